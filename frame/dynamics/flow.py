@@ -1,4 +1,8 @@
-"""Discrete deterministic mapping f_d(t_j; p) of eq. 19 for many parameter sets."""
+"""Trajectories of the outputs of a structure at time nodes, for many parameter sets at once.
+
+A flow is the discrete deterministic mapping f_d(t_j; p) of the paper's eq. 19, with internal
+differentiation by the parameters p.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +36,6 @@ from alphacut.frame.structures.model import Dynamics, StructureModel
 
 MAX_STEPS = 10_000_000
 """Most steps of a motion: bounds of one output at two levels are 320 MB of them."""
-MIN_SUBSTEPS, MAX_SUBSTEPS = 4, 64
-"""Fewest and most parts of a step in `LinearFlow.finer`."""
-MAX_PHASE = 0.8
-"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
 CURE = "keep the parameters where the motion exists, such as positive masses"
 
 
@@ -64,11 +64,14 @@ class StepError(FailedError):
 
 @dataclass(frozen=True, eq=False)
 class Flow(ABC):
-    """Base of mappings from parameter sets to trajectories of the outputs, node by node.
+    """Base class of mappings from parameter sets to trajectories of the outputs at time nodes.
+
+    Below, S is the number of parameter sets, d that of uncertain parameters, T that of time nodes
+    and m that of outputs.
 
     Args:
         system: The structure.
-        names: Its uncertain parameters, in the order of the columns of points.
+        names: The d uncertain parameters, in the order of the columns of points (S, d).
         duration: Length of the simulation, in s.
         step: Length of a step, in s.
 
@@ -93,29 +96,35 @@ class Flow(ABC):
 
     @property
     def exact(self) -> bool:
-        """True if trajectories have no error but rounding; else they are by midpoint steps."""
+        """Whether trajectories have no error but rounding; if not, they are by midpoint steps."""
         return False
 
     @abstractmethod
     def finer(self) -> tuple[Flow, int]:
-        """Return a more accurate flow with steps divided into parts, and the number of parts."""
+        """Return a more accurate flow, and the number of substeps that it divides a step into."""
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Return more accurate trajectories at points (S, d) and this flow's errors, (S, T, m)."""
-        values = self.values(points)  # of a flow that is exact
+        """Return more accurate trajectories at points (S, d), and the errors of this flow there.
+
+        Both have shape (S, T, m). This base class is for exact flows, whose errors are zero.
+        """
+        values = self.values(points)
         return values, np.zeros_like(values)
 
     def reach(self) -> Array:
-        """Size that outputs could have by the energy of the nominal motion, (m,); 0 if unknown."""
+        """Return the size of each output that the energy of the nominal response allows, (m,).
+
+        Zero means that it is not known.
+        """
         return np.zeros(len(self.outputs))
 
     @cached_property
     def time(self) -> Array:
-        """Nodes t_j, shape (T,), in s."""
+        """Time nodes t_j, shape (T,), in s."""
         return time_nodes(self.duration, self.step)
 
     def values(self, points: Array) -> Array:
-        """Return trajectories of the outputs at parameters (S, d), shape (S, T, outputs).
+        """Return trajectories of the outputs at parameter sets (S, d), shape (S, T, m).
 
         Raises:
             RefusedError: A trajectory does not exist, or leaves the range of floating-point
@@ -125,11 +134,21 @@ class Flow(ABC):
         return self._finite(points, derivatives=False).value
 
     def taylor(self, points: Array) -> Jet:
-        """Trajectories (S, T, outputs) with derivatives of the scheme; raises as `values`."""
+        """Return trajectories with first and second derivatives by the d uncertain parameters.
+
+        It is the time-stepping scheme that is differentiated. The jet has shape (S, T, m).
+
+        Args:
+            points: Parameter sets, shape (S, d).
+
+        Raises:
+            RefusedError: As `values` does, or the flow has no derivatives.
+            StepError: A step did not converge.
+        """
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
-        """Trajectories at points (S, d), all of them finite; errors name the point."""
+        """Return trajectories at points (S, d), and raise errors that name the point at fault."""
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
@@ -138,9 +157,9 @@ class Flow(ABC):
         except np.linalg.LinAlgError:
             what = f"a singular matrix at {self._failing_point(points)}"
             raise RefusedError("trajectory", what, "motions that exist", CURE) from None
-        finite = np.isfinite(motion.value)
-        if not finite.all():
-            row, node, _ = np.argwhere(~finite)[0]
+        is_finite = np.isfinite(motion.value)
+        if not is_finite.all():
+            row, node, _ = np.argwhere(~is_finite)[0]
             where = self._point_words(points[row])
             what = f"not finite from t = {self.time[node]:g} s on at {where}"
             cure = f"{CURE}, or a smaller step"
@@ -148,6 +167,7 @@ class Flow(ABC):
         return motion
 
     def _failing_point(self, points: Array) -> str:
+        """Return, in words, the first point that fails alone, or the last one if none does."""
         for point in points:
             try:
                 self._march(point[None], derivatives=False)
@@ -156,13 +176,19 @@ class Flow(ABC):
         return self._point_words(point)
 
     def _point_words(self, point: Array) -> str:
-        pairs, unit = zip(self.names, point, strict=True), self.system.parameter
-        numbers = (f"{name} = {x:g} {unit(name).unit}".rstrip() for name, x in pairs)
-        return ", ".join(numbers) or "the nominal parameters"
+        """Return a parameter set (d,) as words, such as "k1 = 1.2e+08 N/m, m1 = 5e+04 kg"."""
+        words = []
+        for name, value in zip(self.names, point, strict=True):
+            unit = self.system.parameter(name).unit
+            words.append(f"{name} = {value:g} {unit}".rstrip())
+        return ", ".join(words) or "the nominal parameters"
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Trajectories at `points`, shape (S, T, outputs)."""
+        """Return trajectories at `points` (S, d), shape (S, T, m), perhaps not finite.
+
+        With `derivatives` the jet has first and second derivatives by the d parameters.
+        """
 
 
 @dataclass(frozen=True)
@@ -171,8 +197,8 @@ class LinearFlow(Flow):
 
     Args:
         integrator: The method; the other arguments are those of `Flow`.
-        by_modes: Whether compiled code superposes classical modes for values of exact motions. If
-            not they are, to rounding, the same by powers of the step map, which loads no Numba.
+        by_modes: Whether compiled code superposes modes where the integrator is exact. If not, the
+            same trajectories, to rounding, come from powers of the step map, without Numba.
 
     Example:
         >>> from alphacut.frame import StoreyFrame
@@ -186,7 +212,7 @@ class LinearFlow(Flow):
     by_modes: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse, besides, columns that yield, whose motion is not linear."""
+        """Check the arguments; columns that yield are refused too, since they are not linear."""
         super().__post_init__()
         value, allowed = "of columns that yield", "make_flow, which takes them"
         is_linear = self.system.dynamics is Dynamics.LINEAR
@@ -194,125 +220,170 @@ class LinearFlow(Flow):
 
     @property
     def exact(self) -> bool:
-        """True if the integrator is `Exact`."""
+        """Whether the integrator is `Exact`."""
         return isinstance(self.integrator, Exact)
 
     def finer(self) -> tuple[LinearFlow, int]:
-        """Return the exact flow with steps divided into equal parts, and the number of parts."""
-        # parts in which the fastest mode turns by MAX_PHASE at most
+        """Return the exact flow with 4 to 64 equal substeps in a step, and their number.
+
+        Where 64 substeps suffice, the fastest mode turns by at most .8 rad in one of them, so that
+        its curve is resolved. More substeps would cost memory only.
+        """
         phase_per_step = float(frequencies(self.system)[-1]) * self.step
-        parts = int(np.clip(np.ceil(phase_per_step / MAX_PHASE), MIN_SUBSTEPS, MAX_SUBSTEPS))
-        return replace(self, step=self.step / parts, integrator=Exact()), parts
+        substeps = int(np.clip(np.ceil(phase_per_step / 0.8), 4, 64))
+        return replace(self, step=self.step / substeps, integrator=Exact()), substeps
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Return exact trajectories at points (S, d) and this flow's errors, (S, T, m) each."""
-        truth = replace(self, integrator=Exact()).values(points)
-        return truth, np.abs(self.values(points) - truth)
+        """Return exact trajectories at points (S, d), and this flow's errors, (S, T, m) each."""
+        exact_values = replace(self, integrator=Exact()).values(points)
+        return exact_values, np.abs(self.values(points) - exact_values)
 
     def reach(self) -> Array:
-        """Size that outputs could have by the energy of the nominal motion, shape (m,).
+        """Return the size of each output that the energy of the nominal response allows, (m,).
 
-        An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + vᵀ M v).
+        An output r·q + s·v of displacements q and velocities v is at most
+        √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + vᵀ M v), by the inequality of Cauchy and Schwarz. The
+        second factor is the root of twice the energy, here the largest one at a time node.
         """
         nominal = np.array([[self.system.parameters[name] for name in self.names]], float)
         matrices, rows = evaluate(self.system, self.names, nominal, derivatives=False)
         n = matrices.mass.value.shape[-1]
-        states = trajectory(
-            self._step_map(matrices), matrices.start, rows.like(np.eye(2 * n)[None])
-        )
-        energy, size = np.zeros(len(self.time)), np.zeros(len(self.outputs))
-        for k, matrix in enumerate((matrices.stiffness.value[0], matrices.mass.value[0])):
-            part = slice(k * n, (k + 1) * n)
-            x, row = states.value[0, :, part], rows.value[0, :, part]
+        all_states = rows.like(np.eye(2 * n)[None])
+        states = trajectory(self._step_map(matrices), matrices.start, all_states).value[0]
+        energy, squared_size = np.zeros(len(self.time)), np.zeros(len(self.outputs))
+        displacements, velocities = slice(0, n), slice(n, 2 * n)
+        for half, matrix in (
+            (displacements, matrices.stiffness.value[0]),
+            (velocities, matrices.mass.value[0]),
+        ):
+            x, row = states[:, half], rows.value[0, :, half]
             energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
             inverse = np.linalg.pinv(matrix, hermitian=True)
-            size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
-        return np.asarray(np.sqrt(np.maximum(size, 0.0) * max(float(energy.max()), 0.0)))
+            squared_size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
+        largest_energy = max(float(energy.max()), 0.0)
+        return np.asarray(np.sqrt(np.maximum(squared_size, 0.0) * largest_energy))
 
     def _loads(self, matrices: Matrices) -> tuple[Jet, list[History]]:
-        """Accelerations by a unit of each of L loads, (S, n, L), and their histories."""
+        """Return accelerations by a unit of each of L loads, (S, n, L), and the load histories."""
         pushes = matrices.pushes(ground=self.system.ground is not None)
         return pushes, list(histories(self.system).values())
 
     def _step_map(self, matrices: Matrices) -> StepMap:
+        """Return the map of the integrator over one step, for matrices of S parameter sets."""
         steps = len(self.time) - 1
         return self.integrator.step_map(matrices, *self._loads(matrices), self.step, steps)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Outputs of x[k+1] = T x[k] + G load[k] at points (S, d), shape (S, T, outputs)."""
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        motion = self._from_modes(matrices, rows) if self.exact and self.by_modes else None
-        if motion is None:
-            motion = trajectory(self._step_map(matrices), matrices.start, rows)
-        return with_feedthrough(motion, matrices, self.system, self.time)
+        outputs = None
+        if self.exact and self.by_modes:
+            outputs = self._by_superposition(matrices, rows)
+        if outputs is None:
+            outputs = trajectory(self._step_map(matrices), matrices.start, rows)
+        return with_feedthrough(outputs, matrices, self.system, self.time)
 
-    def _from_modes(self, matrices: Matrices, rows: Jet) -> Jet | None:
-        """The same by classical modes, derivatives by complex ones; None where there are none."""
+    def _by_superposition(self, matrices: Matrices, rows: Jet) -> Jet | None:
+        """Return exact trajectories by superposition of modes, without feedthrough, (S, T, m).
+
+        Values come from classical modes, derivatives from complex ones. None is returned where
+        these modes are coupled or too close to each other.
+
+        Args:
+            matrices: Of S parameter sets.
+            rows: Rows of the outputs in the state [q; v], shape (S, m, 2n).
+        """
         pushes, loads = self._loads(matrices)
         if not rows.directions:
             values = classical_trajectory(matrices, rows, pushes, loads, self.time)
-            return None if values is None else rows.like(values)
-        columns = concatenate([matrices.start, concatenate([pushes * 0.0, pushes], -2)], -1)
+            if values is None:
+                return None
+            return rows.like(values)
+        load_columns = concatenate([pushes * 0.0, pushes], -2)
+        columns = concatenate([matrices.start, load_columns], -1)
         return modal_trajectory(state_matrix(matrices), columns, rows, loads, self.time)
 
 
-def with_feedthrough(motion: Jet, matrices: Matrices, system: LinearSystem, time: Array) -> Jet:
-    """Return outputs (S, T, m) whose accelerations also hold the forces over the masses."""
-    feeds = matrices.feeds
-    if feeds is None:
-        return motion
+def with_feedthrough(outputs: Jet, matrices: Matrices, system: LinearSystem, time: Array) -> Jet:
+    """Return outputs with the direct part of the forces, which accelerations have.
+
+    Args:
+        outputs: Trajectories C x(t) of states x, shape (S, T, m).
+        matrices: Of the same S parameter sets. `feeds` has shape (S, m, distinct load histories).
+        system: The structure, which says the loads.
+        time: Time nodes, shape (T,), in s.
+    """
+    feedthrough = matrices.feeds
+    if feedthrough is None:
+        return outputs
     forces = np.stack([history.values(time) for history in distinct_histories(system.loads)])
-    return motion + (feeds @ forces).map(lambda x: x.swapaxes(-1, -2))
+    return outputs + (feedthrough @ forces).map(lambda x: x.swapaxes(-1, -2))
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
-    """Return outputs C x[k], k = 0 … steps, of x[k+1] = T x[k] + G load[k].
+    """Return the outputs C x[k] of x[k+1] = T x[k] + G load[k] at all nodes k = 0 … steps.
 
-    Nodes come in blocks of about √steps. Outputs of a block are C T^j times the state at its first
-    node, j by doubling, and what loads add to a motion from rest, all blocks at once. The states at
-    first nodes are a prefix scan of the states that rest and loads leave (Hillis, Steele 1986).
+    The nodes are divided into blocks of about √steps nodes, since few products of large matrices
+    are faster than many of small ones. Outputs in a block are C T^j times the state at its first
+    node, plus what the loads add to a motion from rest at that node. All blocks are treated at
+    once. The states at the first nodes of the blocks follow by a prefix scan (Hillis, Steele 1986).
 
-    The start has shape (S, N, 1), the rows C (S, m, N), and the outputs (S, steps + 1, m).
+    Args:
+        step_map: T, G and the loads of each step.
+        start: State at t = 0, shape (S, N, 1).
+        rows: Rows C of the outputs, shape (S, m, N).
+
+    Returns:
+        Shape (S, steps + 1, m).
     """
     loads, power = step_map.loads, step_map.transfer
-    count, samples, m = len(loads) + 1, len(start.value), rows.value.shape[-2]
-    observed, size = rows, 1  # C T^j of the nodes j of a block, shape (S, size m, N)
-    while 2 * size**2 < count:
+    nodes, samples, m = len(loads) + 1, len(start.value), rows.value.shape[-2]
+
+    # C T^j for the nodes j of a block, by doubling: shape (S, size m, N)
+    observed, size = rows, 1
+    while 2 * size**2 < nodes:
         observed = concatenate([observed, observed @ power], -2)
         power, size = power @ power, 2 * size
-    blocks = -(-count // size)
-    starts, outputs = start @ np.eye(1, blocks), list[Jet]()
+    blocks = -(-nodes // size)
+
+    # what the loads of a block add to its outputs, and to the state at the next block's first node
+    first_states = start @ np.eye(1, blocks)
+    from_rest = list[Jet]()
     if loads.shape[1]:
         padded = np.zeros((blocks * size, loads.shape[1]))
         padded[: len(loads)] = loads
-        columns = padded.reshape(blocks, size, -1)
+        loads_of_blocks = padded.reshape(blocks, size, -1)
         state = step_map.load @ np.zeros((loads.shape[1], blocks))
         for k in range(size):
-            outputs.append(rows @ state)  # eq. 18, of a linear structure
-            state = step_map.transfer @ state + step_map.load @ columns[:, k].T
-        starts = concatenate([start, state[..., :-1]], -1)
+            from_rest.append(rows @ state)  # eq. 18, of a linear structure
+            state = step_map.transfer @ state + step_map.load @ loads_of_blocks[:, k].T
+        first_states = concatenate([start, state[..., :-1]], -1)
+
+    # prefix scan: to each block's state add T^(size shift) times that of `shift` blocks before
     shift = 1
-    while shift < blocks:  # each state becomes the sum of T^(size i) times that i blocks before
-        carried = power @ starts[..., :-shift]
-        starts = concatenate([starts[..., :shift], starts[..., shift:] + carried], -1)
+    while shift < blocks:
+        carried = power @ first_states[..., :-shift]
+        later = first_states[..., shift:] + carried
+        first_states = concatenate([first_states[..., :shift], later], -1)
         power, shift = power @ power, 2 * shift
-    out = observed @ starts  # (…, S, size m, blocks)
-    if outputs:
-        out = out + concatenate(outputs, -2)
 
-    def in_time(x: Array) -> Array:
-        lead = x.shape[:-3]
-        ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
-        return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
+    outputs = observed @ first_states  # (…, S, size m, blocks)
+    if from_rest:
+        outputs = outputs + concatenate(from_rest, -2)
 
-    return out.map(in_time)
+    def in_time_order(x: Array) -> Array:
+        derivative_axes = x.shape[:-3]
+        by_block = x.reshape((*derivative_axes, samples, size, m, blocks))
+        ordered = np.moveaxis(by_block, -1, -3)
+        return ordered.reshape((*derivative_axes, samples, blocks * size, m))[..., :nodes, :]
+
+    return outputs.map(in_time_order)
 
 
 def exact_flow(flow: object) -> LinearFlow:
-    """Return a flow unchanged if it is the exact motion of a linear structure.
+    """Return a flow unchanged if its trajectories are exact ones of a linear structure.
 
     Raises:
-        UnprovedError: It is not.
+        UnprovedError: They are not.
     """
     if not isinstance(flow, LinearFlow):
         raise UnprovedError("the system is not linear")

@@ -1,11 +1,10 @@
 """One-step methods for linear structures.
 
-All derivatives of a step with respect to parameters share one factorisation (`jet.inverse`): it is
-the scheme that is differentiated, not the differential equation (internal differentiation: Bock
-1981).
+The scheme is differentiated by the parameters, not the differential equation (internal
+differentiation, Bock 1981); all derivatives of a step share one factorisation (`jet.inverse`).
 
-Loads come at their own times: linear between their samples, or that times a sine, with jumps where
-they begin or end. Neither samples nor jumps need lie on nodes.
+Loads are linear between their own samples, or that times a sine, and may jump where they begin or
+end. Neither samples nor jumps need to lie on time nodes.
 """
 
 from __future__ import annotations
@@ -24,31 +23,30 @@ from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Matrices
 
 SAME = 1e-12
-"""Distance of a sample from a node, as a fraction of the step, that is rounding."""
-TERMS = 26
-"""Terms of exp(A τ) where |λ| τ ≤ `MAX_PHASE`: the next is 2^26 / 26! = 2e-19."""
-MAX_PHASE = 2.0
-"""Largest |λ| times a substep of the exact step."""
-MAX_SUBSTEPS = 4096
-SINE_POINTS = 16
-"""Points of Gauss quadrature for a sine that turns by `MAX_PHASE` at most, beside the others."""
+"""Distance of a load's sample from a time node, as a fraction of the step, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class StepMap:
-    """x[k+1] = T x[k] + G load[k] with x = [q; v]."""
+    """The map x[k+1] = T x[k] + G load[k] of the states x = [q; v] of S structures.
 
-    transfer: Jet  # T, (S, 2n, 2n)
-    load: Jet  # G, (S, 2n, L)
-    loads: Array  # what G acts on in each step, (steps, L)
+    Args:
+        transfer: T, shape (S, 2n, 2n).
+        load: G, shape (S, 2n, numbers that describe the loads in a step).
+        loads: These numbers for each step, which G multiplies, shape (steps, numbers).
+    """
+
+    transfer: Jet
+    load: Jet
+    loads: Array
 
 
 @dataclass(frozen=True)
 class Midpoint:
     """Midpoint discrete Lagrangian with midpoint Lagrange–d'Alembert forcing.
 
-    Eliminating the velocity gives (M/h + D/2 + hK/4) q[k+1] = (2M/h − hK/2) q[k] − (M/h − D/2 +
-    hK/4) q[k−1]. On a linear structure this is Newmark's method with β = 1/4 and γ = 1/2.
+    On a linear structure this is Newmark's method with β = 1/4 and γ = 1/2: without the velocity,
+    (M/h + D/2 + h K/4) q[k+1] = (2 M/h − h K/2) q[k] − (M/h − D/2 + h K/4) q[k−1].
     """
 
     name: ClassVar[str] = "midpoint"
@@ -56,9 +54,14 @@ class Midpoint:
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
     ) -> StepMap:
-        """Return the map of each of `count` steps, whose velocities are M⁻¹ times the momenta.
+        """Return the map of one step, whose velocities are M⁻¹ times the momenta.
 
-        `pushes` are accelerations by a unit of each of the L loads, shape (S, n, L).
+        Args:
+            matrices: Of S structures with n unknowns.
+            pushes: Accelerations by a unit of each of the L loads, shape (S, n, L).
+            loads: Histories of the loads.
+            step: Length h of a step, in s.
+            count: Number of steps.
         """
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
@@ -67,7 +70,8 @@ class Midpoint:
         # v[k+1] = 2 (q[k+1] − q[k])/h − v[k]
         q_by_q = implicit_inverse @ (inertia - spring)
         q_by_v = implicit_inverse @ m.mass
-        q_by_load = q_by_v @ (concatenate([pushes, pushes], -1) * (h / 4))  # the mean load, h/2
+        # the load of a step is the mean of its values at both ends, with a weight of h/2
+        q_by_load = q_by_v @ (concatenate([pushes, pushes], -1) * (h / 4))
         eye = np.eye(m.mass.value.shape[-1])
         upper = concatenate([q_by_q, q_by_v], -1)
         lower = concatenate([(q_by_q - eye) * (2 / h), q_by_v * (2 / h) - eye], -1)
@@ -77,46 +81,65 @@ class Midpoint:
 
 @dataclass(frozen=True)
 class Exact:
-    """Exact propagator exp(A h) and Duhamel integral; arguments and result as of `Midpoint`."""
+    """Exact solution of a step: the propagator exp(A h) and Duhamel's integral."""
 
     name: ClassVar[str] = "exact"
 
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
     ) -> StepMap:
-        """Return the exact map of each of `count` steps.
+        """Return the exact map of one step; arguments as for `Midpoint.step_map`.
 
-        Over a substep of length h, ∫ exp(A τ) b f(h − τ) dτ = Σ_k (A h)^k b / k! ∫ (τ/h)^k f dτ:
-        G holds (A h)^k b / k! of each load, b = [0; push], carried on to the step's end, and
-        `loads` the moments.
+        With the state matrix A and b = [0; push], a load f adds to the state in a substep of
+        length h
+
+            ∫ exp(A τ) b f(h − τ) dτ = Σ_k (A h)^k b / k! · ∫ (τ/h)^k f(h − τ) dτ.
+
+        G holds the vectors (A h)^k b / k! of each load and substep, carried on to the end of the
+        step; `StepMap.loads` holds the integrals, the moments of the load.
 
         Raises:
-            RefusedError: A step would take more than `MAX_SUBSTEPS` substeps.
+            RefusedError: A step would take more than 4096 substeps.
         """
+        # In a substep |λ| h ≤ 2 for all eigenvalues, up to which 26 terms of the exponential are
+        # enough: the next one is 2^26/26! = 2e-19.
+        largest_phase, terms, most_substeps = 2.0, 26, 4096
         A, substeps = state_matrix(matrices), 1
         if loads:
             fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
             fastest = max(fastest, *(load.frequency for load in loads), 1e-300)
-            substeps = 1 << max(0, ceil(log2(max(1.0, fastest * step / MAX_PHASE)) - 1e-9))
-            longest = f"up to {MAX_PHASE * MAX_SUBSTEPS / fastest:.2g} s"
+            # a power of 2, so that doubling the time ends at a whole step
+            doublings = ceil(log2(max(1.0, fastest * step / largest_phase)) - 1e-9)
+            substeps = 1 << max(0, doublings)
+            longest = f"up to {largest_phase * most_substeps / fastest:.2g} s"
             allowed = f"{longest} with motions as fast as {fastest:.3g} rad/s under a load"
-            require(substeps <= MAX_SUBSTEPS, "step", value=f"{step:g} s", allowed=allowed)
+            require(substeps <= most_substeps, "step", value=f"{step:g} s", allowed=allowed)
         h = step / substeps
+
         term = concatenate([pushes * 0.0, pushes], -2)
         series = [term]
-        for k in range(1, TERMS):
+        for k in range(1, terms):
             term = A @ term * (h / k)
             series.append(term)
-        columns = [concatenate([x[..., i : i + 1] for x in series], -1) for i in range(len(loads))]
+        columns = []  # of each load, by powers of τ/h
+        for i in range(len(loads)):
+            columns.append(concatenate([x[..., i : i + 1] for x in series], -1))
         transfer = exponential(A * h)
-        for _ in range(substeps.bit_length() - 1):  # doubles the time until it is a step
+        for _ in range(substeps.bit_length() - 1):
+            # the columns of earlier substeps are carried on by exp(A t), t the time so far
             columns = [concatenate([x, transfer @ x], -1) for x in columns]
             transfer = transfer @ transfer
-        moments = [load_moments(load, h, count * substeps, TERMS) for load in loads]
-        # the last substep comes first, as in the columns
-        by_step = [x.reshape(count, substeps, TERMS)[:, ::-1].reshape(count, -1) for x in moments]
-        gain = concatenate(columns, -1) if loads else term
-        return StepMap(transfer, gain, np.concatenate([np.empty((count, 0)), *by_step], -1))
+
+        moments_by_step = [np.empty((count, 0))]
+        for load in loads:
+            moments = load_moments(load, h, count * substeps, terms)
+            # the last substep comes first, as in the columns
+            last_first = moments.reshape(count, substeps, terms)[:, ::-1]
+            moments_by_step.append(last_first.reshape(count, -1))
+        gain = term
+        if loads:
+            gain = concatenate(columns, -1)
+        return StepMap(transfer, gain, np.concatenate(moments_by_step, -1))
 
 
 Integrator = Midpoint | Exact
@@ -124,21 +147,25 @@ INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), Exact())}
 
 
 def state_matrix(m: Matrices) -> Jet:
-    """Return the state matrix A of [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
+    """Return the state matrices A of [q; v]˙ = A [q; v] (eq. 17, eq. 23), shape (S, 2n, 2n)."""
     inverse_mass = m.inverse_mass
     lower = concatenate([-(inverse_mass @ m.stiffness), -(inverse_mass @ m.damping)], -1)
     n = m.mass.value.shape[-1]
-    upper = lower.like(np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape))
+    velocity_rows = np.hstack([np.zeros((n, n)), np.eye(n)])
+    upper = lower.like(np.broadcast_to(velocity_rows, lower.value.shape))
     return concatenate([upper, lower], -2)
 
 
 def exponential(z: Jet) -> Jet:
-    """Return the matrix exponential with derivatives, shape (…, N, N), by scaling and squaring."""
+    """Return the exponentials of matrices (…, N, N), with derivatives, by scaling and squaring."""
     norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
-    squarings = max(0, ceil(log2(norm / 0.25))) if norm > 0 else 0
+    squarings = 0
+    if norm > 0:
+        squarings = max(0, ceil(log2(norm / 0.25)))
     z = z * 0.5**squarings
     eye = np.eye(z.value.shape[-1])
-    degree = 12  # remainder 0.25^13/13! < 1e-17
+    # Horner's rule for Σ_k z^k/k! up to degree 12; the remainder is below .25^13/13! < 1e-17
+    degree = 12
     series = z * (1 / degree) + eye
     for k in range(degree - 1, 0, -1):
         series = z @ series * (1 / k) + eye
@@ -149,43 +176,62 @@ def exponential(z: Jet) -> Jet:
 
 @lru_cache(maxsize=8)
 def load_moments(history: History, step: float, count: int, order: int) -> Array:
-    """Return ∫ s^k f dt of a load f over each of `count` steps, k < `order`, shape (count, order).
+    """Return the moments ∫ s^k f(t) dt, k < `order`, of a load f over each step.
 
-    s falls from 1 at a step's beginning to 0 at its end.
+    In each step s falls from 1 at its beginning to 0 at its end. The integrals are exact to
+    rounding.
+
+    Args:
+        history: The load f.
+        step: Length of a step, in s.
+        count: Number of steps from t = 0.
+        order: Number of moments of each step.
+
+    Returns:
+        Shape (count, order), in the unit of the load times s.
     """
-    # segments between neighbouring nodes and samples: their steps, rising, and times in these
+    # Segments in which the load is smooth, between neighbouring nodes and samples. Each has the
+    # number of its step (`home`), and its start and end from the beginning of that step.
     samples = history.start + np.arange(len(history.samples)) * history.step
     nearest = np.round(samples / step)
-    inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
-    home = np.concatenate([np.arange(count), np.floor(samples[inner] / step).astype(int)])
-    start = np.concatenate([np.zeros(count), samples[inner] - home[count:] * step])
+    is_inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
+    home = np.concatenate([np.arange(count), np.floor(samples[is_inner] / step).astype(int)])
+    start = np.concatenate([np.zeros(count), samples[is_inner] - home[count:] * step])
     in_time = np.lexsort((start, home))
     home, start = home[in_time], start[in_time]
     end = np.append(start[1:], 0.0)
-    end[np.append(np.diff(home) > 0, True)] = step
-    # Gauss quadrature in each, exact, with a sine to round-off
-    points, weights = np.polynomial.legendre.leggauss(
-        order // 2 + 1 + (SINE_POINTS if history.frequency else 0)
-    )
+    is_last_of_step = np.append(np.diff(home) > 0, True)
+    end[is_last_of_step] = step
+
+    # Gauss quadrature in each segment: exact for s^k times a line; for a sine that turns by at
+    # most 2 rad, 16 more points are exact to rounding
+    point_count = order // 2 + 1
+    if history.frequency:
+        point_count += 16
+    points, weights = np.polynomial.legendre.leggauss(point_count)
     length = (end - start)[:, None]
-    since = start[:, None] + length * (points + 1) / 2
-    time = home[:, None] * step + since
-    load = history.envelope(time) * history.wave(time) * (length / 2 * weights)
-    first_segment = np.searchsorted(home, np.arange(count))  # of each step
+    since_step = start[:, None] + length * (points + 1) / 2
+    time = home[:, None] * step + since_step
+    weighted = history.envelope(time) * history.wave(time) * (length / 2 * weights)
+    first_segment_of_step = np.searchsorted(home, np.arange(count))
     moments: Array = np.empty((count, order))
     for k in range(order):
-        moments[:, k] = np.add.reduceat(load.sum(1), first_segment)
-        load = load * (1 - since / step)
+        moments[:, k] = np.add.reduceat(weighted.sum(1), first_segment_of_step)
+        weighted = weighted * (1 - since_step / step)
     return moments
 
 
 def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
-    """Return the best lines through L loads in each step by end values, shape (count, 2 L).
+    """Return the line through each of L loads in each step that has its impulse and first moment.
 
-    A line has the load's impulse and first moment in the step, and is the load where that is
-    linear. Values at the beginnings of steps come first, load by load, then those at their ends.
+    A load that is linear in a step is its own line.
+
+    Returns:
+        Values of the lines, shape (count, 2 L): of each load at the beginning of the step, then of
+        each load at its end.
     """
-    moments = np.array([load_moments(x, step, count, 2) for x in loads])
-    mean, moment = np.moveaxis(moments.reshape(len(loads), count, 2) / step, -1, 0)
-    tilt = 2 * moment - mean
+    moments = np.array([load_moments(load, step, count, 2) for load in loads])
+    mean, first_moment = np.moveaxis(moments.reshape(len(loads), count, 2) / step, -1, 0)
+    # of a line from a to b: mean (a + b)/2 and first moment a/3 + b/6, so that a − b = 6 tilt
+    tilt = 2 * first_moment - mean
     return np.concatenate([mean + 3 * tilt, mean - 3 * tilt]).T

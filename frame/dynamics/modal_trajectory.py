@@ -1,14 +1,18 @@
-"""Trajectories of a linear structure and their derivatives by parameters, from its complex modes.
+"""Trajectories of linear structures by superposition of modes.
 
-With A v_k = λ_k v_k the outputs are Re Σ_k C v_k (w_k·b) ρ(t; λ_k) over all modes of the state
-matrix, w_k the rows of the inverse of the matrix of all v_k, b the start or the push of a load and
-ρ = exp(λ t) or the Duhamel integral of the load. λ_k and v_k are smooth where eigenvalues are
-apart, and their derivatives follow from those of A (Stewart, Sun 1990); ρ has its own by λ.
+`modal_trajectory` takes complex modes of the state matrix A and gives derivatives by the parameters
+as well. With A v_k = λ_k v_k the outputs are Re Σ_k C v_k (w_k·b) ρ(t; λ_k) over all modes. C are
+the rows of the outputs, w_k the rows of the inverse of the matrix of all v_k, b the initial state
+with ρ = exp(λ t), or the column of a load with its Duhamel integral ρ. Where eigenvalues are apart,
+λ_k and v_k are smooth, and their derivatives follow from those of A (Stewart, Sun 1990).
+
+`classical_trajectory` takes classical modes, of structures whose damping does not couple them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,145 +23,209 @@ from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import responses_at_nodes, step_integrals
 from alphacut.frame.structures.linear import Matrices, undamped_modes
 
-MIN_DISTANCE = 1e-4
-"""Relative distance of two eigenvalues below which second derivatives of their modes lose more than
-eight digits."""
-MAX_COUPLING = 1e-13
-"""Damping between two modes, as a fraction of the largest of one mode, that is rounding: it changes
-the motion by this fraction times damping times duration, however near the modes are."""
-LEAST_TURN = 1e-3
-"""Least ω/ω₀ of a mode; the motion of one that hardly oscillates loses this factor of digits."""
-MAX_INTERVALS = 16
-"""Most intervals in a step whose ends are samples of all loads."""
-ROUND_OFF = 1e-7
-"""The same over the largest eigenvalue: double ones at 0 part by the root of rounding."""
-
 
 def modal_trajectory(
     state_matrix: Jet, columns: Jet, rows: Jet, loads: Sequence[History], time: Array
 ) -> Jet | None:
-    """Return outputs at nodes with two derivatives, shape (S, T, m); None where modes are too near.
+    """Return outputs at time nodes with first and second derivatives, by complex modes.
 
-    A is the state matrix (S, N, N), C are the rows (S, m, N), and columns (S, N, 1 + L) the initial
-    state and what a unit of each of L loads pushes.
+    Args:
+        state_matrix: A of S parameter sets, shape (S, N, N).
+        columns: The initial state, then what a unit of each of L loads adds to the rate of the
+            state, shape (S, N, 1 + L).
+        rows: Rows C of the m outputs, shape (S, m, N).
+        loads: Histories of the L loads.
+        time: T time nodes, shape (T,), in s.
+
+    Returns:
+        Shape (S, T, m). None where two eigenvalues are too close, or where a mode grows or turns
+        beyond the range of the recursion of Duhamel's integral.
     """
-    modes = _modes(state_matrix)
+    modes = _complex_modes(state_matrix)
     if modes is None:
         return None
-    rate, shapes, adjoint = modes
-    # one of each conjugate pair, which stand first, twice
-    weight = 1.0 + np.sign(rate.value.imag)
-    count = int((weight > 0).sum(1).max())
-    rate, weight = rate[:, :count], weight[:, :count]
-    read, moved = (rows @ shapes)[..., :count], (adjoint @ columns)[:, :count]
+    # of each conjugate pair the first one is kept, with weight 2; real modes have weight 1
+    weight = 1.0 + np.sign(modes.rate.value.imag)
+    kept = int((weight > 0).sum(1).max())
+    rate, weight = modes.rate[:, :kept], weight[:, :kept]
+    at_outputs = (rows @ modes.shapes)[..., :kept]
+    of_columns = (modes.adjoint @ columns)[:, :kept]
+
+    # ρ, ρ′ and ρ″ by λ of the initial state and of each load, shape (S, 3, modes, T) each
     free = np.exp(rate.value[..., None] * time)
-    # ρ with two derivatives, (S, 3, n, T) each
     waves = [np.stack([free, time * free, time**2 * free], 1)]
     for load in loads:
         try:
             found, _ = responses_at_nodes(rate.value.ravel(), load, time, 2)
-        except UnprovedError:  # a motion grows, or turns, out of the range of the recursion
+        except UnprovedError:
             return None
-        waves.append(found.reshape(3, len(time), *rate.value.shape).transpose(2, 0, 3, 1))
-    amplitudes = [
-        read * moved[:, None, :, source] * weight[:, None] for source in range(1 + len(loads))
-    ]
+        by_mode = found.reshape(3, len(time), *rate.value.shape)
+        waves.append(by_mode.transpose(2, 0, 3, 1))
     table = np.concatenate(waves, 1).reshape(len(weight), -1, len(time))
-    table = np.concatenate([table.real, -table.imag], -2)
+    real_table = np.concatenate([table.real, -table.imag], -2)
+
+    factors_by_column = []
+    for column in range(1 + len(loads)):
+        amplitude = at_outputs * of_columns[:, None, :, column] * weight[:, None]
+        factors_by_column.append(_factors_of_waves(amplitude, rate[:, None]))
     derivatives = list[Array]()
-    for factors in zip(*(_chain(x, rate[:, None]) for x in amplitudes), strict=True):
+    for factors in zip(*factors_by_column, strict=True):
         factor = np.concatenate(factors, -1)
-        motion = np.concatenate([factor.real, factor.imag], -1) @ table  # its real part
-        derivatives.append(np.asarray(motion.swapaxes(-1, -2)))
+        outputs = np.concatenate([factor.real, factor.imag], -1) @ real_table  # the real part
+        derivatives.append(np.asarray(outputs.swapaxes(-1, -2)))
     return Jet.of(*derivatives)
 
 
-def _chain(a: Jet, rate: Jet) -> list[Array]:
-    """Factors of ρ, ρ′ and ρ″ in a ρ(λ) and its derivatives, (…, S, m, 3 n), for a (S, m, n)."""
+def _factors_of_waves(a: Jet, rate: Jet) -> list[Array]:
+    """Return what multiplies ρ, ρ′ and ρ″ in a ρ(λ) and in its derivatives by the parameters.
+
+    With subscripts for derivatives by parameters, (a ρ)_i = a_i ρ + a λ_i ρ′ and (a ρ)_ij =
+    a_ij ρ + (a_i λ_j + a_j λ_i + a λ_ij) ρ′ + a λ_i λ_j ρ″.
+
+    Args:
+        a: Amplitudes, shape (S, m, modes).
+        rate: Eigenvalues λ, shape (S, 1, modes).
+
+    Returns:
+        Factors of the values, of first and of second derivatives, shapes (S, m, 3 modes),
+        (d, S, m, 3 modes) and (d, d, S, m, 3 modes): of ρ for all modes, of ρ′, then of ρ″.
+    """
     slope, zero = rate.first, 0.0 * a.value
-    first = a.first, a.value * slope, 0.0 * a.first
+    of_value = a.value, zero, zero
+    of_first = a.first, a.value * slope, 0.0 * a.first
     cross = a.first[:, None] * slope
     mixed = cross + cross.swapaxes(0, 1) + a.value * rate.second
-    second = a.second, mixed, a.value * slope[:, None] * slope
-    return [np.concatenate(x, -1) for x in ((a.value, zero, zero), first, second)]
+    of_second = a.second, mixed, a.value * slope[:, None] * slope
+    return [np.concatenate(factors, -1) for factors in (of_value, of_first, of_second)]
 
 
-def _modes(A: Jet) -> tuple[Jet, Jet, Jet] | None:
-    """Eigenvalues (S, N), modes as columns and the inverse of their matrix, (S, N, N), with jets.
+class _ComplexModes(NamedTuple):
+    """Modes of S state matrices with derivatives by the parameters.
 
-    Eigenvalues fall with their imaginary part. A mode's derivatives have no part of the mode
-    itself. None where two eigenvalues are nearer than `MIN_DISTANCE`.
+    `rate` are the eigenvalues, shape (S, N), with falling imaginary parts. `shapes` holds the modes
+    as columns, `adjoint` is the inverse of this matrix; both have shape (S, N, N).
     """
+
+    rate: Jet
+    shapes: Jet
+    adjoint: Jet
+
+
+def _complex_modes(A: Jet) -> _ComplexModes | None:
+    """Return the modes of state matrices (S, N, N); None where two eigenvalues are too close.
+
+    The derivatives of a mode v_k are chosen without a component along v_k itself.
+    """
+    # Below a relative distance of 1e-4 the second derivatives of modes lose more than eight digits.
+    # Double eigenvalues at zero split by the root of the rounding, 1e-7 of the largest one.
+    relative_distance, of_largest = 1e-4, 1e-7
     values, vectors = np.linalg.eig(A.value)
     order = np.argsort(-values.imag, axis=-1, kind="stable")
     values = np.take_along_axis(values, order, -1)
     V = np.take_along_axis(vectors, order[:, None], -1).astype(complex)
     gaps = values[:, None] - values[:, :, None]  # λ_k − λ_l in row l, column k
-    same = np.eye(values.shape[-1], dtype=bool)
+    is_diagonal = np.eye(values.shape[-1], dtype=bool)
     size = np.abs(values[:, None])
-    least_gap = MIN_DISTANCE * size + ROUND_OFF * size.max(-1, keepdims=True)
-    if (np.abs(gaps) < least_gap)[:, ~same].any():
+    min_gap = relative_distance * size + of_largest * size.max(-1, keepdims=True)
+    if (np.abs(gaps) < min_gap)[:, ~is_diagonal].any():
         return None
-    quotient = np.where(same, 0.0, 1 / np.where(same, 1.0, gaps))
+
+    # With W = V⁻¹ and B_i = W A_i V: λ_i = diag B_i and V_i = V U_i, where U_i = B_i / gaps off the
+    # diagonal. Once more: with C_ij = W A_ij V + (B_i U_j − U_j λ_i) + (B_j U_i − U_i λ_j),
+    # λ_ij = diag C_ij and V_ij = V (C_ij / gaps) off the diagonal.
+    inverse_gaps = np.where(is_diagonal, 0.0, 1 / np.where(is_diagonal, 1.0, gaps))
     W = np.linalg.inv(V)
-    B, bend = W @ A.first @ V, W @ A.second @ V
-    slope = np.diagonal(B, axis1=-2, axis2=-1)
-    U = B * quotient
-    cross = B[:, None] @ U - U * slope[:, None, :, None, :]
-    bend = bend + cross + cross.swapaxes(0, 1)
-    curve = np.diagonal(bend, axis1=-2, axis2=-1)
-    shapes = Jet.of(V, V @ U, V @ (bend * quotient))
-    return Jet.of(values, slope, curve), shapes, inverse(shapes)
+    B, C = W @ A.first @ V, W @ A.second @ V
+    rate_first = np.diagonal(B, axis1=-2, axis2=-1)
+    U = B * inverse_gaps
+    cross = B[:, None] @ U - U * rate_first[:, None, :, None, :]
+    C = C + cross + cross.swapaxes(0, 1)
+    rate_second = np.diagonal(C, axis1=-2, axis2=-1)
+    shapes = Jet.of(V, V @ U, V @ (C * inverse_gaps))
+    return _ComplexModes(Jet.of(values, rate_first, rate_second), shapes, inverse(shapes))
 
 
 def classical_trajectory(
     matrices: Matrices, rows: Jet, pushes: Jet, loads: Sequence[History], time: Array
 ) -> Array | None:
-    """Return outputs at nodes, shape (S, T, m), of structures whose undamped modes are uncoupled.
+    """Return outputs at time nodes of structures whose undamped modes stay uncoupled.
 
-    With ΦᵀMΦ = 1 the motion is q = Φ Im(z/ω), v = Φ Im(σ z/ω) of ż = σ z + ΦᵀM b f(t) and
-    z(0) = ΦᵀM (v₀ − σ̄ q₀), exact where f is linear in each of equal intervals.
+    Each mode with ΦᵀMΦ = 1, decay δ and frequency ω has σ = −δ + iω. From ż = σ z + ΦᵀM b f(t) and
+    z(0) = ΦᵀM (v₀ − σ̄ q₀) follow q = Φ Im(z/ω) and v = Φ Im(σ z/ω), b the accelerations by a unit
+    of a load f. This is exact where f is linear in each of equal intervals.
 
-    `pushes` are the accelerations b by a unit of each of L loads, shape (S, n, L). None where modes
-    are coupled or do not oscillate, or where loads have other intervals.
+    Args:
+        matrices: Of S structures with n unknowns.
+        rows: Rows of the m outputs in [q; v], shape (S, m, 2n).
+        pushes: Accelerations b by a unit of each of L loads, shape (S, n, L).
+        loads: Histories of the L loads.
+        time: T time nodes, shape (T,), in s.
+
+    Returns:
+        Shape (S, T, m). None where the modes are coupled or hardly oscillate, where a mass matrix
+        is not positive definite, or where no division of a step into 16 equal intervals or fewer
+        has all samples of the loads at its ends.
     """
     step = float(time[1])
-    counts = (k for k in range(1, MAX_INTERVALS + 1) if all(_fits(x, step / k) for x in loads))
-    intervals = next(counts, 0)  # in a step
+    intervals = _intervals_of_step(loads, step)
+    if intervals is None:
+        return None
     try:
         squared, shapes = undamped_modes(matrices.mass.value, matrices.stiffness.value)
-    except np.linalg.LinAlgError:  # a mass is not positive definite
+    except np.linalg.LinAlgError:
         return None
-    across = shapes.swapaxes(-1, -2)
-    damping = across @ matrices.damping.value @ shapes
+    transposed = shapes.swapaxes(-1, -2)
+    damping = transposed @ matrices.damping.value @ shapes
     decay = np.einsum("skk->sk", damping) / 2
     coupling = np.abs(damping - 2 * decay[:, None] * np.eye(decay.shape[-1]))
-    turn = squared - decay**2  # ω²
-    is_coupled = coupling.max() > MAX_COUPLING * 2 * np.abs(decay).max()
-    if not intervals or is_coupled or not (turn > LEAST_TURN**2 * squared).all():
+    # damping between modes of 1e-13 of the largest decay is rounding: it changes the motion by this
+    # fraction times damping times duration, however close the modes are
+    is_coupled = coupling.max() > 1e-13 * 2 * np.abs(decay).max()
+    squared_omega = squared - decay**2
+    # ω below 1e-3 of the undamped frequency would lose three digits in z/ω
+    oscillates = (squared_omega > 1e-3**2 * squared).all()
+    if is_coupled or not oscillates:
         return None
-    omega = np.sqrt(turn)
+
+    omega = np.sqrt(squared_omega)
     sigma = -decay + 1j * omega
-    weight, (q0, v0) = across @ matrices.mass.value, np.split(matrices.start.value, 2, axis=1)
-    start = (weight @ v0)[..., 0] - sigma.conj() * (weight @ q0)[..., 0]
+    to_modes = transposed @ matrices.mass.value
+    q0, v0 = np.split(matrices.start.value, 2, axis=1)
+    start = (to_modes @ v0)[..., 0] - sigma.conj() * (to_modes @ q0)[..., 0]
     q_rows, v_rows = np.split(rows.value, 2, axis=-1)
-    read = (q_rows @ shapes + sigma[:, None] * (v_rows @ shapes)) / omega[:, None]
-    h, out = step / intervals, np.empty((len(sigma), len(time), read.shape[1]))
-    # a load's line in each interval, (I, L), from two of its values, which are no jumps
+    at_outputs = (q_rows @ shapes + sigma[:, None] * (v_rows @ shapes)) / omega[:, None]
+
+    # the line of each load in each interval, from its values at two inner times, which are no jumps
+    h = step / intervals
     begins = np.arange((len(time) - 1) * intervals) * h
-    quarters = np.array([[x.values(begins + share * h) for x in loads] for share in (0.25, 0.75)])
-    quarters = quarters.reshape(2, len(loads), len(begins)).swapaxes(1, 2)
-    slopes = (quarters[1] - quarters[0]) * (2 / h)
-    ends, moved = quarters[1] + slopes * (h / 4), weight @ pushes.value
-    _march_modes(sigma, h, intervals, start, moved, ends, slopes, read, out)
-    return out
+    at_quarters = []
+    for fraction in (0.25, 0.75):
+        values = np.array([load.values(begins + fraction * h) for load in loads])
+        at_quarters.append(values.reshape(len(loads), len(begins)).T)
+    first_quarter, last_quarter = at_quarters
+    slopes = (last_quarter - first_quarter) * (2 / h)
+    ends = last_quarter + slopes * (h / 4)
+    of_loads = to_modes @ pushes.value
+    outputs = np.empty((len(sigma), len(time), at_outputs.shape[1]))
+    _march_modes(sigma, h, intervals, start, of_loads, ends, slopes, at_outputs, outputs)
+    return outputs
 
 
-def _fits(load: History, interval: float) -> bool:
-    """Whether a load is linear in intervals that begin at t = 0."""
+def _intervals_of_step(loads: Sequence[History], step: float) -> int | None:
+    """Return the least number of intervals of a step, up to 16, in which all loads are linear."""
+    for intervals in range(1, 17):
+        if all(_is_linear(load, step / intervals) for load in loads):
+            return intervals
+    return None
+
+
+def _is_linear(load: History, interval: float) -> bool:
+    """Whether a load is linear in each of equal intervals from t = 0 on."""
+    if load.frequency:
+        return False
     ratios = np.array([load.step, load.start]) / interval
     is_multiple = np.abs(ratios - np.round(ratios)).max() < 1e-9 * max(1.0, ratios.max())
-    return not load.frequency and bool(is_multiple) and ratios[0] > 0.5
+    return bool(is_multiple) and bool(ratios[0] > 0.5)
 
 
 @compiled
@@ -172,8 +240,25 @@ def _march_modes(
     read: Array,
     out: Array,
 ) -> None:
-    """Write Im Σ_k read_ok z_k, z(t + h) = exp(σ h) z(t) + moved (J₀ end − J₁ slope), (S, T, m)."""
-    (samples, n_nodes, m), n, n_loads = out.shape, sigma.shape[1], moved.shape[2]
+    """Write the outputs Im Σ_k read_ok z_k at time nodes to `out`, in place.
+
+    Over an interval z_k(t + h) = exp(σ_k h) z_k(t) + Σ_l moved_kl (J₀ end_l − J₁ slope_l), where
+    J_j = ∫ exp(σ_k τ) τ^j dτ over the interval and load l is end_l − slope_l τ a time τ before its
+    end.
+
+    Args:
+        sigma: σ of n modes, shape (S, n).
+        h: Length of an interval.
+        intervals: Number of intervals in a step.
+        start: z at t = 0, shape (S, n).
+        moved: ΦᵀM b of each load, shape (S, n, L).
+        ends: Values of the loads at the ends of the intervals, shape (I, L).
+        slopes: Slopes of the loads in the intervals, shape (I, L).
+        read: Output rows times mode shapes, shape (S, m, n).
+        out: Shape (S, T, m).
+    """
+    samples, n_nodes, m = out.shape
+    n, n_loads = sigma.shape[1], moved.shape[2]
     integrals, factor = np.empty(4, np.complex128), np.empty(n, np.complex128)
     by_end, by_slope = np.empty((2, n_loads, n), np.complex128)
     for s in range(samples):

@@ -1,9 +1,9 @@
-"""Trajectories of Lagrangian systems with derivatives by the inputs, compiled by Numba.
+"""Trajectories of Lagrangian systems by the midpoint variational integrator, compiled by Numba.
 
-A state is (q, π), coordinates and momenta, 2n numbers, with first derivatives (2n, d) and second
-ones (2n, d, d) by d inputs. The equations come as tapes (`calculus/tape.py`), so that one
-compilation serves all systems. Loops are written out: they compile in a fraction of the time that
-array expressions take.
+A state is (q, π): n coordinates and n momenta, with first derivatives of shape (2n, d) and second
+ones of shape (2n, d, d) by d uncertain inputs. The equations come as tapes (`calculus/tape.py`), so
+that one compilation serves all systems. Loops are written out, since Numba compiles them in a
+fraction of the time that array expressions take.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -30,10 +30,31 @@ from alphacut.frame.structures.linear import has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import yields
 
-Expressions = tuple[list[Any], list[Any], list[Any]]
-"""Components, and the symbols they depend on: those to differentiate by, and others."""
 MAX_ITERATIONS = 30
-"""Newton steps after which a time step has not converged."""
+"""Newton iterations after which a time step has failed; five or six are usual."""
+
+
+class Expressions(NamedTuple):
+    """SymPy expressions and the symbols that they depend on.
+
+    Derivatives are taken by the symbols in `active`; those in `constants` are the others.
+    """
+
+    components: list[Any]
+    active: list[Any]
+    constants: list[Any]
+
+
+class SystemExpressions(NamedTuple):
+    """What a time step needs of a Lagrangian system.
+
+    `momenta` are those before and after a step, of the coordinates at both ends. `outputs` are the
+    observed quantities of a state (eq. 18), and `initial` is the state at t = 0.
+    """
+
+    momenta: Expressions
+    outputs: Expressions
+    initial: Expressions
 
 
 def make_flow(
@@ -43,20 +64,22 @@ def make_flow(
     step: float,
     integrator: str | Integrator | None = None,
 ) -> Flow:
-    """Return the flow of a structure, as its dynamics ask for.
+    """Return the flow that integrates a structure.
 
     Args:
         model: The structure.
-        names: Uncertain parameters.
+        names: Names of the uncertain parameters.
         duration: Length of the simulation, in s.
         step: Length of a step, in s.
-        integrator: Time stepping or its name. If not given it is exact where the structure has an
-            exact solution, else the midpoint scheme.
+        integrator: The time integrator or its name. If it is not given, it is "exact" where the
+            structure has an exact solution, else "midpoint".
 
     Raises:
-        RefusedError: The structure has no such parameter, or is not integrated so.
+        RefusedError: The structure has no such parameter, or no such integrator.
     """
-    name = integrator.name if isinstance(integrator, Integrator) else integrator
+    name = integrator
+    if isinstance(integrator, Integrator):
+        name = integrator.name
     if yields(model):
         require_choice("integrator", name or "exact", ["exact"])
         return YieldingFlow(model, tuple(names), duration, step)
@@ -77,74 +100,93 @@ class LagrangianFlow(Flow):
     system: LagrangianSystem
 
     def finer(self) -> tuple[LagrangianFlow, int]:
-        """Return the flow with half the step, and 2, the parts of a step; tapes are shared."""
+        """Return the flow with half the step, and 2 for the substeps; both share their tapes."""
         fine = replace(self, step=self.step / 2)
         shared = ("_expressions", "_newton", "_plain")
         fine.__dict__.update({name: getattr(self, name) for name in shared})
         return fine, 2
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Return trajectories of half the step at points (S, d) and this flow's errors, (S, T, m).
+        """Return trajectories with half the step at points (S, d), and the errors of this flow.
 
-        The error is 4/3 of the distance between both, by extrapolation of a method of order 2.
+        Both have shape (S, T, m). By Richardson's extrapolation of a method of order 2 the error is
+        4/3 of the distance between both trajectories.
         """
         fine = self.finer()[0].values(points)[:, ::2]
         return fine, np.abs(self.values(points) - fine) * 4 / 3
 
     @cached_property
-    def _expressions(self) -> tuple[Expressions, Expressions, Expressions]:
-        """Momenta before and after a step; outputs of a state (eq. 18); the initial state."""
+    def _expressions(self) -> SystemExpressions:
+        """Equations of a step, of the outputs and of the initial state."""
         import sympy
 
         eq, n = self.system.symbols, self.system.coordinates
+
+        def column(name: str) -> Any:
+            """Return n symbols as a column."""
+            return sympy.Matrix(sympy.symbols(f"{name}:{n}", real=True))
+
         fuzzy = [eq.p[name] for name in self.names]
         constants = [x for name, x in eq.p.items() if name not in self.names]
-        new, old, momenta = (
-            sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("new", "old", "pi")
-        )
+        new, old, momenta = column("new"), column("old"), column("pi")
         h = sympy.Symbol("h", positive=True)
-        # π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q + F) at the mean of q[k] and q[k+1]
-        middle = dict(zip([*eq.q, *eq.v], [*((old + new) / 2), *((new - old) / h)], strict=True))
-        momentum, impulse = eq.momentum.subs(middle), h / 2 * eq.push.subs(middle)
-        velocity, (q0, v0) = eq.velocity(momenta), self.system.start()
-        start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
-        both_momenta = [*(momentum - impulse), *(momentum + impulse)]
+        coordinates_and_velocities = list(eq.q) + list(eq.v)
+        # The discrete Lagrangian takes L and the force F at the mean of q[k] and q[k+1]:
+        # π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q + F)
+        mean_state = list((old + new) / 2) + list((new - old) / h)
+        at_mean = dict(zip(coordinates_and_velocities, mean_state, strict=True))
+        momentum, impulse = eq.momentum.subs(at_mean), h / 2 * eq.push.subs(at_mean)
+        q0, v0 = self.system.start()
+        at_start = dict(zip(coordinates_and_velocities, list(q0) + list(v0), strict=True))
+        velocity = eq.velocity(momenta)
         outputs = [self.system.output(name, velocity) for name in self.outputs]
-        return (
-            (both_momenta, [*new, *old, *fuzzy], [*constants, h]),
-            (outputs, [*eq.q, *momenta, *fuzzy], constants),
-            ([*q0, *eq.momentum.subs(start)], fuzzy, constants),
+        return SystemExpressions(
+            momenta=Expressions(
+                list(momentum - impulse) + list(momentum + impulse),
+                active=list(new) + list(old) + fuzzy,
+                constants=[*constants, h],
+            ),
+            outputs=Expressions(outputs, list(eq.q) + list(momenta) + fuzzy, constants),
+            initial=Expressions(list(q0) + list(eq.momentum.subs(at_start)), fuzzy, constants),
         )
 
     @cached_property
     def _newton(self) -> Tape:
         """Tape of the momenta before a step and their derivatives by the coordinates after it."""
-        components, active, constants = self._expressions[0]
-        n = self.system.coordinates
-        slopes = [e.diff(x) for e in components[:n] for x in active[:n]]
-        return tape([*components[:n], *slopes], active, constants)
+        momenta, n = self._expressions.momenta, self.system.coordinates
+        before, new_coordinates = momenta.components[:n], momenta.active[:n]
+        slopes = [momentum.diff(x) for momentum in before for x in new_coordinates]
+        return tape(before + slopes, momenta.active, momenta.constants)
 
     @cached_property
     def _plain(self) -> list[Tape]:
-        return [tape(*expression) for expression in self._expressions]
+        """Tapes of momenta, outputs and initial state."""
+        return [tape(*expressions) for expressions in self._expressions]
 
     @cached_property
     def _deep(self) -> list[Tape]:
-        return [with_derivatives(*expression) for expression in self._expressions]
+        """The same with first and second derivatives."""
+        return [with_derivatives(*expressions) for expressions in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        d = len(self.names) if derivatives else 0
+        d, tapes = 0, self._plain
+        if derivatives:
+            d, tapes = len(self.names), self._deep
         constants = [x for name, x in self.system.parameters.items() if name not in self.names]
         inputs = np.hstack([points, np.tile(constants, (len(points), 1))])
         inputs = np.ascontiguousarray(inputs, float)
-        tapes = (self._newton, *(self._deep if d else self._plain))
-        nodes = (len(points), len(self.time))
-        out = [np.empty((*nodes, len(self.outputs), *(d,) * order)) for order in range(3)]
-        if not _march(*tapes, self.system.coordinates, inputs, self.step, *out):
-            what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
+        shape = (len(points), len(self.time), len(self.outputs))
+        values, first, second = np.empty(shape), np.empty((*shape, d)), np.empty((*shape, d, d))
+        momenta, outputs, initial = tapes
+        n, h = self.system.coordinates, self.step
+        is_whole = _march(
+            self._newton, momenta, outputs, initial, n, inputs, h, values, first, second
+        )
+        if not is_whole:
+            what = f"a step of {h:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         # jets have the axes of the derivatives first
-        return Jet.of(out[0], np.moveaxis(out[1], 3, 0), np.moveaxis(out[2], (3, 4), (0, 1)))
+        return Jet.of(values, np.moveaxis(first, 3, 0), np.moveaxis(second, (3, 4), (0, 1)))
 
 
 @compiled
@@ -160,16 +202,26 @@ def _march(
     out1: Array,
     out2: Array,
 ) -> bool:
-    """Write outputs (S, T, m) and derivatives (S, T, m, d), (S, T, m, d, d); False if a step fails.
+    """Write trajectories and their derivatives; return False if a step fails.
 
-    The tapes are those of `LagrangianFlow`, with derivatives where d > 0; `inputs` (S, K) are d
-    inputs and then other parameters.
+    Args:
+        newton: Tape of `LagrangianFlow._newton`.
+        step: Tape of the momenta before and after a step, with derivatives where d > 0.
+        observe: Tape of the outputs, with derivatives where d > 0.
+        initial: Tape of the initial state, with derivatives where d > 0.
+        n: Number of coordinates.
+        inputs: The d inputs to differentiate by, then the other parameters, shape (S, K).
+        h: Length of a step.
+        out: Receives the outputs, shape (S, T, m).
+        out1: Receives their first derivatives, shape (S, T, m, d); d may be 0.
+        out2: Receives their second derivatives, shape (S, T, m, d, d).
     """
     size, d, m = 2 * n, out1.shape[3], out.shape[2]
     a = size + d
     flat, arguments = np.empty(m + (m * a + m * a * a if d else 0)), np.empty(size + len(inputs[0]))
     start = np.empty(size * (1 + d + d * d))
-    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))  # of state and inputs by the inputs
+    # derivatives by the inputs of the state and of the inputs themselves
+    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
     for i in range(d):
         inner1[size + i, i] = 1.0
     for s in range(len(inputs)):
@@ -195,12 +247,26 @@ def _march(
 def _midpoint_step(
     newton: Tape, step: Tape, n: int, p: Array, h: float, x: Array, x1: Array, x2: Array
 ) -> bool:
-    """Advance a state x (2n,) with derivatives x1 and x2 in place; return False if it fails."""
+    """Advance a state by one midpoint step, in place; return False if the step fails.
+
+    Newton's method finds the new coordinates at which the momenta before the step are those of the
+    state.
+
+    Args:
+        newton: Tape of these momenta and of their derivatives by the new coordinates.
+        step: Tape of the momenta before and after the step, with derivatives where d > 0.
+        n: Number of coordinates.
+        p: All parameters.
+        h: Length of the step.
+        x: The state, shape (2n,).
+        x1: Its first derivatives by the inputs, shape (2n, d).
+        x2: Its second derivatives, shape (2n, d, d).
+    """
     d, m, n_parameters = x1.shape[1], 2 * n, len(p)
     arguments, flat = np.empty(m + n_parameters + 1), np.empty(n + n * n)
-    # Newton's method finds new coordinates whose momenta before the step are those of the state
     residual, jacobian = np.empty((n, 1)), np.empty((n, n))
-    arguments[:n] = arguments[n:m] = x[:n]  # new coordinates, guessed, and old ones
+    # the new coordinates, of which the old ones are the first guess, and the old ones
+    arguments[:n] = arguments[n:m] = x[:n]
     arguments[m : m + n_parameters] = p
     arguments[m + n_parameters] = h
     for _ in range(MAX_ITERATIONS):
@@ -231,15 +297,23 @@ def _midpoint_step(
 
 @compiled
 def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
-    """Advance derivatives x1 (2n, d) and x2 (2n, d, d) of a state by one midpoint step, in place.
+    """Advance the derivatives of a state by one midpoint step, in place.
 
-    `flat` holds the momenta before and after the step, with first and second derivatives by new and
-    old coordinates and the inputs.
+    The new coordinates depend on the inputs through the equations π[k](new, old, inputs) = given,
+    which are differentiated once and twice (implicit function theorem): J new_i is the derivative
+    of the state's momenta less that of π[k] with the new coordinates held.
+
+    Args:
+        flat: Momenta before and after the step, (2n,), then their first derivatives, (2n, a), and
+            second ones, (2n, a, a), by the a variables: new coordinates, old ones, d inputs.
+        n: Number of coordinates.
+        x1: First derivatives of the state by the inputs, shape (2n, d).
+        x2: Its second derivatives, shape (2n, d, d).
     """
     m, d = x1.shape
     a = m + d
-    J = np.empty((n, n))  # of the momenta before the step by the new coordinates
-    # derivatives of the variables (new coordinates, old coordinates, inputs) by the inputs
+    J = np.empty((n, n))  # derivatives of the momenta before the step by the new coordinates
+    # derivatives of the variables by the inputs
     inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
     out1, out2 = np.empty((m, d)), np.empty((m, d, d))
     new_first, new_second = np.empty((n, d)), np.empty((n, d * d))
@@ -273,10 +347,15 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
 
 @compiled
 def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Array) -> None:
-    """Write first and second derivatives of m functions by d inputs to `out1` and `out2`.
+    """Write first and second derivatives of m functions by d inputs, by the chain rule.
 
-    `flat` holds the functions (m,), their first derivatives (m, a) and their second ones (m, a, a)
-    by a variables; `inner1` (a, d) and `inner2` (a, d, d) those of the variables by the inputs.
+    Args:
+        flat: The functions, (m,), their first derivatives, (m, a), and second ones, (m, a, a), by a
+            variables, one array after another.
+        inner1: First derivatives of the variables by the inputs, shape (a, d).
+        inner2: Second derivatives of the variables, shape (a, d, d).
+        out1: Receives the first derivatives, shape (m, d).
+        out2: Receives the second derivatives, shape (m, d, d).
     """
     m, d, a = len(out1), len(out1[0]), len(inner1)
     hessian_row, hessian_at = np.empty(a), m + m * a
@@ -299,13 +378,17 @@ def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Ar
 
 @compiled
 def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
-    """Write the values of a tape's m expressions at arguments (K,) to `out`."""
-    code, results, slots = tape  # slots: arguments first, then results of operations
+    """Write the values of a tape's m expressions to `out`, at K arguments.
+
+    The tape's array of places is overwritten. Operations are numbered by `tape.OPERATIONS`; those
+    of one operand ignore the second one.
+    """
+    code, results, slots = tape
     for k in range(len(arguments)):
         slots[k] = arguments[k]
     for k in range(len(code)):
         number, x, y = code[k, 0], slots[code[k, 1]], slots[code[k, 2]]
-        if number == 0:  # by the order of `tape.OPERATIONS`; functions of one argument ignore y
+        if number == 0:
             value = x + y
         elif number == 1:
             value = x * y

@@ -97,7 +97,7 @@ def test_derivatives_by_modes_are_those_of_the_steps(dampers: tuple[float, ...])
     points = np.array([[1.5e3, 3e5, dampers[1], 4e3], [1.6e3, 2.9e5, dampers[1] + 50, 3e3]])
     matrices, rows = evaluate(frame, flow.names, points, derivatives=True)
     found, by_steps = (
-        flow._from_modes(matrices, rows),
+        flow._by_superposition(matrices, rows),
         trajectory(flow._step_map(matrices), matrices.start, rows),
     )
     assert found is not None
