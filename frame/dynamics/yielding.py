@@ -1,10 +1,14 @@
-"""Motion of storey frames whose columns yield: bilinear springs with kinematic hardening.
+"""Response of storey frames whose columns yield: bilinear springs with kinematic hardening.
 
-A storey of drift d and plastic drift p resists with k d − (1 − a) k p, a its hardening. It is
-elastic, p at rest, while |d − p| is below the yield drift, and then yields: p follows d until d
-turns. Between these events the motion is linear and the load linear in time. The exponential of
-the state matrix acts on the state as its Taylor series, summed to rounding (Al-Mohy, Higham 2011):
-polynomials in time, in which the first event is found by a bound of their curvature.
+A storey with drift d and plastic drift p resists with k d − (1 − a) k p, where a is its hardening.
+It is elastic, and p rests, while |d − p| is below the yield drift. Then it yields: p follows d
+until d turns. Between these events the structure is linear, and the loads are linear in time. There the
+exponential of the state matrix acts on the state as its Taylor series, summed to rounding (Al-Mohy,
+Higham 2011). Its terms are polynomials in time, in which a bound of the curvature finds the first
+event.
+
+A substep is the time between neighbouring nodes, samples of loads and points that keep the series
+short. Inside it, τ in [0, 1] is the fraction that has passed.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,44 +27,47 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import Flow, StepError, with_feedthrough
 from alphacut.frame.dynamics.integrators import SAME, state_matrix
 from alphacut.frame.records.history import History
-from alphacut.frame.structures.linear import evaluate, histories
+from alphacut.frame.structures.linear import Matrices, evaluate, histories
 from alphacut.frame.structures.storey import MOMENT, StoreyFrame
 
 MAX_PHASE = 1.0
-"""Largest |λ| h of a part of a step: the series of exp(A h) then has no cancellation."""
+"""Largest |λ| h of a substep h: up to it the series of exp(A h) has no cancellation."""
 MAX_TERMS = 24
-"""Terms of the series: 1 / 24! is 2e-24; it mostly ends sooner."""
+"""Largest degree of the series: 1/24! is 2e-24. It mostly ends sooner."""
 TERM_ROUNDING = 1e-17
-"""Size of two terms in turn, as a fraction of the largest one, at which the series ends."""
+"""Fraction of the largest term at which, twice in a row, the series ends."""
 GAUSS_NODES, GAUSS_WEIGHTS = (np.polynomial.legendre.leggauss(8) + np.array([[1], [0]])) / 2
-"""Quadrature on [0, 1] of works: of products of exp(±i MAX_PHASE τ) exact to 1e-17."""
+"""Quadrature on [0, 1] for works: products of exp(±i MAX_PHASE τ) are exact to 1e-17."""
 EVENT_ROUNDING = 1e-13
-"""Width in which an event is located, as a fraction of a part; and the same of the yield drift, or
-of the velocity, by which it may be passed: so that a state just left is not met again at once."""
+"""Width in τ to which an event is located. By the same fraction of the yield drift, or of the
+velocity, a state may pass an event, so that an event just handled is not met again at once."""
 RESOLUTION = 2.0**-34
-"""Shortest interval in which a double root is looked for: between its ends a polynomial is within
-2⁻⁷¹ of its curvature of a straight line."""
+"""Shortest interval of τ in which a double root is looked for. In it a polynomial differs from its
+chord by 2⁻⁷¹ of its curvature, far below rounding."""
 MAX_EVENTS = 1000
-"""Events in a part of a step after which the motion has failed."""
+"""Events in a substep after which the computation has failed."""
 MAX_IMBALANCE = 1e-9
-"""Energy that may be missing at the end, as a fraction of all energies that were exchanged."""
+"""Largest energy that may be missing at the end, as a fraction of all energies exchanged."""
 KINDS = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated", MOMENT)
-Q, DRIFT, SHEAR, DUCTILITY = range(4)  # kinds whose peaks are found between nodes
+"""Kinds of outputs, which kernels know by their index."""
+Q, DRIFT, SHEAR, DUCTILITY = range(4)
+"""Indices of those kinds whose peaks are found between nodes, too."""
 AT_NODES = ("v", "a", "residual", MOMENT)
-"""Outputs whose peaks are sought at nodes alone; dissipated energy never falls."""
+"""Kinds whose peaks are sought at nodes alone; dissipated energy never falls."""
 RUNS, COLLAPSED, FAILED = 0, 1, 2
+"""How a motion ends: at its last node, by collapse, or with too many events."""
 
 
 @dataclass(frozen=True, eq=False)
 class YieldingFlow(Flow):
     """Exact trajectories of a storey frame with yielding columns.
 
-    Damping ratios are those of the initial stiffness, and so is Rayleigh's damping unless
+    Damping ratios belong to the initial stiffness. So does Rayleigh damping, unless the frame's
     `rayleigh_of` is "tangent".
 
     Raises:
-        RefusedError: A force is harmonic or yields a storey before the start, or a storey yields
-            whose tangent stiffness is then not positive under the weight.
+        RefusedError: The frame is elastic or a force is harmonic; of trajectories: a force yields a
+            storey before the start, or a storey collapses under its weight when it yields.
     """
 
     system: StoreyFrame
@@ -78,11 +86,11 @@ class YieldingFlow(Flow):
 
     @property
     def exact(self) -> bool:
-        """True: steps only say where the exact motion is read."""
+        """True: steps only say where the exact response is observed."""
         return True
 
     def finer(self) -> tuple[YieldingFlow, int]:
-        """Return the flow with a quarter of the step, and 4."""
+        """Return the flow with a quarter of the step, and 4 for the substeps."""
         return replace(self, step=self.step / 4), 4
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
@@ -94,103 +102,177 @@ class YieldingFlow(Flow):
     def values_and_peaks(
         self, points: Array, *, takes_collapse: bool = False
     ) -> tuple[Array, Array]:
-        """Return trajectories (S, T, m) at points (S, d), and their largest magnitudes (S, m).
+        """Return trajectories at parameter sets, and the peak magnitudes of the outputs over time.
 
-        These are largest over time, of outputs of the kinds `AT_NODES` at the nodes. Those of a
-        motion that collapses are infinite if `takes_collapse`; else it is refused.
+        Peaks of outputs of the kinds `AT_NODES` are those at time nodes, all others are exact.
+
+        Args:
+            points: Parameter sets, shape (S, d).
+            takes_collapse: Whether a motion that collapses has trajectories of zero and infinite
+                peaks. If not, it raises RefusedError.
+
+        Returns:
+            Trajectories, shape (S, T, m), and peaks, shape (S, m).
         """
-        system, points, loads = self.system, np.asarray(points, float), histories(self.system)
+        system, points = self.system, np.asarray(points, float)
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
-        named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
-        p = {x: Jet.constant(np.zeros(len(points)) + y, 0) for x, y in named.items()}
-        k, hardening, yield_drift = system.springs(p), system.hardenings(p), system.yield_drifts(p)
-        softening = system.softening(p) if system.gravity else k * 0.0
-        heights = system.heights(p) if len(system.lengths) else k * 0.0
-        mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
-        is_tangent = float(system.rayleigh_of == "tangent")
-        lost_damping = k * (1.0 - hardening) * (is_tangent * p["rayleigh_stiffness"])[:, None]
-        properties = [k, softening, hardening, yield_drift, heights, lost_damping]
-        storeys = np.stack([mass, *(x.value for x in properties)], 1)  # (S, 7, n)
+        storeys, drifts_at_yield = self._storeys(points, matrices)
         start = matrices.start.value[..., 0]
-        drift0 = np.diff(start[:, : system.floors], prepend=0.0)
-        if matrices.static is not None and (np.abs(drift0) > yield_drift.value).any():
+        start_drifts = np.diff(start[:, : system.floors], prepend=0.0)
+        if matrices.static is not None and (np.abs(start_drifts) > drifts_at_yield).any():
             allowed = "forces under which no storey yields before the start"
             raise RefusedError("load", "static, and yields a storey", allowed)
         pushes = matrices.pushes(ground=system.ground is not None).value
         fastest = float(np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max())
-        parts = load_parts([*loads.values()], self.time, MAX_PHASE / max(fastest, 1e-300))
+        loads = list(histories(system).values())
+        substeps = load_substeps(loads, self.time, longest=MAX_PHASE / max(fastest, 1e-300))
         kinds = np.array([(KINDS.index(x), z) for x, z in map(system.quantity, self.outputs)])
         values: Array = np.empty((len(points), len(self.time), len(kinds)))
         peaks = np.zeros((len(points), len(kinds)))
-        by_motion = map(np.ascontiguousarray, (storeys, matrices.damping.value, pushes, start))
-        for s, motion in enumerate(zip(*by_motion, strict=True)):
-            end = _march(*motion, *parts, kinds, values[s], peaks[s])
-            if takes_collapse and end[0] == COLLAPSED:
-                values[s], peaks[s] = 0.0, np.inf
+        for s in range(len(points)):
+            end = _march(
+                np.ascontiguousarray(storeys[s]),
+                np.ascontiguousarray(matrices.damping.value[s]),
+                np.ascontiguousarray(pushes[s]),
+                np.ascontiguousarray(start[s]),
+                *substeps,
+                kinds,
+                values[s],
+                peaks[s],
+            )
+            if takes_collapse and end.status == COLLAPSED:
+                values[s] = 0.0
+                peaks[s] = np.inf
                 continue
-            self._require_motion(points[s], *end)
+            self._require_motion(points[s], end)
         values = with_feedthrough(Jet.constant(values, 0), matrices, system, self.time).value
         return values, np.maximum(peaks, np.abs(values).max(1))
 
-    def _require_motion(
-        self, point: Array, status: int, time: float, storey: int, imbalance: float
-    ) -> None:
-        if status == COLLAPSED:
-            value = f"collapsing under its weight at t = {time:.6g} s at {self._point_words(point)}"
+    def _storeys(self, points: Array, matrices: Matrices) -> tuple[Array, Array]:
+        """Return the properties of n storeys at S parameter sets, and their yield drifts.
+
+        Returns:
+            Properties, shape (S, 7, n): mass, stiffness, softening by weight (weight over height),
+            hardening, yield drift, height, and the damping in N s/m that is lost while a storey
+            yields. Then the yield drifts alone, shape (S, n), in m.
+        """
+        system = self.system
+        named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
+        p = {x: Jet.constant(np.zeros(len(points)) + y, 0) for x, y in named.items()}
+        k, hardening, yield_drift = system.springs(p), system.hardenings(p), system.yield_drifts(p)
+        softening, heights = k * 0.0, k * 0.0
+        if system.gravity:
+            softening = system.softening(p)
+        if len(system.lengths):
+            heights = system.heights(p)
+        mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
+        lost_damping = k * 0.0
+        if system.rayleigh_of == "tangent":
+            lost_damping = k * (1.0 - hardening) * p["rayleigh_stiffness"][:, None]
+        properties = [k, softening, hardening, yield_drift, heights, lost_damping]
+        storeys = np.stack([mass, *(jet.value for jet in properties)], 1)
+        return storeys, yield_drift.value
+
+    def _require_motion(self, point: Array, end: MotionEnd) -> None:
+        """Raise RefusedError of a collapse at a parameter set (d,), and StepError of a failure."""
+        if end.status == COLLAPSED:
+            where = self._point_words(point)
+            value = f"collapsing under its weight at t = {end.time:.6g} s at {where}"
             allowed = "hardening times stiffness above weight over height where it yields"
             cure = "take more hardening, a larger yield force or a weaker load"
-            raise RefusedError(f"storey {storey + 1}", value, allowed, cure)
-        if status == FAILED:
-            what = f"more than {MAX_EVENTS} events in a step at t = {time:.6g} s"
+            raise RefusedError(f"storey {end.storey + 1}", value, allowed, cure)
+        if end.status == FAILED:
+            what = f"more than {MAX_EVENTS} events in a step at t = {end.time:.6g} s"
             raise StepError(what, "take a smaller step or a larger yield force")
-        if not abs(imbalance) <= MAX_IMBALANCE:
-            what = f"the balance of energy is off by {abs(imbalance):.2g} at the end of a motion"
+        if not abs(end.imbalance) <= MAX_IMBALANCE:
+            off = f"{abs(end.imbalance):.2g}"
+            what = f"the balance of energy is off by {off} at the end of a motion"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
 
 
-def load_parts(
-    loads: Sequence[History], time: Array, longest: float
-) -> tuple[Array, Mask, Array, Array]:
-    """Return times (E + 1,) between which L loads are linear, and their values there.
+class MotionEnd(NamedTuple):
+    """How a motion ends.
 
-    The times are the nodes, all samples, and others so that no part is longer than `longest`.
-    Which are nodes comes second, then the values at the beginning and at the end of each part,
-    shape (E, L), between jumps.
+    `status` is RUNS, COLLAPSED or FAILED, `time` is in s, `storey` is that of the collapse or of
+    the last event, −1 for none, and `imbalance` is the energy that is missing, as a fraction of all
+    energies exchanged.
+    """
+
+    status: int
+    time: float
+    storey: int
+    imbalance: float
+
+
+class LoadSubsteps(NamedTuple):
+    """E substeps in which L loads are linear.
+
+    `edges` are the times between them, shape (E + 1,), and `is_node` says which of these are time
+    nodes. `first` and `last` are the loads at the beginning and at the end of each substep, shape
+    (E, L), on its side of a jump.
+    """
+
+    edges: Array
+    is_node: Mask
+    first: Array
+    last: Array
+
+
+def load_substeps(loads: Sequence[History], time: Array, *, longest: float) -> LoadSubsteps:
+    """Return substeps between all time nodes and all samples of the loads, up to `longest` each.
+
+    Args:
+        loads: Histories that are linear between samples.
+        time: Equally spaced nodes from 0, in s.
+        longest: Largest length of a substep, in s.
     """
     step = time[1]
-    times = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
-    samples = np.unique(np.concatenate([np.zeros(0), *times]))
-    is_new = np.abs(samples - np.round(samples / step) * step) > SAME * step  # no node
+    sample_times = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
+    samples = np.unique(np.concatenate([np.zeros(0), *sample_times]))
+    # samples that lie on a node, or on another load's sample, but for rounding, make no new edge
+    is_new = np.abs(samples - np.round(samples / step) * step) > SAME * step
     is_new &= (samples < time[-1]) & (np.diff(samples, prepend=-1.0) > SAME * step)
     segments = np.union1d(time, samples[is_new])
-    counts = np.append(0, np.cumsum(np.ceil(np.diff(segments) / longest)))
-    edges = np.interp(np.arange(counts[-1] + 1), counts, segments)
-    first, last = np.zeros((2, len(edges) - 1, len(loads)))
-    for c, load in enumerate(loads):
-        first[:, c], last[:, c] = load.envelope(edges[:-1]), load.envelope(edges[1:], -1.0)
-    return edges, np.isin(edges, time), first, last
+    edges_before = np.append(0, np.cumsum(np.ceil(np.diff(segments) / longest)))
+    edges = np.interp(np.arange(edges_before[-1] + 1), edges_before, segments)
+    first = np.zeros((len(edges) - 1, len(loads)))
+    last = np.zeros((len(edges) - 1, len(loads)))
+    for column, load in enumerate(loads):
+        first[:, column] = load.envelope(edges[:-1])
+        last[:, column] = load.envelope(edges[1:], -1.0)
+    return LoadSubsteps(edges, np.isin(edges, time), first, last)
 
 
 @compiled
 def _march(
     storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
     first: Array, last: Array, kinds: Ints, values: Array, peaks: Array,
-) -> tuple[int, float, int, float]:  # fmt: skip
-    """Write values (T, m) and peaks within parts (m,); return status, time, storey, imbalance.
+) -> MotionEnd:  # fmt: skip
+    """Write the response of one frame to `values` and `peaks`, and return how it ends.
 
-    `storeys` (7, n): mass, stiffness, softening by weight, hardening, yield drift, height, damping
-    in N s/m that is lost while it yields; `damping` (n, n) without yielding, `pushes` (n, L) by
-    loads, `start` (2n,); parts as of `load_parts`; `kinds` (m, 2): kinds and storeys. Accelerations
-    lack the forces over the masses.
+    Args:
+        storeys: Properties as of `YieldingFlow._storeys`, shape (7, n).
+        damping: Damping matrix while no storey yields, shape (n, n).
+        pushes: Accelerations by a unit of each load, shape (n, L).
+        start: Initial displacements and velocities, shape (2n,).
+        edges: As of `LoadSubsteps`, as are the next three.
+        is_node: Which edges are time nodes.
+        first: Loads at the beginning of the substeps.
+        last: Loads at their end.
+        kinds: Index of the kind in `KINDS` and storey of each output, shape (m, 2).
+        values: Receives the outputs at nodes, shape (T, m). Accelerations lack the forces over the
+            masses.
+        peaks: Raised to the largest magnitudes within substeps, shape (m,).
     """
     mass, k, softening, hardening, yield_drift, _, lost_damping = storeys
     n, inverse_mass = len(mass), 1 / mass
-    # coefficients by powers of the fraction of a part: q, v, drifts
+    # coefficients of displacements, velocities and drifts by powers of τ
     series = np.zeros((3, n, MAX_TERMS + 1))
     load, rise, tangent, constant = np.zeros((4, n))
     q, v = start[:n].copy(), start[n:].copy()
-    plastic, dissipated, direction = np.zeros((3, n))  # direction 0: elastic, ±1: yields
-    for z in range(n):  # loaded in one direction before the start
+    # plastic drift, dissipated energy, and direction of yielding: ±1, or 0 of an elastic storey
+    plastic, dissipated, direction = np.zeros((3, n))
+    for z in range(n):  # as if the start was reached by loading in one direction
         d = _drift(q, z)
         plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
     before, works, node = _energy(storeys, q, v, plastic), np.zeros(2), 0
@@ -207,11 +289,15 @@ def _march(
             for c in range(pushes.shape[1]):
                 load[i] += mass[i] * pushes[i, c] * first[e, c]
                 rise[i] += mass[i] * pushes[i, c] * (last[e, c] - first[e, c])
-        for event in range(MAX_EVENTS + 1):  # h is what remains of the part
+        for event in range(MAX_EVENTS + 1):  # h is what remains of the substep
+            # net force of a storey: tangent · drift + constant
             for i in range(n):
-                spring = direction[i] * yield_drift[i] if direction[i] != 0 else -plastic[i]
+                if direction[i] != 0:
+                    spring, fraction = direction[i] * yield_drift[i], hardening[i]
+                else:
+                    spring, fraction = -plastic[i], 1.0
                 constant[i] = (1 - hardening[i]) * k[i] * spring
-                tangent[i] = (hardening[i] if direction[i] != 0 else 1.0) * k[i] - softening[i]
+                tangent[i] = fraction * k[i] - softening[i]
             terms = _expand(inverse_mass, damping, tangent, constant, load, rise, h, q, v, series)
             at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
             _add_works(damping, load, rise, series, terms, at, h, works)
@@ -231,10 +317,11 @@ def _march(
             if direction[z] != 0:
                 direction[z] = 0.0
             elif softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
-                return COLLAPSED, edges[e + 1] - h, z, 0.0
+                return MotionEnd(COLLAPSED, edges[e + 1] - h, z, 0.0)
             else:
                 direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
-            damping[:] = elastic_damping  # forces jump with it, velocities do not
+            # damping forces jump at the event, velocities do not
+            damping[:] = elastic_damping
             for i in range(n):
                 if direction[i] != 0:
                     damping[i, i] -= lost_damping[i]
@@ -243,11 +330,13 @@ def _march(
                         damping[i, i - 1] += lost_damping[i]
                         damping[i - 1, i] += lost_damping[i]
             if event == MAX_EVENTS:
-                return FAILED, edges[e + 1] - h, z, 0.0
+                return MotionEnd(FAILED, edges[e + 1] - h, z, 0.0)
     after, dissipation = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
     exchanged = abs(before) + abs(after) + abs(works[0]) + dissipation
-    missing = before + works[0] - after - dissipation
-    return RUNS, edges[-1], -1, missing / exchanged if exchanged > 0 else 0.0
+    imbalance = 0.0
+    if exchanged > 0:
+        imbalance = (before + works[0] - after - dissipation) / exchanged
+    return MotionEnd(RUNS, edges[-1], -1, imbalance)
 
 
 @compiled
@@ -255,10 +344,20 @@ def _expand(
     inverse_mass: Array, damping: Array, tangent: Array, constant: Array, load: Array, rise: Array,
     h: float, q: Array, v: Array, series: Array,
 ) -> int:  # fmt: skip
-    """Write coefficients of q, v and drifts by powers of τ/h; return their number.
+    """Write the Taylor series of a state over a substep, and return the number of its terms.
 
-    The storeys' net forces are tangent · drift + constant, loads load + rise τ/h.
-    `series` has shape (3, n, powers).
+    Args:
+        inverse_mass: 1/m of each floor, shape (n,).
+        damping: Damping matrix, shape (n, n).
+        tangent: Net force of a storey is tangent · drift + constant, shape (n,) each.
+        constant: See `tangent`.
+        load: Force on each floor is load + rise τ, shape (n,) each.
+        rise: See `load`.
+        h: Length of the substep, in s.
+        q: Displacements at its beginning, shape (n,).
+        v: Velocities, shape (n,).
+        series: Receives coefficients of displacements, velocities and drifts by powers of τ, shape
+            (3, n, MAX_TERMS + 1).
     """
     Q, V, drifts = series
     n, scale, previous = len(q), 0.0, math.inf
@@ -296,14 +395,19 @@ def _first_event(
     series: Array, terms: int, plastic: Array, direction: Array, yield_drift: Array,
     hardening: Array,
 ) -> tuple[float, int]:  # fmt: skip
-    """Return the fraction of the part at the first event, and its storey; 1 and −1 for none."""
+    """Return τ at the first event of a substep, and its storey; 1 and −1 where there is none.
+
+    An elastic storey yields where |drift − plastic| exceeds the yield drift; a yielding one turns
+    elastic where the velocity of its drift changes its sign. Arguments are as in `_march`.
+    """
     first, storey, drifts = 1.0, -1, series[2]
-    margin = np.empty(terms)  # polynomial that is negative after the event
+    margin = np.empty(terms)  # coefficients of a polynomial that is negative after the event
     for z in range(len(plastic)):
         elastic, variation, sign = drifts[z, 0] - plastic[z], 0.0, direction[z]
         for term in range(1, terms):
             variation += (term if sign != 0 else 1) * abs(drifts[z, term])
-        if sign != 0:  # yields until the velocity of the drift has the other sign
+        # Σ |c_k| bounds the variation of a polynomial Σ c_k τ^k: mostly there is no event
+        if sign != 0:
             if 2 * sign * drifts[z, 1] > variation:
                 continue
             for term in range(1, terms):
@@ -328,10 +432,17 @@ def _first_event(
 
 @compiled
 def _first_root(polynomial: Array, terms: int, end: float) -> float:
-    """Return the first place in [0, end) from which on a polynomial is negative; 1 for none.
+    """Return the first τ in [0, end) from which on a polynomial is negative, or 1 for none.
 
-    Over an interval of width w it deviates from its chord by w²/8 times the largest second
-    derivative, and its slope from the chord's by w/2 times that.
+    Over an interval of width w a polynomial deviates from its chord by at most w²/8 times its
+    largest second derivative, and its slope from that of the chord by w/2 times that. An interval
+    is passed where the chord is above this deviation, halved where this is not known, and searched
+    for the root where the polynomial surely falls through zero.
+
+    Args:
+        polynomial: Coefficients by powers of τ.
+        terms: Number of coefficients.
+        end: End of the search, at most 1.
     """
     curvature = 0.0
     for term in range(2, terms):
@@ -343,7 +454,7 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
         if min(left, right) > curvature * width**2 / 8 or (width <= RESOLUTION and right >= 0):
             low, left, width = low + width, right, 2 * width
         elif width <= RESOLUTION or (right < 0 and right - left < -curvature * width**2 / 2):
-            # Newton's steps, or halves where they leave the interval
+            # Newton's method from the chord's root, with bisection where a step leaves the interval
             high, root = low + width, low + width * left / (left - right)
             while high - low > EVENT_ROUNDING:
                 value, slope = polynomial[terms - 1], 0.0
@@ -371,7 +482,10 @@ def _add_works(
     damping: Array, load: Array, rise: Array, series: Array, terms: int, at: float, h: float,
     works: Array,
 ) -> None:  # fmt: skip
-    """Add the work of loads and what damping takes up to a fraction of a part, ∫ v·f dt."""
+    """Add works ∫ v·f dt from τ = 0 to τ = `at` in place: of the loads, and taken by damping.
+
+    `works` has shape (2,); h is the length of the substep, other arguments are as in `_expand`.
+    """
     n, V = len(load), series[1]
     points, weights = at * GAUSS_NODES, at * h * GAUSS_WEIGHTS
     velocity = np.empty((n, len(GAUSS_NODES)))
@@ -391,7 +505,7 @@ def _add_works(
 
 @compiled
 def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
-    """Return kinetic and stored energy, less the work of weights, in J."""
+    """Return the kinetic and the elastic energy of a state, less the work of weights, in J."""
     total = 0.0
     for z in range(len(q)):
         mass, k, softening, a = storeys[:4, z]
@@ -402,8 +516,10 @@ def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
 
 @compiled
 def _drift(q: Array, z: int) -> float:
-    """Return the drift of a storey, counted from 0."""
-    return q[z] - q[z - 1] if z else q[z]
+    """Return the drift of storey z, counted from 0, of displacements (or velocities) of floors."""
+    if z == 0:
+        return q[z]
+    return q[z] - q[z - 1]
 
 
 @compiled
@@ -411,26 +527,34 @@ def _add_peaks(
     kinds: Ints, storeys: Array, tangent: Array, constant: Array, series: Array, terms: int,
     end: float, q: Array, v: Array, peaks: Array,
 ) -> None:  # fmt: skip
-    """Raise peaks (m,) of outputs by those within a part, at whose `end` the motion is q, v."""
+    """Raise the peaks of outputs, in place, by those from τ = 0 to τ = `end`.
+
+    A quantity scale · x + shift, x a displacement or drift, is looked at where its velocity changes
+    its sign and at the end, where displacements and velocities are q and v. Other arguments are as
+    in `_march`; the beginning was the end of the substep before.
+    """
     for row in range(len(kinds)):
         kind, z = kinds[row]
         if kind > DUCTILITY:
             continue
-        polynomial = series[0, z] if kind == Q else series[2, z]
-        x, velocity = (q[z], v[z]) if kind == Q else (_drift(q, z), _drift(v, z))
+        if kind == Q:
+            polynomial, x, velocity = series[0, z], q[z], v[z]
+        else:
+            polynomial, x, velocity = series[2, z], _drift(q, z), _drift(v, z)
         scale, shift = 1.0, 0.0
         if kind == DUCTILITY:
             scale = 1 / storeys[4, z]
         elif kind == SHEAR:
             scale, shift = tangent[z] + storeys[2, z], constant[z]
         peaks[row] = max(peaks[row], abs(scale * x + shift))
-        if polynomial[1] * velocity < 0:  # it turns
+        if polynomial[1] * velocity < 0:  # x turns in between
             reach, slope = abs(scale * polynomial[0] + shift), np.empty(terms - 1)
             for term in range(1, terms):
                 slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
                 reach += abs(scale * polynomial[term])
             if reach > peaks[row]:
-                stop = min(_first_root(slope, terms - 1, end), end)  # 1 where rounding decides
+                # a turn that rounding hides lies at the end
+                stop = min(_first_root(slope, terms - 1, end), end)
                 turn = scale * _value(polynomial, terms, stop) + shift
                 peaks[row] = max(peaks[row], abs(turn))
 
@@ -440,6 +564,11 @@ def _observe(
     kinds: Ints, storeys: Array, damping: Array, state: tuple[Array, Array, Array, Array],
     values: Array,
 ) -> None:  # fmt: skip
+    """Write all outputs of a state to `values`, shape (m,).
+
+    `state` holds displacements, velocities, plastic drifts and dissipated energies of n storeys;
+    other arguments are as in `_march`.
+    """
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
         kind, z = kinds[row]
@@ -452,7 +581,7 @@ def _observe(
             force -= damping[z, i] * v[i]
             shear = _net_force(storeys, q, plastic, i) + storeys[2, i] * _drift(q, i)
             moment += storeys[5, i] * shear
-        # drift in equilibrium without load, where storeys that yield back rest
+        # the drift at which the storey would rest without load; it may yield back on the way
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
         residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (
@@ -464,13 +593,14 @@ def _observe(
 
 @compiled
 def _net_force(storeys: Array, q: Array, plastic: Array, z: int) -> float:
-    """Return the force of a storey's columns less that of the weight."""
+    """Return the force of the columns of storey z less the overturning one of its weight, in N."""
     _, k, softening, hardening = storeys[:4, z]
     return (k - softening) * _drift(q, z) - (1 - hardening) * k * plastic[z]
 
 
 @compiled
 def _value(polynomial: Array, terms: int, at: float) -> float:
+    """Return the value of a polynomial at τ = `at`, by Horner's rule."""
     value = polynomial[terms - 1]
     for term in range(terms - 2, -1, -1):
         value = value * at + polynomial[term]
