@@ -2,10 +2,10 @@
 
 A storey with drift d and plastic drift p resists with k d − (1 − a) k p, where a is its hardening.
 It is elastic, and p rests, while |d − p| is below the yield drift. Then it yields: p follows d
-until d turns. Between these events the structure is linear, and the loads are linear in time. There the
-exponential of the state matrix acts on the state as its Taylor series, summed to rounding (Al-Mohy,
-Higham 2011). Its terms are polynomials in time, in which a bound of the curvature finds the first
-event.
+until d turns. Between these events the structure is linear, and the loads are linear in time.
+There the exponential of the state matrix acts on the state as its Taylor series, summed to rounding
+(Al-Mohy, Higham 2011). Its terms are polynomials in time, in which a bound of the curvature finds
+the first event.
 
 A substep is the time between neighbouring nodes, samples of loads and points that keep the series
 short. Inside it, τ in [0, 1] is the fraction that has passed.
