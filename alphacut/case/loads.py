@@ -60,9 +60,9 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         path = case_file(kind, info)
     except RefusedError as error:
         raise RefusedError("", kind, f"{HISTORY}; {error.allowed}") from None
-    step, samples, has_unit = read_force_history(path)
-    history = History(step, samples, start, is_static=bool(static))
-    return ForceHistory(history, "" if has_unit else "N")
+    force = read_force_history(path)
+    history = History(force.step, force.samples, start, is_static=bool(static))
+    return ForceHistory(history, "" if force.has_unit else "N")
 
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:

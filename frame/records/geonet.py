@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from math import ceil
 
 from alphacut.base.arrays import Array
@@ -16,79 +17,104 @@ from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 
-GEONET = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*\bGNS\b", re.IGNORECASE)
-TEXT_LINES, INTEGER_LINES, REAL_LINES = 16, 4, 6
-HEAD_LINES = TEXT_LINES + INTEGER_LINES + REAL_LINES
+MARK = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*\bGNS\b", re.IGNORECASE)
+"""First line of a component."""
+TEXT_LINES = 16
 PER_LINE, WIDTH = 10, 8
-COUNTS, STEP, PEAK = slice(33, 36), 25, 35
-"""Places, from 0: counts of samples in the integers; step and peak in the reals."""
-UNIT = "mm/s/s"
-COMPONENT = re.compile(r"Component\s+(\S+)")
+"""Numbers in a line, and characters of each."""
 
 
 def is_geonet(file: TextFile) -> bool:
-    """True if the first line is that of GeoNet's files of one accelerogram."""
-    return GEONET.match(file.lines[0]) is not None
+    """Return whether the first line is that of GeoNet's files of one accelerogram."""
+    return MARK.match(file.lines[0]) is not None
+
+
+@dataclass(frozen=True)
+class _Component:
+    """A component of a file.
+
+    Args:
+        start: Its first line, counted from 0.
+        samples: Line of its first acceleration.
+        end: Line behind its last displacement.
+        count: Number of its accelerations.
+        name: Its name in small letters, as "s90e"; empty if it has none.
+    """
+
+    start: int
+    samples: int
+    end: int
+    count: int
+    name: str
+
+    @classmethod
+    def of(cls, file: TextFile, start: int) -> _Component:
+        """Return the component that begins in a line.
+
+        Raises:
+            RefusedError: Its head does not count the samples.
+        """
+        first = start + TEXT_LINES
+        integers = file.numbers(first, first + 4, width=WIDTH)
+        counts = [int(number) for number in integers[33:36]]
+        if len(counts) < 3 or counts[0] < 2 or min(counts) < 0:
+            allowed = "40 integers, of which 34 to 36 count samples"
+            raise file.refusal(first, f"counts of {counts}", allowed, "load the file anew")
+        words = re.search(r"Component\s+(\S+)", " ".join(file.lines[start:first]))
+        samples = first + 10  # behind 4 lines of integers and 6 of reals
+        end = samples + sum(ceil(count / PER_LINE) for count in counts)
+        return cls(start, samples, end, counts[0], words[1].lower() if words else "")
 
 
 def read_geonet(file: TextFile, channel: str = "") -> Recording:
-    """Recording of one component, which is named by its number or orientation, as "1" or "S90E".
+    """Return the recording of one component, named by its number or orientation, as "1" or "S90E".
 
     Raises:
         RefusedError: The file is not corrected, a head does not tell counts and step, or samples
             are missing.
     """
-    match = GEONET.match(file.lines[0])
+    match = MARK.match(file.lines[0])
     if match is not None and match[1]:
         cure = "take the corrected file of the same record, .V2A"
         raise file.refusal(0, file.lines[0].strip(), "a corrected accelerogram", cure)
-    starts = [*_starts(file)]
+    components = [*_components(file)]
     names = []
-    for number, start in enumerate(starts, 1):
-        found = (COMPONENT.match(line) for line in file.lines[start : start + TEXT_LINES])
-        component = next((x[1].lower() for x in found if x), "")
-        names.append(tuple(filter(None, (str(number), component))))
+    for number, component in enumerate(components, 1):
+        names.append((str(number), component.name) if component.name else (str(number),))
     chosen = choose_channel(file.location(0), channel, names)
-    start = starts[chosen]
-    reals = _reals(file, start)
-    first, count = start + HEAD_LINES, _counts(file, start)[0]
-    samples = file.numbers(first, first + ceil(count / PER_LINE), width=WIDTH)
-    file.require_count(samples, count, start + TEXT_LINES)
+    component = components[chosen]
+    reals = _reals(file, component.samples - 6)
+    samples = file.fixed_columns(
+        component.samples,
+        count=component.count,
+        per_line=PER_LINE,
+        width=WIDTH,
+        head=component.start + TEXT_LINES,
+    )
     return recording_in_si(
-        file.location(start + TEXT_LINES + INTEGER_LINES),
+        file.location(component.samples - 6),
         "GeoNet V2A",
-        UNIT,
-        float(reals[STEP]),
+        "mm/s/s",
+        float(reals[25]),
         samples,
         " ".join(names[chosen]),
-        stated=[StatedPeak(1e-3 * abs(float(reals[PEAK])))],
+        stated=[StatedPeak(1e-3 * abs(float(reals[35])))],
     )
 
 
-def _starts(file: TextFile) -> Iterator[int]:
-    """Yield the first line, from 0, of each component."""
+def _components(file: TextFile) -> Iterator[_Component]:
+    """Yield the components of a file in their order."""
     start = 0
-    while start < len(file.lines) and GEONET.match(file.lines[start]):
-        yield start
-        blocks = (ceil(count / PER_LINE) for count in _counts(file, start))
-        start += HEAD_LINES + sum(blocks)
+    while start < len(file.lines) and MARK.match(file.lines[start]):
+        component = _Component.of(file, start)
+        yield component
+        start = component.end
 
 
-def _counts(file: TextFile, start: int) -> list[int]:
-    """Return the counts of accelerations, velocities and displacements below a head."""
-    first = start + TEXT_LINES
-    integers = file.numbers(first, first + INTEGER_LINES, width=WIDTH)
-    counts = [int(x) for x in integers[COUNTS]]
-    if len(counts) < 3 or counts[0] < 2 or min(counts) < 0:
-        allowed = "40 integers, of which 34 to 36 count samples"
-        raise file.refusal(first, f"counts of {counts}", allowed)
-    return counts
-
-
-def _reals(file: TextFile, start: int) -> Array:
-    """Return the reals of a head, shape (60,)."""
-    first = start + TEXT_LINES + INTEGER_LINES
-    reals = file.numbers(first, first + REAL_LINES, width=WIDTH)
-    if len(reals) != REAL_LINES * PER_LINE:
-        raise file.refusal(first, f"{len(reals)} reals", "60 reals, of which 26 is the step")
+def _reals(file: TextFile, first: int) -> Array:
+    """Return the reals of a head, shape (60,), from their first line on."""
+    reals = file.numbers(first, first + 6, width=WIDTH)
+    if len(reals) != 60:
+        allowed = "60 reals, of which 26 is the step"
+        raise file.refusal(first, f"{len(reals)} reals", allowed, "load the file anew")
     return reals

@@ -1,6 +1,7 @@
 """Records of networks with one channel a file: PEER, K-NET and KiK-net, ESM and ITACA, SMC.
 
-Readers raise RefusedError with the line at which a file is not of its format.
+Readers raise RefusedError with the line at which a file is not of its format. Each takes the file
+and the unit that the case states, which counts where the head states none.
 
 PEER's files of type AT2 are read with all the heads that were written since 1999. The head names
 the unit and, in one of its first lines, the number of samples and their step: ``NPTS= 4000, DT=
@@ -11,10 +12,12 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
-from math import ceil
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.text_file import (
@@ -26,175 +29,243 @@ from alphacut.frame.records.text_file import (
 )
 
 PEER_HEAD_LINES = 12
-"""Lines in which a head ends; most have four."""
-REAL = r"([0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
-PEER_STEP = re.compile(
-    rf"(?:NPTS\s*=?\s*([0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{REAL}\s*(?:S|SEC|SECONDS?)?\s*[,;.]?\s*",
-    re.I,
-)
-PEER_STEP_WORD = re.compile(r"\b(?:DT|NPTS)\b", re.I)
-PEER_STEP_FIRST = re.compile(rf"([0-9]+)[\s,]+{REAL}[\s,]+NPTS\s*,?\s*DT\s*[,;.]?\s*", re.I)
-PEER_MARK = re.compile(
-    rf".*(?:\bNPTS\b|\bDT\s*=?\s*{REAL}|\bPEER\b.*\b(?:DATABASE|RECORD)\b)", re.I
-)
-PEER_UNIT = re.compile(r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)", re.I)
-PEER_IN_GRAVITY = re.compile(r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b", re.I)
-PEER_COMPONENT = re.compile(r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*")
-PEER_HEAD = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers below it"
-SCALE = re.compile(r"\s*([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)\s*", re.IGNORECASE)
-FREQUENCY = re.compile(r"\s*([0-9.]+)\s*Hz\s*", re.IGNORECASE)
-DURATION = re.compile(r"\s*([0-9.]+)\s*")
-KNET_FIELDS = {"Sampling Freq(Hz)": FREQUENCY, "Duration Time(s)": DURATION, "Scale Factor": SCALE}
-KNET_LABEL = 18
-"""Columns of a label in the head."""
-ESM_LINE = re.compile(r"([A-Z][A-Z0-9_/.^]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)")
-INTERVAL, COUNT, KIND = "SAMPLING_INTERVAL_S", "NDATA", "DATA_TYPE"
-ESM_PEAK = "PGA_CM/S^2"
-SMC = re.compile(r"\s*([1-4])\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$")
-SMC_TEXT, SMC_INTEGERS, SMC_REALS = 11, 6, 10
-"""Lines of the three heads of an SMC file."""
-VERTICAL_ANGLE, COMMENTS, POINTS, RATE = 13, 16, 17, 2
-"""Entries of the integer head, from 1, and the one of the real head with samples in a second."""
-SMC_EXTREMES, SMC_NULL = (30, 32), 1e38
-"""Entries of the real head with the largest and the least sample; numbers above stand for none."""
-GAL = 0.01  # in m/s²
+"""Lines in which a head of PEER ends; most have four."""
 
 
-def read_peer(file: TextFile, unit: str = "") -> Recording:
-    """Return the recording in a file of type AT2; `unit` is for a head that states none."""
-    head = enumerate(file.lines[:PEER_HEAD_LINES])
-    found = ((k, PEER_STEP_FIRST.search(x) or PEER_STEP.search(x)) for k, x in head)
-    row, match = next(((k, match) for k, match in found if match), (0, None))
-    head_lines = file.lines[:PEER_HEAD_LINES]
-    step_line = next((k for k, x in enumerate(head_lines) if PEER_STEP_WORD.search(x)), row)
-    if match is None or re.search(r"\bDT\s*=?\s*\d*,\d", file.lines[step_line], re.I):
-        cure = "write the step as a number above 0 with a decimal point: DT= .0050 SEC"
-        raise file.refusal(step_line, file.lines[step_line].strip(), PEER_HEAD, cure)
-    count, step = int(match[1] or 0), float(re.sub("[dD]", "e", match[2]))
-    require_step(file.location(row), step, "DT is in seconds: write 20 ms as DT= .0200 SEC")
-    line, own_unit = _peer_unit(file, row)
-    unit = own_unit or unit
+@dataclass(frozen=True)
+class _PeerHead:
+    """Number of samples (0 where it is not stated), their step in s, and the line of both."""
+
+    count: int
+    step: float
+    line: int
+
+    @classmethod
+    def of(cls, file: TextFile) -> _PeerHead:
+        """Return count and step of a file of type AT2.
+
+        Raises:
+            RefusedError: No line of the head states the step, or a number is not as PEER writes it.
+        """
+        real = r"(?P<step>[0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
+        names_last = rf"(?P<count>[0-9]+)[\s,]+{real}[\s,]+NPTS\s*,?\s*DT\b"
+        names_first = rf"(?:NPTS\s*=?\s*(?P<count>[0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{real}(?P<end>.*)"
+        head = file.lines[:PEER_HEAD_LINES]
+        named = [k for k, line in enumerate(head) if re.search(r"\b(?:DT|NPTS)\b", line, re.I)]
+        line = named[0] if named else min(3, len(file.lines) - 1)
+        for row in named:
+            if match := re.search(names_last, head[row], re.I):
+                return cls(int(match["count"]), float(match["step"]), row)
+            match = re.search(names_first, head[row], re.I)
+            if match is None:
+                continue
+            line = row
+            is_complete = "NPTS" not in head[row].upper() or int(match["count"] or 0) > 0
+            # Behind the step may stand S, SEC or SECONDS, but no other unit and no decimals.
+            seconds = r"(?:(?:S|SEC|SECONDS?)\b)?(?![a-z]|,\d)"
+            is_in_seconds = re.match(seconds, match["end"].strip(), re.I)
+            if is_complete and is_in_seconds:
+                step = float(re.sub("[dD]", "e", match["step"]))
+                return cls(int(match["count"] or 0), step, row)
+        allowed = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers below"
+        cure = "write the count and the step in s, with a decimal point: NPTS= 4000, DT= .0050 SEC"
+        raise file.refusal(line, file.lines[line].strip(), allowed, cure)
+
+
+def read_peer(file: TextFile, unit: str) -> Recording:
+    """Return the recording in a file of type AT2."""
+    head = _PeerHead.of(file)
+    cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
+    require_step(file.location(head.line), head.step, cure)
+    line, own_unit = head.line, unit
+    for pattern in (
+        r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)",
+        r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b",
+    ):
+        matches = [re.search(pattern, text, re.I) for text in file.lines[: head.line + 1]]
+        stating = [(row, match) for row, match in enumerate(matches) if match]
+        if stating:
+            line, match = stating[0]
+            own_unit = match[1].rstrip(".")
+            break
     if word := re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
         allowed = f"accelerations in {ACCELERATION_UNITS}"
         cure = f"this is a {word[1].lower()}: take the file .AT2 of the acceleration"
-        raise file.refusal(line, f"in units of {unit}", allowed, cure)
-    samples = file.numbers(row + 1, len(file.lines), count=count)
-    if count:
-        file.require_count(samples, count, row)
-    component = PEER_COMPONENT.fullmatch(file.lines[1]) if row > 1 else None
-    channel = component[1] if component else ""
-    stated = peaks_in_text(file.lines[: row + 1], unit)
-    location = file.location(line)
-    return recording_in_si(location, "PEER AT2", unit, step, samples, channel, stated=stated)
+        raise file.refusal(line, f"in units of {own_unit}", allowed, cure)
+    samples = file.numbers(head.line + 1, len(file.lines), count=head.count)
+    if head.count:
+        file.require_count(samples, head.count, head.line)
+    component = None
+    if head.line > 1:
+        component = re.fullmatch(r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*", file.lines[1])
+    return recording_in_si(
+        file.location(line),
+        "PEER AT2",
+        own_unit,
+        head.step,
+        samples,
+        component[1] if component else "",
+        stated=peaks_in_text(file.lines[: head.line + 1], own_unit),
+    )
 
 
-def _peer_unit(file: TextFile, last: int) -> tuple[int, str]:
-    """Line that states the unit, and the unit; empty where no line up to `last` does."""
-    for pattern in (PEER_UNIT, PEER_IN_GRAVITY):
-        for row, line in enumerate(file.lines[: last + 1]):
-            if match := pattern.search(line):
-                return row, match[1].rstrip(".")
-    return last, ""
-
-
-def read_knet(file: TextFile, unit: str = "") -> Recording:
-    """Recording of a K-NET or KiK-net file: a head of 17 lines, then counts, eight to a line.
+def read_knet(file: TextFile, unit: str) -> Recording:
+    """Return the recording in a K-NET or KiK-net file: a head of 17 lines, then counts.
 
     One count is the scale factor ``7845(gal)/8223790``. Counts keep the sensor's offset, so that
     such a record wants ``baseline = "mean"``.
     """
-    end = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
-    if end is None:
-        raise file.refusal(len(file.lines) - 1, "without a line Memo.", "the head of a K-NET file")
-    head = {x[:KNET_LABEL].strip(): (k, x[KNET_LABEL:]) for k, x in enumerate(file.lines[:end])}
-    numbers: list[float] = []  # in the order of `KNET_FIELDS`
-    for name, pattern in KNET_FIELDS.items():
-        line, text = head.get(name, (end, ""))
-        match = pattern.fullmatch(text)
-        if match is None or any(float(number) <= 0 for number in match.groups()):
-            value = text.strip() or f"without {name}"
-            raise file.refusal(line, value, f"{name}, as in files of K-NET")
-        numbers += map(float, match.groups())
-    rate, duration, gal, full_scale = numbers
+    memo_lines = [k for k, line in enumerate(file.lines) if line.startswith("Memo")]
+    if not memo_lines:
+        cure = "load the file anew"
+        line = len(file.lines) - 1
+        raise file.refusal(line, "without a line Memo.", "the head of a K-NET file", cure)
+    end = memo_lines[0]
+    label_width = 18
+    head = {x[:label_width].strip(): (k, x[label_width:]) for k, x in enumerate(file.lines[:end])}
+    [rate] = _knet_numbers(file, head, end, "Sampling Freq(Hz)", r"([0-9.]+)\s*Hz", "100Hz")
+    [duration] = _knet_numbers(file, head, end, "Duration Time(s)", r"([0-9.]+)", "300")
+    scale = r"([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)"
+    example = "7845(gal)/8223790"
+    gal, full_scale = _knet_numbers(file, head, end, "Scale Factor", scale, example)
     counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(duration * rate), head["Duration Time(s)"][0])
-    channel = head.get("Dir.", (0, ""))[1].strip()
+    _, channel = head.get("Dir.", (0, ""))
     return recording_in_si(
         file.location(end),
         "K-NET",
         "gal",
         1 / rate,
         counts * (gal / full_scale),
-        channel,
+        channel.strip(),
         stated=peaks_in_text(file.lines[:end], "gal"),
     )
 
 
-def read_esm(file: TextFile, unit: str = "") -> Recording:
-    """Recording of a file of ESM or ITACA: a head of lines ``KEY: value``, then a sample a line."""
-    head = dict[str, tuple[str, int]]()  # value and line, from 0, of each key
+def _knet_numbers(
+    file: TextFile,
+    head: dict[str, tuple[int, str]],
+    end: int,
+    name: str,
+    pattern: str,
+    example: str,
+) -> list[float]:
+    """Return the numbers above 0 of a field in the head of a K-NET file.
+
+    Args:
+        file: The file.
+        head: Line and text of each field by its name.
+        end: Line at which the head ends.
+        name: Name of the field.
+        pattern: Regular expression of its text, with a group for each number.
+        example: A text that it may have, for the message.
+
+    Raises:
+        RefusedError: The field is missing or has another text, or a number is not above 0.
+    """
+    line, text = head.get(name, (end, ""))
+    match = re.fullmatch(pattern, text.strip(), re.IGNORECASE)
+    numbers = [float(number) for number in match.groups()] if match else []
+    if not numbers or min(numbers) <= 0:
+        value = text.strip() or f"without {name}"
+        allowed = f"{name}, as in files of K-NET"
+        raise file.refusal(line, value, allowed, f"load the file anew, or write as {example}")
+    return numbers
+
+
+class _EsmField(NamedTuple):
+    text: str
+    line: int
+
+
+def read_esm(file: TextFile, unit: str) -> Recording:
+    """Return the recording in a file of ESM or ITACA: lines ``KEY: value``, then samples."""
+    head = dict[str, _EsmField]()
     for row, line in enumerate(file.lines):
-        if match := ESM_LINE.fullmatch(line.strip()):
-            head[match[1]] = match[2].strip(), row
+        pattern = r"([A-Z][A-Z0-9_/.^]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)"
+        if match := re.fullmatch(pattern, line.strip()):
+            head[match[1]] = _EsmField(match[2].strip(), row)
         elif NUMBER.fullmatch(line.strip()):
             break
-    for key in (INTERVAL, COUNT):
-        text, row = head.get(key, ("", 0))
+    numbers = []
+    for key, example in (("SAMPLING_INTERVAL_S", "0.005"), ("NDATA", "4000")):
+        text, row = head.get(key, _EsmField("", 0))
         if not NUMBER.fullmatch(text) or float(text) <= 0:
-            raise file.refusal(row, f"{key}: {text}", "a number above 0", "load the file anew")
-    kind, kind_row = head.get(KIND, ("ACCELERATION", 0))
-    if "ACCELERATION" not in kind.upper():
-        raise file.refusal(kind_row, kind, f"accelerations in {ACCELERATION_UNITS}")
-    step, count = float(head[INTERVAL][0]), int(float(head[COUNT][0]))
-    samples = file.numbers(1 + max(row for _, row in head.values()), len(file.lines))
-    file.require_count(samples, count, head[COUNT][1])
-    unit, unit_row = head.get("UNITS", (unit, head[INTERVAL][1]))
-    channel, _ = head.get("STREAM", ("", 0))
-    peak, _ = head.get(ESM_PEAK, ("", 0))
-    stated = peaks_in_text([f"PGA: {peak} cm/s^2"], "cm/s^2")
-    location = file.location(unit_row)
-    return recording_in_si(location, "ESM", unit, step, samples, channel, stated=stated)
+            cure = f"load the file anew, or write {key}: {example}"
+            raise file.refusal(row, f"{key}: {text}", "a number above 0", cure)
+        numbers.append(float(text))
+    step, count = numbers
+    kind = head.get("DATA_TYPE", _EsmField("ACCELERATION", 0))
+    if "ACCELERATION" not in kind.text.upper():
+        cure = "take the file of the acceleration"
+        allowed = f"accelerations in {ACCELERATION_UNITS}"
+        raise file.refusal(kind.line, kind.text, allowed, cure)
+    samples = file.numbers(1 + max(field.line for field in head.values()), len(file.lines))
+    file.require_count(samples, int(count), head["NDATA"].line)
+    own_unit = head.get("UNITS", _EsmField(unit, head["SAMPLING_INTERVAL_S"].line))
+    peak = head.get("PGA_CM/S^2", _EsmField("", 0)).text
+    return recording_in_si(
+        file.location(own_unit.line),
+        "ESM",
+        own_unit.text,
+        step,
+        samples,
+        head.get("STREAM", _EsmField("", 0)).text,
+        stated=peaks_in_text([f"PGA: {peak} cm/s^2"], "cm/s^2"),
+    )
 
 
-def read_smc(file: TextFile, unit: str = "") -> Recording:
-    """Recording of an SMC file of the USGS, in cm/s²: three heads, comments, 8 samples a line."""
-    match = SMC.match(file.lines[0])
-    assert match is not None
-    if match[1] not in "12":
-        raise file.refusal(0, file.lines[0].strip(), "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM")
-    integers = file.numbers(SMC_TEXT, SMC_TEXT + SMC_INTEGERS, width=10)
-    reals_line = SMC_TEXT + SMC_INTEGERS
-    reals = file.numbers(reals_line, reals_line + SMC_REALS, width=15)
-    if len(integers) < POINTS or len(reals) < RATE:
-        value, allowed = f"{len(integers)} integers and {len(reals)} reals", "48 and 50, as in SMC"
-        raise file.refusal(SMC_TEXT, value, allowed)
-    count, comments = int(integers[POINTS - 1]), max(int(integers[COMMENTS - 1]), 0)
-    rate = float(reals[RATE - 1])
+def read_smc(file: TextFile, unit: str) -> Recording:
+    """Return the recording in an SMC file of the USGS, in cm/s².
+
+    Heads of text, integers and reals are followed by comments, and by eight samples a line.
+    """
+    if file.lines[0].split()[0] not in ("1", "2"):
+        allowed = "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM"
+        raise file.refusal(0, file.lines[0].strip(), allowed, "take the file of the acceleration")
+    integers_line, reals_line, comments_line = 11, 17, 27
+    integers = file.numbers(integers_line, reals_line, width=10)
+    reals = file.numbers(reals_line, comments_line, width=15)
+    if len(integers) != 48 or len(reals) != 50:
+        value = f"{len(integers)} integers and {len(reals)} reals"
+        raise file.refusal(integers_line, value, "48 and 50, as in SMC", "load the file anew")
+    # The places below are counted from 0, those of the format's description from 1.
+    vertical_angle, n_comments, count = integers[[12, 15, 16]]
+    rate = float(reals[1])
     if not (count > 1 and rate > 0):
-        value = f"{count} samples, {rate:g} in a second"
+        value = f"{count:g} samples, {rate:g} in a second"
         raise file.refusal(reals_line, value, "two or more, at a rate above 0")
-    first = reals_line + SMC_REALS + comments
-    samples = file.numbers(first, first + ceil(count / 8), width=10)
-    file.require_count(samples, count, SMC_TEXT)
-    channel = "vertical" if integers[VERTICAL_ANGLE - 1] in (0, 180) else ""
-    in_text = [*peaks_in_text(file.lines[:SMC_TEXT], "cm/s^2")]
-    extremes = np.abs([reals[k - 1] for k in SMC_EXTREMES if k <= len(reals)])
-    largest = float(extremes[extremes < SMC_NULL].max(initial=0.0))
+    samples = file.fixed_columns(
+        comments_line + max(int(n_comments), 0),
+        count=int(count),
+        per_line=8,
+        width=10,
+        head=integers_line,
+    )
     return recording_in_si(
         file.location(reals_line),
         "SMC",
         "cm/s^2",
         1 / rate,
         samples,
-        channel,
-        stated=[*in_text, StatedPeak(GAL * largest)],
+        "vertical" if vertical_angle in (0, 180) else "",
+        stated=[*peaks_in_text(file.lines[:integers_line], "cm/s^2"), _smc_peak(reals)],
     )
 
 
+def _smc_peak(reals: Array) -> StatedPeak:
+    """Return the peak in the reals of an SMC file; 0, which counts as none, if it states none."""
+    extremes = np.abs(reals[[29, 31]])  # the largest and the smallest sample, in cm/s²
+    is_stated = extremes < 1e38  # the format's number for none is 1.7e38
+    return StatedPeak(0.01 * float(extremes[is_stated].max(initial=0.0)))
+
+
+PEER_MARKS = r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)"
+SMC_MARKS = r"\s*[1-4]\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"
 FORMATS = (
     (re.compile("Origin Time"), 1, read_knet),
-    (SMC, 1, read_smc),
-    (re.compile(INTERVAL), 80, read_esm),
-    (PEER_MARK, PEER_HEAD_LINES, read_peer),
+    (re.compile(SMC_MARKS), 1, read_smc),
+    (re.compile("SAMPLING_INTERVAL_S"), 80, read_esm),
+    (re.compile(PEER_MARKS, re.IGNORECASE), PEER_HEAD_LINES, read_peer),
 )
 """How a line of a file of each format begins, in how many first lines, and its reader."""

@@ -1,14 +1,15 @@
 """Records and forces in tables: times and values, with units in a head or without a head.
 
-Without a head the case says the unit, and of numbers without times the step as well: one a line, or
-several a line, which follow one another. Of several components a channel chooses the column.
+Without a head the case states the unit, and of numbers without times the step as well: one number
+a line, or several that follow one another. Of several components a channel chooses the column.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
-    ACCELERATION_UNITS,
     MAX_STEP,
     TextFile,
     choose_channel,
@@ -27,145 +27,168 @@ from alphacut.frame.records.text_file import (
     recording_in_si,
     require_step,
 )
-from alphacut.frame.records.units import NEWTONS, SECONDS, acceleration_factor, other_quantity
+from alphacut.frame.records.units import (
+    NEWTONS,
+    SECONDS,
+    acceleration_factor,
+    other_quantity,
+    seconds_of,
+)
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
-TIME = r"\W*(?:time|t)\b\W*([a-zµ]*)\W*[,;\s]\W*"
-UNIT = r"[^\w%‰]*(.*?)[\s\])\"]*"  # %g is a unit, and another than g
-HEAD = re.compile(TIME + rf"(?:ground\s+)?(?:acceleration|accel|acc|ag|a)\b{UNIT}", re.IGNORECASE)
-FORCE_HEAD = re.compile(TIME + rf"(?:force|load|f)\b{UNIT}", re.IGNORECASE)
-"""A head of two columns: units of the times and of the values, each empty where it has none."""
-ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
-ALLOWED_FORCE = "time [s],force [kN], or time [s],force of a course without a unit"
-TAKE = "take the record of the acceleration, or mend the head"
-DECIMAL_COMMAS_BETWEEN_COMMAS = (
-    "these seem to be decimal commas: write decimal points, or semicolons between the columns"
-)
-OTHER_WORDS = {
-    "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
-    "a velocity": r"vel(?:oc\w*)?|speed",
-    "a force": r"forces?|loads?|thrust|(?:base )?shear",
-    "a strain": r"strains?",
-    "a stress": r"stress(?:es)?|pressure",
-    "an angle": r"rotation|angle|tilt",
-    "a number of counts": r"counts?",
-    "a voltage": r"voltage|volts?",
-}
-OTHER_COLUMN = {
-    name: re.compile(rf"(?:\b|_)(?:{words})(?:\b|_)", re.IGNORECASE)
-    for name, words in OTHER_WORDS.items()
-}
-"""Words in the head of a column whose quantity is no acceleration, by what it is called."""
-ACCELERATION_WORD = re.compile(r"(?:\b|_)(?:acc(?:el\w*)?|ag)(?:\b|_)", re.IGNORECASE)
-BRACKETED = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
-_DECIMAL = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
-DECIMAL_COMMAS = re.compile(
-    rf'\s*{_DECIMAL}(?P<more>\s*[;\t]\s*{_DECIMAL}|\s+{_DECIMAL}|(?<="),(?="){_DECIMAL})*[;\s]*'
-)
-"""A row whose cells have decimal commas; semicolons, tabs, blanks or quotes part the cells."""
-BEGINS_WITH_NUMBER = re.compile(r'[\s"]*[-+−]?[.,]?\d')
-CURES_OF_ROWS = {
-    r"\d:\d\d": "write seconds in place of clock times, or leave times out and say records.step",
-    r"\d{4}-\d\d-\d\d|\d/\d+/\d": "write seconds in place of dates, or say records.step",
-    r"\d\.\d{3},\d|\d,\d{3}\.\d": "write numbers without separators of thousands",
-    r"(?i)nan|null|n/?a\b|inf|-{2}|#": "values are missing: fill the gap, or cut the record there",
-    r",\s*,|;\s*;|,\s*$|;\s*$": "cells are empty: fill the gap, or cut the record there",
-    r"^\s*[,;]": "cells are empty: fill the gap, or cut the record there",
-    r"[A-Za-z]{2}": "text stands among the numbers: cut it off",
-    r"\d,\d": "write decimal points if these are decimal commas",
-}
-"""Cure of a row that is not of numbers, by a pattern in its text; the first that fits."""
-COUNTED = re.compile(r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\b", re.IGNORECASE)
-"""A head whose first column counts samples."""
-UNEVEN = 0.05
-"""Fraction of a step by which a time may miss its place, as times that are rounded do."""
-ROUNDED = 1 + 1e-6
-"""Last digits by which times that lost digits may miss their place; with binary round-off."""
+EXPECTED_HEAD = "time [s],acceleration [m/s^2], [g] or [gal]"
+MAX_UNEVENNESS = 0.05
+"""Fraction of a step by which a time may miss its place, as times that are rounded do (tuned)."""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Head of a column: its name in small letters and its unit, empty where it states none."""
+
+    name: str = ""
+    unit: str = ""
+
+    @classmethod
+    def of(cls, cell: str) -> _Column:
+        """Return the column with a head such as "Accel. [g]", "acc (g)", "acc, g" or "acc g"."""
+        text = cell.strip(' "')
+        if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
+            return cls(match[1].lower(), match[2])
+        match = re.fullmatch(r"(.*?)[\s,]+(\S+)", text)
+        if match and (acceleration_factor(match[2]) or seconds_of(match[2]) or match[2] in NEWTONS):
+            return cls(match[1].lower(), match[2])
+        return cls(text.lower())
+
+    @property
+    def is_time(self) -> bool:
+        """Whether the head names times."""
+        return re.match(r"\W*(?:time|t)(?![a-z])", self.name) is not None
+
+    @property
+    def is_acceleration(self) -> bool:
+        """Whether the head names accelerations."""
+        pattern = r"(?:\b|_)(?:a|acc(?:el\w*)?|ag)(?:\b|_)"
+        return re.search(pattern, self.name) is not None
 
 
 @dataclass(frozen=True)
 class _Table:
-    """A table of numbers: its last line of head, empty without one, and cells of each row by line.
+    """A table of numbers below a head.
 
-    Lines are counted from 0; `start` is the first that is neither empty nor a comment. `above` are
-    all lines above the numbers, comments among them, and `column_heads` those of them that tell
-    what the columns are: the last one, and those that begin with a time.
+    Args:
+        file: The file; its lines are counted from 0.
+        start: First line that is neither empty nor a comment.
+        head: Last line above the numbers; empty without one.
+        above: All lines above the numbers, comments among them without their mark.
+        rows: Cells of each row, by its line.
     """
 
-    head: str
+    file: TextFile
     start: int
-    rows: dict[int, list[str]]
-    column_heads: tuple[str, ...]
+    head: str
     above: tuple[str, ...]
+    rows: dict[int, list[str]]
 
     @classmethod
     def of(cls, file: TextFile) -> _Table:
-        """The table in a file; lines above the first that begins with a number are its head."""
+        """Return the table in a file; lines above the first that begins with a number are heads."""
         lines = {k: x for k, x in enumerate(file.lines) if x.strip() and not x.startswith("#")}
-        starts = (k for k, x in lines.items() if BEGINS_WITH_NUMBER.match(x))
-        first = next(starts, len(file.lines))
-        head = [x for k, x in lines.items() if k < first][-1:]
-        texts = {k: x for k, x in lines.items() if k >= first}
-        if _have_decimal_commas([*texts.values()]):
-            rows = {k: re.findall(r'[^;\s"]+', x) for k, x in texts.items()}
-            rows = {
-                k: [x.replace(",", ".") for x in cells if x != ","] for k, cells in rows.items()
-            }
-        else:
-            rows = {k: re.findall(r'[^,;\s"]+', x) for k, x in texts.items()}
+        first = len(file.lines)
+        for line, text in lines.items():
+            if re.match(r'[\s"]*[-+−]?[.,]?\d', text):
+                first = line
+                break
+        texts = {line: text for line, text in lines.items() if line >= first}
+        has_decimal_commas = _have_decimal_commas([*texts.values()])
+        rows = {}
+        for line, text in texts.items():
+            if has_decimal_commas:
+                cells = re.findall(r'[^;\s"]+', text)
+                rows[line] = [cell.replace(",", ".") for cell in cells if cell != ","]
+            else:
+                rows[line] = re.findall(r'[^,;\s"]+', text)
+        heads = [text for line, text in lines.items() if line < first]
         above = tuple(x.lstrip("# \t") for x in file.lines[:first] if x.strip("# \t"))
-        begin_with_time = [x for x in above[:-1] if re.match(TIME, x, re.IGNORECASE)]
-        heads = (*begin_with_time, *above[-1:])
-        return cls("".join(head), min(lines, default=0), rows, heads, above)
+        return cls(file, min(lines, default=0), heads[-1] if heads else "", above, rows)
 
-    def other_quantity(self) -> str:
-        """The quantity, not an acceleration, that a head of the columns names; empty if none."""
-        for head in self.column_heads:
-            if ACCELERATION_WORD.search(head):
-                continue
-            named = (name for name, pattern in OTHER_COLUMN.items() if pattern.search(head))
-            if name := next(named, ""):
-                return name
-        for head in self.column_heads:
-            for unit in BRACKETED.findall(head):
-                if name := other_quantity(unit):
-                    return f"{name} by its unit {unit}"
-        return ""
+    @property
+    def width(self) -> int:
+        """Numbers in the first row; 0 without rows."""
+        return len(next(iter(self.rows.values()), []))
 
-    def numbers(self, file: TextFile, columns: int) -> Array:
-        """The numbers, shape (rows, columns); refuses a row of others."""
-        for line, cells in self.rows.items():
-            if len(cells) != columns or not _are_numbers(cells):
-                raise _row_refusal(file, line, columns)
-        return np.array([[float(x) for x in cells] for cells in self.rows.values()])
+    @property
+    def columns(self) -> list[_Column]:
+        """Heads of the columns; nameless ones where the head has another number of cells."""
+        words = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", self.head)
+        for cells in (next(csv.reader([self.head])), re.split("[,;\t]", self.head), words):
+            if self.head and len(cells) == self.width:
+                return [_Column.of(cell) for cell in cells]
+        return [_Column()] * self.width
 
-    def series(self, file: TextFile) -> Array:
-        """All numbers, row by row, shape (n,); the last row alone may have fewer than the others.
+    @property
+    def column_heads(self) -> list[str]:
+        """Lines above the numbers that tell what the columns are.
 
-        Refuses columns that are smoother than the rows: those of several components, not of one
-        series whose numbers follow one another.
+        They are those that begin with a time, and the last one.
         """
-        first, *_ = self.rows.values()
+        named = [line for line in self.above[:-1] if _Column.of(line).is_time]
+        return [*named, *self.above[-1:]]
+
+    @property
+    def has_times(self) -> bool:
+        """Whether the head begins with times, or the numbers of the first column never fall."""
+        if _Column.of(self.head).is_time:
+            return True
+        first = [cells[0] for cells in self.rows.values()]
+        return _are_numbers(first) and bool((np.diff(np.array(first, float)) >= 0).all())
+
+    def refusal(self, cure: str) -> RefusedError:
+        """Return the error about the head."""
+        value = self.head[:80] or f"{self.width} columns without a head"
+        return self.file.refusal(self.start, value, EXPECTED_HEAD, cure)
+
+    def numbers(self, *, rows: Sequence[int] = ()) -> Array:
+        """Return the numbers, shape (rows, columns), of all rows or of those at some lines.
+
+        Raises:
+            RefusedError: A row has another text, or another count of numbers than the first.
+        """
+        lines = rows or [*self.rows]
+        for line in lines:
+            if len(self.rows[line]) != self.width or not _are_numbers(self.rows[line]):
+                raise _wrong_row(self.file, line, self.width)
+        return np.array([[float(cell) for cell in self.rows[line]] for line in lines])
+
+    def series(self) -> Array:
+        """Return the numbers of all rows one after another, shape (n,).
+
+        The last row alone may have fewer numbers than the others.
+
+        Raises:
+            RefusedError: A row is wrong, or the columns are smoother than the rows, as those of
+                several components are: then the numbers are not one series.
+        """
         *full, last = self.rows
-        whole = replace(self, rows={line: self.rows[line] for line in full})
-        numbers = whole.numbers(file, len(first))
-        if len(self.rows[last]) > len(first) or not _are_numbers(self.rows[last]):
-            raise _row_refusal(file, last, len(first))
-        is_one_column = len(first) == 1 or len(full) == 1
-        along_rows = np.abs(np.diff(numbers.ravel())).sum() / max(numbers.size - 1, 1)
-        along_columns = np.abs(np.diff(numbers, axis=0)).sum() / max(numbers[1:].size, 1)
-        if along_columns < along_rows and not is_one_column:
-            value = f"{len(first)} columns, each smoother than the rows"
-            allowed = "one series, whose numbers follow one another"
-            cure = f"choose one of several components: {file.name}#1, #2 …; else one number a line"
-            raise file.refusal(self.start, value, allowed, cure)
-        return np.append(numbers.ravel(), [float(x) for x in self.rows[last]])
+        numbers = self.numbers(rows=full)
+        last_cells = self.rows[last]
+        if len(last_cells) > self.width or not _are_numbers(last_cells):
+            raise _wrong_row(self.file, last, self.width)
+        if self.width > 1 and len(full) > 1:
+            change_along_rows = np.abs(np.diff(numbers.ravel())).mean()
+            change_along_columns = np.abs(np.diff(numbers, axis=0)).mean()
+            if change_along_columns < change_along_rows:
+                value = f"{self.width} columns, each smoother than the rows"
+                allowed = "one series, whose numbers follow one another"
+                name = self.file.name
+                cure = f"choose one of several components: {name}#1, #2 …; else one number a line"
+                raise self.file.refusal(self.start, value, allowed, cure)
+        return np.append(numbers.ravel(), [float(cell) for cell in last_cells])
 
     def resolution(self) -> float:
-        """The coarsest last digit of the times in the first column, in their unit: of 1.023 0.001.
+        """Return the last digit of the times in the first column, in their unit, as .001 of 1.023.
 
-        Formats have a number of decimals, or of digits; final zeros may be left out, so that the
-        cells with most of them tell.
+        Formats have a fixed number of decimals, or of digits. Zeros at the end may be left out, so
+        that the cells with most of them tell.
         """
         times = [Decimal(cells[0]) for cells in self.rows.values()]
         finest = min(int(time.as_tuple().exponent) for time in times)
@@ -174,266 +197,333 @@ class _Table:
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
-    return all(NUMBER.fullmatch(x) and np.isfinite(float(x)) for x in cells)
+    return all(NUMBER.fullmatch(cell) and np.isfinite(float(cell)) for cell in cells)
 
 
-def _row_refusal(file: TextFile, line: int, columns: int) -> RefusedError:
-    """Error about a row that is not of so many numbers, with the cure that its text tells."""
+def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
+    """Return the error about a row that is not of `width` numbers, with a cure from its text."""
+    cures = {
+        r"\d:\d\d": "write seconds in place of clock times, or leave times out and say"
+        " records.step",
+        r"\d{4}-\d\d-\d\d|\d/\d+/\d": "write seconds in place of dates, or say records.step",
+        r"\d\.\d{3},\d|\d,\d{3}\.\d": "write numbers without separators of thousands",
+        r"(?i)nan|null|n/?a\b|inf|-{2}|#": "values are missing: fill the gap, or cut the record"
+        " there",
+        r"^\s*[,;]|,\s*,|;\s*;|[,;]\s*$": "cells are empty: fill the gap, or cut the record there",
+        r"\d\s*[a-zA-Z%]+\s*(?:[,;]|$)": "write numbers alone: units stand in the head",
+        r"[A-Za-z]{2}": "text stands among the numbers: cut it off",
+        r"\d,\d": "write decimal points if these are decimal commas",
+    }
     text = file.lines[line].strip()
-    cures = (cure for pattern, cure in CURES_OF_ROWS.items() if re.search(pattern, text))
-    return file.refusal(
-        line, text, f"rows of {columns} numbers such as 1.25 or 1e-3", next(cures, "")
-    )
+    fitting = [cure for pattern, cure in cures.items() if re.search(pattern, text)]
+    allowed = f"rows of {width} numbers such as 1.25 or 1e-3"
+    return file.refusal(line, text, allowed, fitting[0] if fitting else "")
 
 
 def _have_decimal_commas(rows: Sequence[str]) -> bool:
-    """True if the commas of all rows are decimal commas.
+    """Return whether the commas of all rows are decimal commas.
 
-    A row such as 0,03097 may be two numbers as well. It is one if the numbers before the commas do
-    not rise, as times or counts of samples would.
+    Semicolons, tabs, blanks or quotes then separate the cells. A row such as 0,03097 may also be
+    two numbers. It is one if the numbers before the commas do not rise, as times or counts of
+    samples would.
     """
-    matches = [DECIMAL_COMMAS.fullmatch(row) for row in rows]
+    number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
+    further = rf'\s*[;\t]\s*{number}|\s+{number}|(?<="),(?="){number}'
+    matches = [re.fullmatch(rf"\s*{number}(?P<more>{further})*[;\s]*", row) for row in rows]
     if not all(matches) or not any("," in row for row in rows):
         return False
     if any(match and match["more"] for match in matches):
         return True
-    before = np.array([float(row.strip(' ";').partition(",")[0] or 0) for row in rows])
-    return bool((np.diff(before) <= 0).any())
+    before_commas = [float(row.strip(' ";').partition(",")[0] or 0) for row in rows]
+    return bool((np.diff(before_commas) <= 0).any())
 
 
 def is_table(file: TextFile, *, is_described: bool = False) -> bool:
-    """True if a head begins with times, or the last row has one or two numbers.
+    """Return whether a file is a table of numbers.
 
-    More numbers a row are a table if there is no head, or the case describes them (`is_described`).
+    Its head begins with times or dates, or its last row has one or two numbers. More numbers a row
+    are a table if there is no head, or if the case describes them (`is_described`).
     """
     table = _Table.of(file)
-    last = list(table.rows.values())[-1:]
-    is_row = any(all(map(NUMBER.fullmatch, x)) for x in last)
-    is_plain = is_described or not table.head or any(len(x) < 3 for x in last)
-    return bool(re.match(TIME, table.head, re.IGNORECASE)) or (is_row and is_plain)
+    if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
+        return True
+    last_row = [*table.rows.values()][-1:]
+    is_row = any(all(NUMBER.fullmatch(cell) for cell in cells) for cells in last_row)
+    return is_row and (is_described or not table.head or len(last_row[0]) < 3)
 
 
 def read_table(
     file: TextFile, step: float | None = None, unit: str = "", channel: str = ""
 ) -> Recording:
-    """Recording of a table with even steps: times and accelerations, or accelerations alone.
+    """Return the recording in a table with even steps: times and accelerations, or these alone.
 
-    The case's unit, and of numbers without times its step in s, stand in where no head states them;
-    times without a unit are in s. The channel is a column: its number, where the times are column
-    1, or its name in the head.
+    Args:
+        file: The file.
+        step: Step in s that the case states, for numbers without times.
+        unit: Unit that the case states, for a head without one. Times without a unit are in s.
+        channel: Column of the accelerations: its number, counted from 1 with the times, or its name
+            in the head; empty where there is only one.
+
+    Raises:
+        RefusedError: A row or the head is not understood, the times are uneven, or the column is
+            not one of accelerations.
     """
     table = _Table.of(file)
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
-    columns = len(next(iter(table.rows.values())))
-    in_head = len(re.split("[,;\t]", table.head))
-    has_commas = all("," in file.lines[line] for line in table.rows)
-    if has_commas and 1 < in_head < columns <= 2 * in_head and re.match(TIME, table.head, re.I):
-        value = f"{columns} numbers in a row below {in_head} heads"
-        first_row = next(iter(table.rows))
-        cure = DECIMAL_COMMAS_BETWEEN_COMMAS
-        raise file.refusal(first_row, value, "a number in a row for each head", cure)
-    if channel or columns > 2:
-        return _read_column(file, table, step, unit, channel=channel)
-    if quantity := table.other_quantity():
-        shown = " ".join(table.column_heads)
-        raise file.refusal(table.start, shown, ALLOWED, f"its column is {quantity}: {TAKE}")
-    match = HEAD.fullmatch(table.head) if columns == 2 else None
-    time_unit, head_unit = match.groups() if match else ("", "")
-    unit, to_s = head_unit or unit, SECONDS.get(time_unit or "s", 0.0)
-    is_complete = to_s > 0 and acceleration_factor(unit) is not None
-    if not is_complete or (columns == 1 and step is None):
-        value = table.head[:80] or f"{columns} columns without a head"
-        allowed = f"a unit of {ACCELERATION_UNITS}, and a step" if columns == 1 else ALLOWED
-        cure = 'records.unit = "g"' + (', records.step = "0.005 s"' if columns == 1 else "")
-        cure = f"or say {cure}"
-        if (
-            head_unit and acceleration_factor(head_unit) is None
-        ):  # the case's unit does not stand in
-            cure = f"{head_unit} is no unit of accelerations: mend the head"
-        if re.search(r"[,;\s]\W*(?:time|t)\b", table.head, re.IGNORECASE):
-            cure = "times stand in the first column"
-        elif COUNTED.match(table.head):
-            cure = 'leave the count of samples out, and say records.step = "0.005 s"'
-        if to_s == 0:
-            cure = f"{time_unit} is no unit of times: {', '.join(SECONDS)}"
-        raise file.refusal(table.start, value, allowed, cure)
-    stated = [*peaks_in_text(table.above, unit)]
+    _require_cell_of_each_head(table)
     location = file.location(table.start)
-    if columns == 1 or (step and not table.head and not _has_times(table)):
-        samples, name = table.series(file), "one column" if columns == 1 else "bare numbers"
-        return recording_in_si(location, name, unit, step or 0.0, samples, stated=stated)
-    numbers = table.numbers(file, columns)
-    step, remarks = _step_and_remarks(file, table, to_s=to_s, stated_step=step)
-    if match and not time_unit:
-        remarks.append("its times have no unit, taken as s")
-    if table.head and not match:
+    stated = [*peaks_in_text(table.above, unit)]
+    has_times = table.has_times or (table.width == 2 and step is None)
+    is_series = table.width == 1 or (not has_times and bool(step and unit))
+    if is_series and not channel:
+        _require_acceleration(table, table.column_heads)
+        if step is None or not unit:
+            raise table.refusal('say records.unit = "g" and records.step = "0.005 s"')
+        return recording_in_si(location, "numbers", unit, step, table.series(), stated=stated)
+
+    if table.head:  # without one, the last row of a series of numbers may be a short one
+        table.numbers()
+    columns = table.columns
+    index, heads, name = 1, table.column_heads, ""
+    if channel or table.width > 2:
+        index = _choose_column(table, channel, has_times=has_times)
+        heads = [f"{columns[index].name} [{columns[index].unit}]"]
+        name = f"{index + 1} {columns[index].name}".strip()
+    _require_acceleration(table, heads)
+    column = columns[index]
+    is_understood = table.width > 2 or columns[0].is_time
+    own_unit = column.unit if is_understood else ""
+    if cure := _cure_of_head(table, column, unit=own_unit or unit):
+        raise table.refusal(cure)
+    numbers = table.numbers()
+    remarks: list[str] = []
+    if not has_times:
+        if step is None:
+            raise table.refusal('say records.step = "0.005 s"')
+    else:
+        step, remarks = _step_and_remarks(table, stated_step=step)
+        if is_understood and not columns[0].unit:
+            remarks.append("its times have no unit, taken as s")
+    if table.head and not is_understood:
         what = f"its head, {table.head[:40]}, is not understood"
         remarks.append(f"{what}: the case's unit is taken")
-    name = "CSV" if match else "two columns"
     return recording_in_si(
-        location, name, unit, step, numbers[:, 1], "", (*remarks,), stated=stated
+        location,
+        "CSV",
+        own_unit or unit,
+        step,
+        numbers[:, index],
+        name,
+        (*remarks,),
+        stated=stated,
     )
 
 
-def _has_times(table: _Table) -> bool:
-    """True if the head begins with times, or the numbers of the first column rise."""
-    if re.match(TIME, table.head, re.IGNORECASE):
-        return True
-    first = [cells[0] for cells in table.rows.values()]
-    return _are_numbers(first) and bool((np.diff(np.array(first, float)) >= 0).all())
+def _require_cell_of_each_head(table: _Table) -> None:
+    """Refuse rows with more cells than the head has, as of decimal commas between commas."""
+    heads = len(re.split("[,;\t]", table.head))
+    has_commas = all("," in table.file.lines[line] for line in table.rows)
+    if has_commas and 1 < heads < table.width <= 2 * heads and _Column.of(table.head).is_time:
+        value = f"{table.width} numbers in a row below {heads} heads"
+        first_row, *_ = table.rows
+        cure = "these seem to be decimal commas: write decimal points, or semicolons between the"
+        cure += " columns"
+        raise table.file.refusal(first_row, value, "a number in a row for each head", cure)
 
 
-def _read_column(
-    file: TextFile, table: _Table, step: float | None, unit: str, *, channel: str
-) -> Recording:
-    """Recording of one of several columns, or of several numbers a line that follow one another."""
-    columns = len(next(iter(table.rows.values())))
-    location, has_times = file.location(table.start), _has_times(table)
-    if not channel and not has_times and step and unit:
-        return recording_in_si(location, "bare numbers", unit, step, table.series(file))
-    heads = _column_heads(table.head, columns)
-    bare = [BRACKETED.sub("", head).strip(' "').lower() for head in heads]
-    components = range(1 if has_times else 0, columns)
-    names = [tuple(filter(None, (str(k + 1), bare[k]))) for k in components]
+def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
+    """Return the index of the column that a channel names by its number or by its head.
+
+    Raises:
+        RefusedError: No column or several have the name; or there are no times and no name, so that
+            the numbers may as well be one series.
+    """
     if not channel and not has_times:
-        cure = (
-            f"choose one of several components, {file.name}#1; one series, several numbers a line,"
-        )
+        name = table.file.name
+        cure = f"choose one of several components, {name}#1; one series, several numbers a line,"
         cure += ' has records.step = "0.005 s" and records.unit = "g"'
-        raise file.refusal(table.start, f"{columns} columns without times", ALLOWED, cure)
-    column = components[choose_channel(f"{location}: {file.name}#COLUMN", channel, names)]
-    in_head = BRACKETED.search(heads[column])
-    unit, name = in_head[1] if in_head else unit, " ".join(names[column - components[0]])
-    for quantity, pattern in OTHER_COLUMN.items():
-        if pattern.search(bare[column]) and not ACCELERATION_WORD.search(bare[column]):
-            raise file.refusal(
-                table.start, heads[column], ALLOWED, f"its column is {quantity}: {TAKE}"
-            )
-    if not unit or (not has_times and step is None):
-        cure = 'say records.unit = "g"' + ("" if has_times else ', records.step = "0.005 s"')
-        raise file.refusal(table.start, table.head[:80] or "columns alone", ALLOWED, cure)
-    numbers = table.numbers(file, columns)
-    if not has_times:
-        return recording_in_si(location, "columns", unit, step or 0.0, numbers[:, column], name)
-    time_unit = BRACKETED.search(heads[0])
-    to_s = SECONDS.get(time_unit[1], 0.0) if time_unit else 1.0
-    if to_s == 0:
-        raise file.refusal(table.start, heads[0], f"times in {', '.join(SECONDS)}")
-    step, remarks = _step_and_remarks(file, table, to_s=to_s, stated_step=step)
-    if time_unit is None:
-        remarks.append("its times have no unit, taken as s")
-    return recording_in_si(location, "columns", unit, step, numbers[:, column], name, (*remarks,))
+        value = f"{table.width} columns without times"
+        raise table.file.refusal(table.start, value, EXPECTED_HEAD, cure)
+    first = 1 if has_times else 0
+    names = []
+    for number, column in enumerate(table.columns[first:], first + 1):
+        names.append((str(number), column.name) if column.name else (str(number),))
+    place = f"{table.file.location(table.start)}: {table.file.name}#COLUMN"
+    return first + choose_channel(place, channel, names)
 
 
-def _column_heads(head: str, columns: int) -> list[str]:
-    """The part of a head above each column, with its unit; empty texts if they do not fit."""
-    for cells in (
-        re.split("[,;\t]", head),
-        re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", head),
-    ):
-        if len(cells) == columns:
-            return [cell.strip() for cell in cells]
-    return [""] * columns
+def _require_acceleration(table: _Table, heads: Sequence[str]) -> None:
+    """Refuse a column whose heads name another quantity than an acceleration, or its unit."""
+    words_of_quantities = {
+        "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
+        "a velocity": r"vel(?:oc\w*)?|speed",
+        "a force": r"forces?|loads?|thrust|(?:base )?shear",
+        "a strain": r"strains?",
+        "a stress": r"stress(?:es)?|pressure",
+        "an angle": r"rotation|angle|tilt",
+        "a number of counts": r"counts?",
+        "a voltage": r"voltage|volts?",
+    }
+    quantity = ""
+    for head in heads:
+        for name, words in words_of_quantities.items():
+            is_named = re.search(rf"(?:\b|_)(?:{words})(?:\b|_)", head, re.IGNORECASE)
+            if is_named and not _Column(head.lower()).is_acceleration:
+                quantity = quantity or name
+        for unit in re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", head):
+            if name := other_quantity(unit):
+                quantity = quantity or f"{name} by its unit {unit}"
+    if quantity:
+        cure = f"its column is {quantity}: take the record of the acceleration, or mend the head"
+        raise table.file.refusal(table.start, " ".join(heads), EXPECTED_HEAD, cure)
 
 
-def _step_and_remarks(
-    file: TextFile, table: _Table, *, to_s: float, stated_step: float | None
-) -> tuple[float, list[str]]:
-    """Return the step in s of a record's times, and remarks; arguments as of `_even_step`."""
-    step, first, remarks = _even_step(file, table, to_s=to_s, stated_step=stated_step)
-    is_count = step == 1 and first in (0, 1)
-    if is_count and stated_step is not None:
-        return stated_step, ["its times count the samples: the stated step is taken"]
-    cure = "times in ms have the head time [ms]" if step >= MAX_STEP else ""
-    if is_count:
-        cure = 'times that count the samples do not tell their step: say records.step = "0.005 s"'
-    elif to_s != 1:
-        cure = "the head states another unit of times than s: if they are in s, write time [s]"
-    require_step(file.location(table.start), step, cure)
-    if abs(first) > UNEVEN * step:
-        remarks.append(f"its times begin at {first:g} s, taken as 0")
-    return step, remarks
-
-
-def _even_step(
-    file: TextFile,
-    table: _Table,
-    *,
-    to_s: float,
-    stated_step: float | None = None,
-    or_step: str = ', or say records.step = "{:.9g} s"',
-) -> tuple[float, float, list[str]]:
-    """Return the step of a table's times, the first time, and what is unusual about them.
-
-    The times stand in the first column and must rise in even steps. A step that the case states is
-    taken if the times do not tell it: all are equal, they count the samples, or they are rounded so
-    coarsely that even steps look uneven. In the last case it must agree with them.
+def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
+    """Return what to mend in the head of times and accelerations; empty if it is complete.
 
     Args:
-        file: The file, for messages.
-        table: Its table, of two rows or more.
-        to_s: Unit of the times, in s.
+        table: The table.
+        column: Head of the accelerations.
+        unit: Unit of the accelerations, of the head or of the case.
+    """
+    first = table.columns[0]
+    if first.is_time and not seconds_of(first.unit or "s"):
+        return f"{first.unit} is no unit of times: {', '.join(SECONDS)}"
+    if column.is_time:
+        return "times stand in the first column"
+    if re.match(r"freq|period|sa\b|psa\b", first.name):
+        return "this is a spectrum: take the record of the acceleration over time"
+    if column.unit and acceleration_factor(column.unit) is None:
+        return f"{column.unit} is no unit of accelerations: mend the head"
+    if acceleration_factor(unit) is not None:
+        return ""
+    if re.match(r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\b", first.name):
+        return 'leave the count of samples out, and say records.step = "0.005 s"'
+    return 'write the unit into the head, or say records.unit = "g"'
+
+
+def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[float, list[str]]:
+    """Return the step in s of a record's times, and clauses on what is unusual about them.
+
+    Args:
+        table: The table, whose first column has the times.
+        stated_step: Step that the case states, in s.
+
+    Raises:
+        RefusedError: The times are uneven, or their step is one that records do not have.
+    """
+    steps = _even_steps(table, stated_step=stated_step)
+    is_count = steps.step == 1 and steps.first in (0, 1)
+    if is_count and stated_step is not None:
+        return stated_step, ["its times count the samples: the stated step is taken"]
+    cure = ""
+    if is_count:
+        cure = 'times that count the samples do not tell their step: say records.step = "0.005 s"'
+    elif table.columns[0].is_time and seconds_of(table.columns[0].unit or "s") != 1:
+        cure = "the head states another unit of times than s: if they are in s, write time [s]"
+    elif steps.step >= MAX_STEP:
+        cure = "times in ms have the head time [ms]"
+    require_step(table.file.location(table.start), steps.step, cure)
+    remarks = [steps.remark] if steps.remark else []
+    if abs(steps.first) > MAX_UNEVENNESS * steps.step:
+        remarks.append(f"its times begin at {steps.first:g} s, taken as 0")
+    return steps.step, remarks
+
+
+@dataclass(frozen=True)
+class _EvenSteps:
+    """Step and first time of even times, in s, and a clause on how the step was found."""
+
+    step: float
+    first: float
+    remark: str = ""
+
+
+def _even_steps(
+    table: _Table,
+    *,
+    stated_step: float | None = None,
+    or_step: str = ', or say records.step = "{:.9g} s"',
+) -> _EvenSteps:
+    """Return the even steps of the times in the first column of a table of two rows or more.
+
+    A step that the case states is taken where the times do not tell it: if all are equal, or if
+    they were rounded so coarsely that even steps look uneven. In the latter case it must agree with
+    them.
+
+    Args:
+        table: The table.
         stated_step: Step that the case states, in s.
         or_step: What a cure says of the key that states the step; empty where there is none.
 
-    Returns:
-        The step and the first time, in s, and clauses for remarks.
-
     Raises:
-        RefusedError: The times tell no even step, or one that records do not have.
+        RefusedError: The times do not rise in even steps.
     """
+    file = table.file
     lines = [*table.rows]
+    to_s = 1.0
+    if table.columns[0].is_time:
+        to_s = seconds_of(table.columns[0].unit or "s")
     time = to_s * np.array([float(cells[0]) for cells in table.rows.values()])
     first, last, n_steps = float(time[0]), float(time[-1]), len(time) - 1
+    if (time == first).all():
+        if stated_step is not None:
+            remark = "its times are all equal: the stated step is taken"
+            return _EvenSteps(stated_step, first=0.0, remark=remark)
+        cure = f"write times of even steps{or_step.format(0.005)}"
+        raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
+
     even: Array = np.asarray(np.linspace(first, last, len(time)), float)
     step = float(even[1] - even[0])
-    if (time == first).all():
-        if stated_step is None:
-            cure = f"write times of even steps{or_step.format(0.005)}"
-            raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
-        return stated_step, 0.0, ["its times are all equal: the stated step is taken"]
-    if not (step > 0 and np.abs(time - even).max() <= UNEVEN * step):
-        last_digit = to_s * table.resolution()
-        if not _are_rounded(time, even, last_digit):
-            raise _uneven(file, lines, time)
-        duration = last - first
-        difference = abs((stated_step or 0.0) * n_steps - duration)
-        if stated_step is None or difference > ROUNDED * last_digit:
-            likely = _likely_step(n_steps, duration, last_digit)
-            cure = f"digits were lost: write times of steps of {likely:.9g} s in full"
-            cure += or_step.format(likely)
-            value = f"times to {last_digit:g} s in steps of about {step:.4g} s"
-            raise file.refusal(lines[0], value, "even steps", cure)
-        return stated_step, first, [f"its times are rounded to {last_digit:g} s: the stated step"]
-    return step, first, []
+    if step > 0 and np.abs(time - even).max() <= MAX_UNEVENNESS * step:
+        return _EvenSteps(step, first)
+    last_digit = to_s * table.resolution()
+    if not _are_rounded(time, even, last_digit):
+        raise _uneven(file, lines, time)
+    duration = last - first
+    difference = abs((stated_step or 0.0) * n_steps - duration)
+    if stated_step is None or difference > last_digit * (1 + 1e-6):  # 1e-6 is binary round-off
+        likely = _likely_step(n_steps, duration, last_digit)
+        cure = f"digits were lost: write times of steps of {likely:.9g} s in full"
+        value = f"times to {last_digit:g} s in steps of about {step:.4g} s"
+        raise file.refusal(lines[0], value, "even steps", cure + or_step.format(likely))
+    remark = f"its times are rounded to {last_digit:g} s: the stated step is taken"
+    return _EvenSteps(stated_step, first, remark)
 
 
 def _are_rounded(time: Array, even: Array, last_digit: float) -> bool:
-    """True if times in s, shape (n,), are even ones that were rounded or cut to a last digit.
+    """Return whether times are even ones that were rounded or cut to a last digit.
 
-    Then two steps or more differ from the usual one. A single odd step is a time
-    that stands twice, or a gap.
+    Then two steps or more differ from the usual one. A single odd step is a time that stands twice,
+    or a gap.
+
+    Args:
+        time: The times in s, shape (n,).
+        even: Even times from the first to the last of them, shape (n,).
+        last_digit: Unit of the last digit of the times, in s.
     """
     steps = np.diff(time)
     usual = np.median(steps)
-    is_odd = np.abs(steps - usual) > 2 * UNEVEN * usual
-    # a rounded time lies within half its last digit, and so does the line through both ends
-    is_near = np.abs(time - even).max() <= ROUNDED * last_digit
+    is_odd = np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual
+    # A rounded time lies within half of the last digit, and so does the line through both ends. The
+    # factor leaves room for binary round-off.
+    is_near = np.abs(time - even).max() <= last_digit * (1 + 1e-6)
     rises = time[-1] > time[0] and bool((steps >= 0).all())
     return rises and bool(is_near) and int(is_odd.sum()) > 1
 
 
 def _likely_step(n_steps: int, duration: float, last_digit: float) -> float:
-    """Step in s of a usual sampling rate that fits the duration to its last digit, else the mean.
+    """Return the step of a usual sampling rate that fits a duration to its last digit, in s.
 
-    Rates are multiples of 100, 128, 50, 64, 25 or 10 samples in a second, in this order.
+    Rates are multiples of 100, 128, 50, 64, 25 or 10 samples in a second, in this order. If none
+    fits, the step is the mean.
     """
-    least = n_steps / (duration + last_digit)
-    most = n_steps / max(duration - last_digit, duration / 2)
+    lowest = n_steps / (duration + last_digit)
+    highest = n_steps / max(duration - last_digit, duration / 2)
     for multiple in (100, 128, 50, 64, 25, 10):
         rate = multiple * round(n_steps / duration / multiple)
-        if rate and least <= rate <= most:
+        if rate and lowest <= rate <= highest:
             return 1 / rate
     return duration / n_steps
 
@@ -444,55 +534,75 @@ def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
     Args:
         file: The file.
         lines: Line of each time, counted from 0.
-        time: The times, in s, shape (n,).
+        time: The times in s, shape (n,).
     """
     steps = np.diff(time)
     rising = steps[steps > 0]
     usual = float(np.median(rising)) if rising.size else 0.0
-    is_odd = np.abs(steps - usual) > 2 * UNEVEN * usual
-    distances = np.abs(time - np.linspace(time[0], time[-1], len(time)))
-    wrong = 1 + int(is_odd.argmax()) if is_odd.any() else int(distances.argmax())
-    if (steps < 0).any():
-        wrong = 1 + int((steps < 0).argmax())
-    value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"
-    cure = "resample to even steps"
-    in_order = np.diff(np.sort(time))
-    if time[wrong] < time[wrong - 1]:
+    odd = np.flatnonzero(np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual)
+    wrong = 1 + int(odd[0]) if odd.size else int(np.abs(time - time[0]).argmax())
+    falls = np.flatnonzero(steps < 0)
+    is_one_time = odd.size == 2 and odd[1] == odd[0] + 1
+    if is_one_time and abs(steps[odd].sum() - 2 * usual) <= 2 * MAX_UNEVENNESS * usual:
+        cure = f"this time alone is wrong: {time[wrong - 1] + usual:.9g} s fits"
+    elif falls.size:
+        wrong = 1 + int(falls[0])
         pair = f"line {lines[wrong - 1] + 1} and line {lines[wrong] + 1}"
         cure = f"times must rise, and fall between {pair}: sort the rows"
-        if (steps < 0).all():
+        if falls.size == steps.size:
             cure = "times must rise, and these fall: turn the order of the rows round"
-        elif (in_order < UNEVEN * usual).any():
+        elif (np.diff(np.sort(time)) < MAX_UNEVENNESS * usual).any():
             cure = f"times must rise, and fall between {pair}: of two records in one file keep one"
     elif time[wrong] == time[wrong - 1]:
         cure = "a time stands twice: leave one out, or resample to even steps"
-    elif steps[wrong - 1] > 1.5 * usual and is_odd.sum() == 1:
+    elif steps[wrong - 1] > 1.5 * usual and odd.size == 1:
         cure = "samples are missing there: fill the gap, or resample to even steps"
+    else:
+        cure = "resample to even steps"
+    value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"
     return file.refusal(lines[wrong], value, "even steps", cure)
 
 
-def read_force_history(path: Path) -> tuple[float, Array, bool]:
-    """Reads a force over time from a table with even steps from t = 0.
+@dataclass(frozen=True)
+class ForceHistory:
+    """A force over time in even steps from t = 0.
 
-    Returns:
-        Step in s; samples, shape (n,), in N or without a unit; whether the head gives a unit.
+    Args:
+        step: Time between samples, in s.
+        samples: The force in N, or without a unit, shape (n,).
+        has_unit: Whether the file states the unit of the force.
+    """
+
+    step: float
+    samples: Array
+    has_unit: bool
+
+
+def read_force_history(path: Path) -> ForceHistory:
+    """Read a force over time from a table with even steps from t = 0.
+
+    Raises:
+        RefusedError: The file cannot be read, its head does not name times and a force in known
+            units, a row is wrong, the times are uneven or begin elsewhere, or the force is 0.
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
-    match = FORCE_HEAD.fullmatch(table.head)
-    to_s = SECONDS.get(match[1], 0.0) if match and match[1] else 0.0
-    if match is None or not table.rows or to_s == 0:
-        raise file.refusal(table.start, table.head[:80] or "without a head", ALLOWED_FORCE)
-    to_si = NEWTONS.get(match[2], 0.0) if match[2] else 1.0
-    if to_si == 0:
+    allowed = "time [s],force [kN], or time [s],force of a course without a unit"
+    if table.width != 2:
+        raise file.refusal(table.start, table.head[:80] or "without a head", allowed)
+    time, force = table.columns
+    is_head = time.is_time and re.match(r"\W*(?:force|load|f)\b", force.name) is not None
+    if not is_head or not seconds_of(time.unit):
+        raise file.refusal(table.start, table.head[:80] or "without a head", allowed)
+    if force.unit and force.unit not in NEWTONS:
         cure = f"units are {', '.join(NEWTONS)}"
-        raise file.refusal(table.start, table.head[:80], ALLOWED_FORCE, cure)
-    numbers = table.numbers(file, 2)
-    step, first, _ = _even_step(file, table, to_s=to_s, or_step="")
-    if abs(first) > UNEVEN * step:
-        [line, *_] = table.rows
-        raise file.refusal(line, f"time {first:g} s", "even steps from 0 s")
-    samples = np.asarray(to_si * numbers[:, 1])
-    if not samples.any():
+        raise file.refusal(table.start, table.head[:80], allowed, cure)
+    numbers = table.numbers()
+    steps = _even_steps(table, or_step="")
+    if abs(steps.first) > MAX_UNEVENNESS * steps.step:
+        first_row, *_ = table.rows
+        raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s")
+    if not numbers[:, 1].any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")
-    return step, samples, bool(match[2])
+    samples = NEWTONS.get(force.unit, 1.0) * numbers[:, 1]
+    return ForceHistory(steps.step, np.asarray(samples), has_unit=bool(force.unit))

@@ -1,4 +1,4 @@
-"""Text of a downloaded file: its lines, numbers by place, and refusals that name the line."""
+"""Text files with records: their lines with places for messages, and what all formats share."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import ceil, isfinite
 from pathlib import Path
 from typing import Self
 
@@ -21,11 +21,10 @@ from alphacut.frame.records.units import acceleration_factor, other_quantity
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
-LONGEST_LINE = 10_000
-"""Letters of a line; formats have about 80, and searches of a line take their square."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
 MIN_STEP, MAX_STEP = 4e-5, 0.5
-"""Steps of records in s that are believed: instruments sample 10 to 20,000 times a second."""
+"""Smallest step of a record, and the one that all are below, in s. Instruments take 10 to 20,000
+samples in a second; another step is a mistake in its unit, or a count of samples."""
 
 
 @dataclass(frozen=True)
@@ -37,48 +36,85 @@ class TextFile:
 
     @classmethod
     def from_bytes(cls, name: str, content: bytes) -> Self:
-        """The lines of a content in UTF-8 or Latin-1; RefusedError of what no text has."""
+        """Return the lines of a content in UTF-8 or Latin-1.
+
+        Raises:
+            RefusedError: The content has zero bytes, or a line of more than 10,000 letters.
+        """
         require(b"\0" not in content, name, "no text", "a text file with a record")
         file = cls(name, tuple(re.split(r"\r\n|\r|\n", decoded(content))))
+        # Searches in a line take the square of its length; formats have about 80 letters a line.
         length, longest = max((len(line), number) for number, line in enumerate(file.lines))
-        if length > LONGEST_LINE:
-            allowed = f"lines of up to {LONGEST_LINE:,} letters"
-            raise file.refusal(longest, f"{length:,} letters long", allowed)
+        if length > 10_000:
+            raise file.refusal(longest, f"{length:,} letters long", "lines of up to 10,000 letters")
         return file
 
     def location(self, line: int) -> str:
-        """Name of a line, counted from 0, for messages."""
+        """Return the name of a line, counted from 0, for messages."""
         return f"{self.name}, line {line + 1}"
 
     def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
-        """Error about a line, counted from 0."""
+        """Return the error about a line, counted from 0."""
         return RefusedError(self.location(line), str(value)[:80], allowed, cure)
 
     def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
-        """All numbers from line `first` up to, but not with, line `last`, counted from 0.
+        """Return all numbers from line `first` up to, but not with, line `last`, counted from 0.
 
-        In files of fixed columns a number has `width` characters, else spaces part numbers. Behind
-        `count` numbers a line of text ends the reading. What else is no finite number is refused.
+        Args:
+            first: First line.
+            last: Line behind the last one.
+            width: Characters of a number in files of fixed columns; 0 where spaces separate them.
+            count: Numbers behind which a line of text ends the reading; 0 for none.
+
+        Raises:
+            RefusedError: A word is no finite number.
         """
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
             line = self.lines[row].rstrip()
-            columns = range(0, len(line), width) if width else ()
-            words = [line[start : start + width].strip() for start in columns] or line.split()
-            if 0 < count <= len(values) and not all(map(NUMBER.fullmatch, words)):
+            words = line.split()
+            if width:
+                starts = range(0, len(line), width)
+                words = [line[start : start + width].strip() for start in starts]
+            if 0 < count <= len(values) and not all(NUMBER.fullmatch(word) for word in words):
                 break
-            for word in filter(None, words):
+            for word in words:
+                if not word:  # an empty column
+                    continue
                 value = float(re.sub("[dD]", "e", word)) if NUMBER.fullmatch(word) else np.nan
                 if not isfinite(value):
-                    raise self.refusal(row, repr(word), "finite numbers such as -.1394908E-02")
+                    allowed = "finite numbers such as -.1394908E-02"
+                    cure = "write decimal points" if re.search(r"\d,\d", word) else ""
+                    raise self.refusal(row, repr(word), allowed, cure)
                 values.append(value)
         return np.array(values)
 
+    def fixed_columns(
+        self, first: int, *, count: int, per_line: int, width: int, head: int
+    ) -> Array:
+        """Return samples in fixed columns, shape (count,).
+
+        Args:
+            first: Line of the first sample.
+            count: Number of samples that the head states.
+            per_line: Samples in a line.
+            width: Characters of a sample.
+            head: Line that states the count, for the message.
+
+        Raises:
+            RefusedError: A sample is no finite number, or there are more or fewer than stated.
+        """
+        last = first + ceil(count / max(per_line, 1))
+        samples = self.numbers(first, last, width=width)
+        self.require_count(samples, count, head)
+        return samples
+
     def require_count(self, samples: Array, count: int, line: int) -> None:
-        """Refuses another number of samples than the head states."""
+        """Refuse another number of samples than the head states in a line."""
         if len(samples) != count:
             what = f"{count} samples, and {len(samples)} follow"
-            raise self.refusal(line, what, "as many samples as the head states", "load it anew")
+            cure = "load the file anew, or mend the number in the head"
+            raise self.refusal(line, what, "as many samples as the head states", cure)
 
 
 def recording_in_si(
@@ -92,10 +128,22 @@ def recording_in_si(
     *,
     stated: Iterable[StatedPeak] = (),
 ) -> Recording:
-    """Recording of samples in a unit, their step in s; refuses other units and steps at a place.
+    """Return the recording of samples in a unit of accelerations.
 
-    `stated` are the peaks in the file's head: if the samples have another one, the recording
-    bears a remark, or is refused, as `remarks_on_peak` says.
+    Args:
+        location: File and line, for messages.
+        file_format: Name of the format.
+        unit: Unit of the samples; empty where neither the file nor the case states one.
+        step: Time between samples, in s.
+        samples: The samples, shape (n,).
+        channel: Name of the channel in the file.
+        remarks: Clauses on what is unusual in the file.
+        stated: Peaks in the file's head. If the samples have another peak, the recording bears a
+            remark, or is refused, as `remarks_on_peak` says.
+
+    Raises:
+        RefusedError: The unit is not one of accelerations, no record has this step, or the peak in
+            the head is another one.
     """
     to_si = acceleration_factor(unit)
     if to_si is None:
@@ -113,36 +161,41 @@ def recording_in_si(
     return Recording(file_format, unit, step, in_si, channel, remarks)
 
 
-def require_step(location: str, step: float, cure: str = "") -> None:
+def require_step(location: str, step: float, cure: str = "mend the step in the head") -> None:
     """Refuse a step, in s, that no record of an earthquake has; `cure` is for the message."""
     allowed = f"steps from {MIN_STEP:g} s to below {MAX_STEP:g} s"
-    is_usual = MIN_STEP <= step < MAX_STEP
-    require(
-        is_usual, location, f"a step of {step:g} s", allowed, cure or "mend the step in the head"
-    )
+    require(MIN_STEP <= step < MAX_STEP, location, f"a step of {step:g} s", allowed, cure)
 
 
 def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
-    """Index of the channel that has a name; of the only one where none is asked for.
+    """Return the index of the channel that has a name, or of the only one if none is asked for.
 
-    A name that several channels have is numbered in their order, as "90 deg#1" and "90 deg#2".
+    Args:
+        location: File and line, for the message.
+        channel: The name, in any capitals; empty if none is asked for. A name that several channels
+            have is numbered in their order, as "90 deg#1" and "90 deg#2".
+        names: Names of each channel, in small letters.
+
+    Raises:
+        RefusedError: No channel has the name, or none is asked for and there are several.
     """
     counts = Counter(name for aliases in names for name in aliases)
-    numbers = Counter[str]()
-    numbered: list[list[str]] = []  # names of each channel, none of which another one has
+    seen = Counter[str]()
+    unique_names = []  # of each channel, none of which another one has
     for aliases in names:
-        numbers.update(aliases)
-        is_own = {name: counts[name] == 1 for name in aliases}
-        numbered.append([x if is_own[x] else f"{x}#{numbers[x]}" for x in aliases])
-    chosen = [k for k, own in enumerate(numbered) if not channel or channel.lower() in own]
-    allowed = "; ".join(dict.fromkeys(" or ".join(own) for own in numbered)) or "accelerations"
+        seen.update(aliases)
+        unique = [name if counts[name] == 1 else f"{name}#{seen[name]}" for name in aliases]
+        unique_names.append(unique)
+    wanted = channel.lower()
+    chosen = [k for k, unique in enumerate(unique_names) if not wanted or wanted in unique]
+    allowed = "; ".join(dict.fromkeys(" or ".join(unique) for unique in unique_names))
     value = f"channel {channel or 'not named'}"
-    require(len(chosen) == 1, location, value, f"one of: {allowed}")
+    require(len(chosen) == 1, location, value, f"one of: {allowed or 'accelerations'}")
     return chosen[0]
 
 
 def decoded(content: bytes) -> str:
-    """The text of a content in UTF-8, else in Latin-1."""
+    """Return the text of a content in UTF-8, else in Latin-1."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -150,7 +203,11 @@ def decoded(content: bytes) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file; refuses one that cannot be read."""
+    """Return the content of a file.
+
+    Raises:
+        RefusedError: The file cannot be read.
+    """
     try:
         require_text(path)
         return path.read_bytes()

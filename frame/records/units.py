@@ -13,7 +13,7 @@ METRES = {
 }  # fmt: skip
 SECONDS = {
     "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "msec": 1e-3, "s": 1.0, "sec": 1.0,
-    "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "h": 3600.0,
+    "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
 }  # fmt: skip
 NEWTONS = {
     "N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
@@ -43,6 +43,11 @@ OTHER_UNITS = {
     "an angle": re.compile(r"m?rad|deg|degrees?|°", re.I),
 }
 """Units of other quantities that instruments record, by what the quantity is called."""
+
+
+def seconds_of(unit: str) -> float:
+    """Return the value of a unit of time in s, whatever its capitals; 0 of other units."""
+    return SECONDS.get(unit, SECONDS.get(unit.lower(), 0.0))
 
 
 def acceleration_factor(unit: str) -> float | None:

@@ -92,6 +92,12 @@ def test_channels_are_told_apart(tmp_path, text, channels, words):
         read_recording(path, "7")
 
 
+def test_a_head_of_peer_without_a_unit_is_read_in_the_stated_one(tmp_path):
+    path = saved(tmp_path, written.at2(NAMED, "ACCELERATION TIME SERIES"))
+    record = read_recording(path, unit="g")
+    assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
+
+
 def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
     two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2])
     with pytest.raises(RefusedError, match=r"or say records\.unit"):
@@ -196,10 +202,13 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         (written.at2("NPTS=  401, DT= .0050 SEC"), r"line 4 is 401 samples, and 400 follow"),
         (written.at2(NAMED, "VELOCITY TIME SERIES IN UNITS OF CM/S"), "line 3 is in units of CM/S"),
         (written.at2(NAMED, "ACCELERATION TIME SERIES"), "without a unit"),
-        (written.at2("NPTS=  400"), "line 4 is NPTS= 400; .*write the step"),
+        (written.at2("NPTS=  400"), "line 4 is NPTS= 400; .*write the count and the step"),
         (written.at2("NPTS=  400, DT= 20 SEC"), "line 4 is a step of 20 s; .*write 20 ms as DT"),
         (written.at2("NPTS=  400, DT= 0,0050 SEC"), "line 4 is .*with a decimal point"),
-        (written.at2("NPTS=  400, DT= -.0050 SEC"), "line 4 is .*a number above 0"),
+        (written.at2("NPTS=  400, DT= -.0050 SEC"), "line 4 is .*write the count and the step"),
+        (written.at2("NPTS=  400, DT= 5 MSEC"), "line 4 is .*the step in s"),
+        (written.at2("NPTS=  400.5, DT= .0050 SEC"), "line 4 is .*write the count"),
+        (written.at2("NPTS=  0, DT= .0050 SEC"), "line 4 is .*write the count"),
         (written.at2(NAMED, "VELOCITY TIME SERIES IN UNITS OF CM/S"), "take the file .AT2 of the"),
         (written.at2(NAMED, "ACCELERATION TIME SERIES"), r'say records\.unit = "g"'),
         (written.at2("NPTS=  400, DT= 0.0 SEC"), "a step of 0 s"),

@@ -138,6 +138,7 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
         ("0.01,0.1,5", "decimal points"),
         (",0.1", "cells are empty"),
         ("max,0.3", "text stands among the numbers"),
+        ("0.01s,0.3", "units stand in the head"),
     ],
 )
 def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
@@ -155,6 +156,7 @@ def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
         ((6, 5, 4, 3, 2, 1, 0), "turn the order of the rows round"),
         ((0, 1, 2, 3, 5, 7, 9), "resample to even steps"),
         ((0, 0, 0, 0, 0), 'records.step = "0.005 s"'),
+        ((0, 1, 2, 9, 4, 5, 6), "this time alone is wrong: 0.03 s fits"),
     ],
 )
 def test_uneven_times_tell_their_cure(tmp_path, times, cure):
@@ -174,6 +176,29 @@ def test_uneven_times_tell_their_cure(tmp_path, times, cure):
 def test_times_whose_step_no_record_has_tell_their_cure(tmp_path, head, step, cure):
     rows = [f"{step * k:g},{0.1 * k * k % 1:.3f}" for k in range(20)]
     assert cure in refused(saved(tmp_path, rows, head))
+
+
+@pytest.mark.parametrize(
+    ("head", "cure"),
+    [
+        ("period [s],Sa [g]", "a spectrum"),
+        ("frequency [Hz],acceleration [g]", "a spectrum"),
+        ("time [s],jerk [m/s^3]", "m/s^3 is no unit of accelerations"),
+        ("time [s],acceleration [m/s]", "a velocity by its unit m/s"),
+    ],
+)
+@pytest.mark.parametrize("unit", ["", "g"])
+def test_heads_of_no_record_tell_what_they_are_whatever_the_case_states(tmp_path, head, cure, unit):
+    rows = [f"{0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in range(20)]
+    assert cure in refused(saved(tmp_path, rows, head), "", None, unit)
+
+
+def test_capitals_and_words_that_are_not_known_do_not_matter_beside_a_unit(tmp_path):
+    rows = [f"{0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in range(20)]
+    for head in ("TIME [S],ACCELERATION [G]", "time [s],ground motion [g]"):
+        record = read_recording(saved(tmp_path, rows, head))
+        assert record.step == pytest.approx(0.01)
+        assert record.unit.lower() == "g"
 
 
 @pytest.mark.parametrize("times", [[0] * 9, range(9), range(1, 10)])
