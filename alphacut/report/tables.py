@@ -12,7 +12,7 @@ import pandas as pd
 from alphacut.base.csv_text import csv_cell
 from alphacut.base.kept_files import write_text
 from alphacut.base.number_text import MINUS, Table, rounded_ends
-from alphacut.frame import LearnedInputs, Sensitivity
+from alphacut.frame import Sensitivity
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
@@ -87,7 +87,7 @@ def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     return pd.DataFrame(columns | {"nature of E": str(result.nature)})
 
 
-def rows_of(answer: Answer | LearnedInputs) -> pd.DataFrame:
+def rows_of(answer: Answer) -> pd.DataFrame:
     """Return the rows of numbers of an answer."""
     return pd.DataFrame(answer.records())
 

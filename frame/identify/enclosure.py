@@ -1,14 +1,17 @@
 """Enclosure of all parameters of a storey frame that agree with ranges of its natural modes.
 
-A mode with a measured shape r obeys T_z = k_z (r_z − r_(z−1)) and T_z − T_(z+1) = λ m_z r_z. Each
-product is replaced by its four bounding planes (McCormick, Mathematical Programming 10, 1976), each
-exponential of a log parameter by tangents and a secant. A frequency alone gives two rows by the
-Rayleigh quotient of a fixed shape and its distance from the eigenvalue (Kato and Temple). The
-linear program that results bounds each parameter in turn.
+A mode with the eigenvalue λ and the shape r obeys T_z = k_z (r_z - r_(z-1)) for the shear force of
+each storey and T_z - T_(z+1) = λ m_z r_z for each floor. Each product of two variables is enclosed
+by its four bounding planes (McCormick, Mathematical Programming 10, 147, 1976), and each
+exponential of a logarithm of a parameter by tangents and a secant. A frequency alone gives two
+inequalities by the Rayleigh quotient of a fixed shape and its distance from the eigenvalue (Kato
+and Temple). The result is a linear relaxation: every frame with such modes is one of its solutions.
+Linear programs bound each parameter in turn.
 
-Any multipliers y ≤ 0 give a lower bound of the least cᵀx over A x ≤ 0, l ≤ x ≤ u: that of
-(c − Aᵀy)ᵀx over the box alone. The solver's own multipliers make it sharp, and its tolerances do
-not matter (Neumaier and Shcherbina, Mathematical Programming 99, 2004).
+The optimal value of a linear program is computed with rounding and tolerances. It is made a proved
+bound as follows. For any multipliers y ≤ 0, the minimum of cᵀx over A x ≤ 0 and l ≤ x ≤ u is at
+least the minimum of (c - Aᵀy)ᵀx over l ≤ x ≤ u alone, because yᵀA x ≥ 0. The multipliers of the
+solver make this bound sharp (Neumaier and Shcherbina, Mathematical Programming 99, 283, 2004).
 """
 
 from __future__ import annotations
@@ -22,38 +25,47 @@ from alphacut.base.arrays import Array
 from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
 from alphacut.frame.structures.storey import chain_matrix
 
-MAX_PASSES = 6  # over all ends
-MIN_PROGRESS = 0.03  # fraction of the widths that a pass must take off to be worth another one
-ROUND_OFF = 1e-13  # fraction of the sums' sizes by which bounds are widened for rounding
-
 
 def enclosure(
     chain: Chain, lower: Array, upper: Array, modes: Sequence[ModeCut]
 ) -> tuple[Array, Array] | None:
-    """Return the corners of a box proved to contain all parameters that agree with the modes.
+    """Return a box that contains all parameters that agree with ranges of measured modes.
 
-    Each side is bounded by linear programs, in at most `MAX_PASSES` passes over ever smaller boxes.
-    `modes` are ranges of the measured modes at a level, `lower` and `upper` corners (d,) of the
-    first box: logarithms of parameters over nominal values. None where no parameters agree.
+    Linear programs bound each side in several passes over ever smaller boxes.
+
+    Args:
+        chain: The frame.
+        lower: Lower ends of the first box, shape (parameters,): logarithms of the parameters over
+            their nominal values.
+        upper: Upper ends of the first box.
+        modes: Ranges of the measured modes.
+
+    Returns:
+        Lower and upper ends of the box, or None if no parameters agree with the modes.
     """
     lower, upper = lower.copy(), upper.copy()
-    amplitudes: dict[tuple[int, int], tuple[float, float]] = {}  # not measured, by mode and floor
-    for _ in range(MAX_PASSES):
+    # Ranges of amplitudes that were not measured, by mode and floor.
+    amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
+    for _ in range(6):  # passes (tuned: later ones hardly narrow a box)
         relaxation = ChainRelaxation(chain, lower, upper, modes, amplitudes)
         if relaxation.unmeasured and not relaxation.is_empty:
-            amplitudes |= {key: relaxation.bounds(x) for key, x in relaxation.unmeasured.items()}
+            for key, expression in relaxation.unmeasured.items():
+                amplitudes[key] = relaxation.bounds(expression)
             if any(low > high for low, high in amplitudes.values()):
                 return None
             relaxation = ChainRelaxation(chain, lower, upper, modes, amplitudes)
         if relaxation.is_empty:
             return None
-        has_width, width = upper > lower, upper - lower
+
+        width = upper - lower
+        has_width = width > 0
         for k in np.flatnonzero(has_width):
             low, high = relaxation.bounds(relaxation.logs[k])
             lower[k], upper[k] = max(low, lower[k]), min(high, upper[k])
         if (lower > upper).any():
             return None
-        if (1 - (upper - lower)[has_width] / width[has_width]).max(initial=0.0) < MIN_PROGRESS:
+        narrowed_by = 1 - (upper - lower)[has_width] / width[has_width]
+        if narrowed_by.max(initial=0.0) < 0.03:  # tuned: another pass is not worth its time
             break
     return lower, upper
 
@@ -61,34 +73,54 @@ def enclosure(
 class LinearRelaxation:
     """Linear program A x ≤ 0, l ≤ x ≤ u, with products and exponentials between planes.
 
-    An expression is an array of the coefficients of at most `size` variables, shape (size,). The
-    first variable is 1, so that its coefficient is the constant.
+    An expression is a linear function of the variables, given by its coefficients, shape (size,).
+    The first variable is the constant 1, so that its coefficient is a constant term.
+
+    Args:
+        size: Largest number of variables.
+
+    Attributes:
+        lower: Lower ends l of the variables, shape (size,).
+        upper: Upper ends u of the variables, shape (size,).
+        one: The expression 1.
+        count: Number of variables so far.
+        rows: Rows of A: expressions that are at most 0.
     """
 
     def __init__(self, size: int) -> None:
-        self.lower, self.upper = np.zeros((2, size))
+        self.lower = np.zeros(size)
+        self.upper = np.zeros(size)
         self.lower[0] = self.upper[0] = 1.0
         self.one: Array = np.eye(1, size)[0]
-        self.count, self.rows = 1, list[Array]()  # rows are expressions that are 0 at most
+        self.count = 1
+        self.rows: list[Array] = []
 
     def variable(self, low: float, high: float) -> Array:
-        """Add a variable between two ends and return it; without width it is a constant."""
+        """Add a variable between two ends and return it; if the ends agree, return a constant."""
         if low == high:
             return low * self.one
-        self.lower[self.count], self.upper[self.count] = low, high
+        k = self.count
+        self.lower[k], self.upper[k] = low, high
         self.count += 1
-        return np.asarray(np.eye(1, len(self.one), self.count - 1)[0])
+        return np.asarray(np.eye(1, len(self.one), k)[0])
 
     def range(self, expression: Array) -> tuple[float, float]:
-        """Return least and greatest value of an expression over the ranges of its variables."""
-        ends = np.sort([expression * self.lower, expression * self.upper], axis=0).sum(1)
+        """Return the smallest and largest value of an expression for l ≤ x ≤ u alone."""
+        ends = np.sort([expression * self.lower, expression * self.upper], axis=0).sum(axis=1)
         return float(ends[0]), float(ends[1])
 
     def product(self, x: Array, y: Array) -> Array:
-        """Add and return a variable for the product x y, between four planes (McCormick 1976)."""
-        (a, b), (c, d) = self.range(x), self.range(y)
-        if a == b or c == d:
-            return y * a if a == b else x * c
+        """Add and return a variable for the product of two expressions.
+
+        With x in [a, b] and y in [c, d], the nonnegative products (x - a)(y - c), (b - x)(d - y),
+        (b - x)(y - c) and (x - a)(d - y) give the four bounding planes.
+        """
+        a, b = self.range(x)
+        c, d = self.range(y)
+        if a == b:
+            return y * a
+        if c == d:
+            return x * c
         corners = (a * c, a * d, b * c, b * d)
         z = self.variable(min(corners), max(corners))
         for p, q, sign in ((a, c, -1), (b, d, -1), (b, c, 1), (a, d, 1)):
@@ -96,7 +128,10 @@ class LinearRelaxation:
         return z
 
     def exponential(self, y: Array) -> Array:
-        """Add and return a variable for exp(y), between three tangents and the secant."""
+        """Add and return a variable for exp(y), above three tangents and below the secant.
+
+        The ends and the secant are widened by a few units of rounding.
+        """
         low, high = self.range(y)
         if low == high:
             return float(np.exp(low)) * self.one
@@ -108,46 +143,69 @@ class LinearRelaxation:
         return x
 
     def bounds(self, expression: Array) -> tuple[float, float]:
-        """Return proved least and greatest value of an expression."""
-        program = csr_array(np.reshape(self.rows, (-1, len(self.one)))), self.lower, self.upper
-        return proved_minimum(expression, *program), -proved_minimum(-expression, *program)
+        """Return a proved lower and upper bound of an expression over the linear program."""
+        rows = csr_array(np.reshape(self.rows, (-1, len(self.one))))
+        low = proved_minimum(expression, rows, self.lower, self.upper)
+        high = -proved_minimum(-expression, rows, self.lower, self.upper)
+        return low, high
 
 
 def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array) -> float:
-    """Return a lower bound of cᵀx over A x ≤ 0, l ≤ x ≤ u; infinite if the set is proved empty."""
-    from scipy.optimize import linprog  # which takes time to import
+    """Return a proved lower bound of cᵀx over A x ≤ 0, l ≤ x ≤ u.
 
-    right, ends = np.zeros(rows.shape[0]), np.column_stack([lower, upper])
-    result = linprog(objective, A_ub=rows, b_ub=right, bounds=ends, method="highs")
-    if result.status == 2:  # phase one: the least t with A x − t ≤ 0 for some x is proved positive
+    Args:
+        objective: c, shape (variables,).
+        rows: A, shape (rows, variables).
+        lower: l, shape (variables,).
+        upper: u, shape (variables,).
+
+    Returns:
+        The bound; +∞ if it is proved that no x exists.
+    """
+    from scipy.optimize import linprog  # takes time to import
+
+    no_multipliers = np.zeros(rows.shape[0])
+    ends = np.column_stack([lower, upper])
+    result = linprog(objective, A_ub=rows, b_ub=no_multipliers, bounds=ends, method="highs")
+    is_infeasible = result.status == 2
+    if is_infeasible:
+        # The set is empty if the smallest t with A x - t ≤ 0 for some x is proved positive.
         relaxed = csr_array(hstack([rows, csr_array(-np.ones((rows.shape[0], 1)))]))
         slack = np.append(np.zeros(len(lower)), 1.0)
         if proved_minimum(slack, relaxed, np.append(lower, 0.0), np.append(upper, 1e3)) > 0:
             return np.inf
-    multipliers = right  # zero, which leaves the bound over the box
+    multipliers = no_multipliers
     if result.status == 0:
         multipliers = np.minimum(result.ineqlin.marginals, 0.0)
-    # min (c − Aᵀy)ᵀx over the box, by the sign of each reduced cost
+
+    # The minimum of (c - Aᵀy)ᵀx over the box is attained at an end of each variable, by the sign of
+    # its reduced cost. Rounding is in proportion to the sum of the magnitudes of all terms.
     reduced_costs = objective - rows.T @ multipliers
     terms = np.where(reduced_costs > 0, reduced_costs * lower, reduced_costs * upper)
-    # sum of the absolute values of all terms, in proportion to which they are rounded
-    sizes = np.abs(objective) + abs(rows).T @ np.abs(multipliers)
-    return float(terms.sum() - ROUND_OFF * sizes @ np.maximum(np.abs(lower), np.abs(upper)))
+    magnitudes = np.abs(objective) + abs(rows).T @ np.abs(multipliers)
+    rounding = 1e-13 * magnitudes @ np.maximum(np.abs(lower), np.abs(upper))
+    return float(terms.sum() - rounding)
 
 
 class ChainRelaxation(LinearRelaxation):
     """Linear relaxation of all chains of a box whose modes lie in measured ranges.
 
-    Args are those of `enclosure`; `known` are ends of amplitudes that were not measured, by mode
-    and floor.
+    The first four arguments are those of `enclosure`.
+
+    Args:
+        chain: The frame.
+        lower: Lower ends of the box.
+        upper: Upper ends of the box.
+        modes: Ranges of the measured modes.
+        known: Known ranges of amplitudes that were not measured, by mode and floor.
 
     Attributes:
         logs: Logarithm of each parameter over its nominal value, as an expression.
         stiffness: Stiffness of each storey over its nominal value, as an expression.
         mass: Mass of each floor over its nominal value, as an expression.
         unmeasured: Amplitudes at floors without a sensor, as expressions, by mode and floor.
-        lowest: Lower bounds of all eigenvalues, shape (n,), in 1/s².
-        highest: Upper bounds of them.
+        eigenvalue_lower: Lower bounds of all eigenvalues, shape (floors,), in 1/s².
+        eigenvalue_upper: Upper bounds of all eigenvalues.
         is_empty: Whether no chain of the box has such eigenvalues.
     """
 
@@ -160,102 +218,178 @@ class ChainRelaxation(LinearRelaxation):
         known: Mapping[tuple[int, int], tuple[float, float]],
     ) -> None:
         n = len(chain.mass)
-        # parameters, stiffnesses and masses; of each mode amplitudes, λ and three products a floor
+        # Variables: parameters, stiffnesses and masses; for each mode the amplitudes, λ and three
+        # products at each floor.
         super().__init__(1 + len(lower) + 2 * n + len(modes) * (4 * n + 1))
         self.chain = chain
         self.logs = [self.variable(*ends) for ends in zip(lower, upper, strict=True)]
-        self.stiffness, self.mass = (
-            [self.exponential(row @ np.array(self.logs)) for row in rows] for rows in chain.powers
-        )
-        self.lowest, self.highest = eigenvalue_ranges(chain, lower, upper)
-        low, high = chain.ranges(lower, upper)
-        self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)
+        logs = np.array(self.logs)
+        stiffness_powers, mass_powers = chain.powers
+        self.stiffness = [self.exponential(row @ logs) for row in stiffness_powers]
+        self.mass = [self.exponential(row @ logs) for row in mass_powers]
+        self.eigenvalue_lower, self.eigenvalue_upper = eigenvalue_ranges(chain, lower, upper)
         self.unmeasured: dict[tuple[int, int], Array] = {}
-        least = {cut.mode: max(cut.low, self.lowest[cut.mode - 1]) for cut in modes}
-        greatest = {cut.mode: min(cut.high, float(self.highest[cut.mode - 1])) for cut in modes}
-        self.is_empty = any(least[mode] > greatest[mode] for mode in least)
-        for cut in () if self.is_empty else modes:
-            self.add_frequency(cut)
-            eigenvalue = greatest[cut.mode]
-            if cut.shape and (ends := self.amplitude_ranges(eigenvalue, cut)) is not None:
-                ends |= {z: known[cut.mode, z] for z in ends if (cut.mode, z) in known}
-                shape = {floor: self.variable(*ends[floor]) for floor in sorted(ends)}
-                unmeasured = shape.keys() - cut.shape.keys()
-                self.unmeasured |= {(cut.mode, floor): shape[floor] for floor in unmeasured}
-                relative = self.variable(least[cut.mode] / eigenvalue, 1.0)
-                self.add_balance(shape, relative, eigenvalue)
 
-    def add_balance(
+        # The range of each measured eigenvalue within its bounds.
+        ranges = []
+        for cut in modes:
+            low = max(cut.low, self.eigenvalue_lower[cut.mode - 1])
+            high = min(cut.high, float(self.eigenvalue_upper[cut.mode - 1]))
+            ranges.append((low, high))
+        self.is_empty = any(low > high for low, high in ranges)
+        if self.is_empty:
+            return
+        low_logs, high_logs = chain.ranges(lower, upper)
+        smallest_factors, largest_factors = np.exp(low_logs), np.exp(high_logs)
+        for cut, (low, high) in zip(modes, ranges, strict=True):
+            self._add_frequency(cut, smallest_factors, largest_factors)
+            if cut.shape:
+                self._add_shape(cut, low, high, known)
+
+    def _add_shape(
+        self,
+        cut: ModeCut,
+        low: float,
+        high: float,
+        known: Mapping[tuple[int, int], tuple[float, float]],
+    ) -> None:
+        """Add the variables and the equations of motion of a mode with a measured shape.
+
+        Nothing is added if an amplitude that was not measured is not bounded.
+
+        Args:
+            cut: Ranges of the mode.
+            low: Smallest eigenvalue λ, in 1/s².
+            high: Largest eigenvalue.
+            known: Known ranges of amplitudes that were not measured, by mode and floor.
+        """
+        ends = self._amplitude_ranges(high, cut)
+        if ends is None:
+            return
+        shape: dict[int, Array] = {}
+        for floor in sorted(ends):
+            shape[floor] = self.variable(*known.get((cut.mode, floor), ends[floor]))
+            if floor not in cut.shape:
+                self.unmeasured[cut.mode, floor] = shape[floor]
+        relative_eigenvalue = self.variable(low / high, 1.0)
+        self._add_balance(shape, relative_eigenvalue, high)
+
+    def _add_balance(
         self, shape: Mapping[int, Array], relative_eigenvalue: Array, eigenvalue: float
     ) -> None:
-        """Add the balance at floors, T_z − T_(z+1) = λ m_z r_z, with λ over its greatest value."""
+        """Add T_z - T_(z+1) = λ m_z r_z at each floor z.
+
+        Args:
+            shape: Amplitude of each floor as an expression, by its number from 1.
+            relative_eigenvalue: λ over its largest value, as an expression.
+            eigenvalue: Largest value of λ, in 1/s².
+        """
         chain, n = self.chain, len(self.mass)
-        unit = float(chain.stiffness.mean())  # of all forces
-        shears, below = [], 0.0 * self.one  # the ground's amplitude
+        unit = float(chain.stiffness.mean())  # scale of the forces
+        nothing = 0.0 * self.one
+        shears = []
+        below = nothing  # amplitude of the ground
         for z in range(n):
             shear = self.product(self.stiffness[z], shape[z + 1] - below)
             shears.append(shear * (chain.stiffness[z] / unit))
             below = shape[z + 1]
-        for z, above in enumerate([*shears[1:], 0.0 * self.one]):
+        shears.append(nothing)  # above the uppermost floor
+        for z in range(n):
             inertia = self.product(relative_eigenvalue, self.product(self.mass[z], shape[z + 1]))
-            imbalance = shears[z] - above - inertia * (eigenvalue * chain.mass[z] / unit)
+            force = inertia * (eigenvalue * chain.mass[z] / unit)
+            imbalance = shears[z] - shears[z + 1] - force
             self.rows.append(imbalance)
             self.rows.append(-imbalance)
 
-    def amplitude_ranges(
+    def _amplitude_ranges(
         self, eigenvalue: float, cut: ModeCut
     ) -> dict[int, tuple[float, float]] | None:
-        """Range of the amplitude of each floor for λ ≤ `eigenvalue`; None if one is not bounded."""
-        # Floors between two measured ones are a chain between moving supports. While λ is below its
-        # least eigenvalue, K − λ M is positive definite and bounds its amplitudes by the supports'.
-        n, amplitudes = len(self.mass), dict(cut.shape)
-        k = np.array([self.range(x) for x in self.stiffness]) * self.chain.stiffness[:, None]
-        m = np.array([self.range(x) for x in self.mass]) * self.chain.mass[:, None]
-        supports = [0, *sorted(cut.shape)]
-        ends = {0: 0.0} | {floor: float(np.abs(cut.shape[floor]).max()) for floor in cut.shape}
+        """Return the range of the amplitude of each floor, or None if one is not bounded.
+
+        The floors between two measured ones are a chain between moving supports. While λ is below
+        the smallest eigenvalue of this chain, K - λ M is positive definite, and the amplitudes are
+        at most the norm of the forces of the supports over the smallest eigenvalue of K - λ M.
+
+        Args:
+            eigenvalue: Largest eigenvalue λ of the mode, in 1/s².
+            cut: Ranges of the mode with the amplitudes of the measured floors.
+        """
+        n = len(self.mass)
+        amplitudes = dict(cut.shape)
+        k = np.array([self.range(x) for x in self.stiffness]) * self.chain.stiffness[:, np.newaxis]
+        m = np.array([self.range(x) for x in self.mass]) * self.chain.mass[:, np.newaxis]
+        supports = [0, *sorted(cut.shape)]  # 0 is the ground
+        support_amplitudes = {0: 0.0}
+        for floor, ends in cut.shape.items():
+            support_amplitudes[floor] = float(np.abs(ends).max())
         for support, following in zip(supports, [*supports[1:], n + 1], strict=True):
-            floors = np.arange(support, min(following, n + 1) - 1)  # from 0
+            floors = np.arange(support, min(following, n + 1) - 1)  # indices from 0
             if not len(floors):
                 continue
-            # lower bound of K − λ M: least springs, that above included, and greatest masses
+            # A lower bound of K - λ M has the smallest springs, including the one above the chain,
+            # and the largest masses. Above the uppermost floor there is no spring.
             springs = np.append(k[:, 0], 0.0)[np.append(floors, floors[-1] + 1)]
-            A = chain_matrix(springs[:-1]) - eigenvalue * np.diag(m[floors, 1])
-            A[-1, -1] += springs[-1]
-            least = float(np.linalg.eigvalsh(A)[0]) * (1 - 1e-12)
-            if least <= 0:
+            difference = chain_matrix(springs[:-1]) - eigenvalue * np.diag(m[floors, 1])
+            difference[-1, -1] += springs[-1]
+            smallest = float(np.linalg.eigvalsh(difference)[0]) * (1 - 1e-12)
+            if smallest <= 0:
                 return None
-            force_above = k[following - 1, 1] * ends[following] if following <= n else 0.0
-            forces = k[support, 1] * ends[support], force_above  # of both moving supports
-            largest = float(sum(forces) if len(floors) == 1 else np.hypot(*forces)) / least
+            force_below = k[support, 1] * support_amplitudes[support]
+            force_above = 0.0
+            if following <= n:
+                force_above = k[following - 1, 1] * support_amplitudes[following]
+            # Both forces act on the same floor if the chain has only one.
+            force = force_below + force_above
+            if len(floors) > 1:
+                force = float(np.hypot(force_below, force_above))
+            largest = float(force) / smallest
             amplitudes |= {int(floor) + 1: (-largest, largest) for floor in floors}
         return amplitudes
 
-    def add_frequency(self, cut: ModeCut) -> None:
-        """Add two inequalities, necessary for an eigenvalue to lie within a measured cut."""
-        # low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in the factors of stiffnesses and masses, x the mode
-        # shape at the middle of the box. e₁ and e₂ bound the distance of quotient and eigenvalue by
-        # the residual (Kato and Temple), where no neighbouring eigenvalue reaches the quotient.
-        chain, low, high, k = self.chain, self.low, self.high, cut.mode - 1
-        below = self.highest[k - 1] if k else -np.inf
-        above = self.lowest[k + 1] if k + 1 < len(self.lowest) else np.inf
-        centre, half = (low + high) / 2, (high - low) / 2
-        values, vectors = chain_modes(chain.stiffness * centre[0], chain.mass * centre[1])
+    def _add_frequency(self, cut: ModeCut, low: Array, high: Array) -> None:
+        """Add two inequalities that hold if an eigenvalue lies within a measured range.
+
+        Let x be a fixed vector, here the mode shape at the midpoint of the box. Its Rayleigh
+        quotient q = xᵀK x / xᵀM x is a quotient of linear functions of stiffnesses and masses. If
+        λ_(k-1) < q < λ_(k+1), the theorem of Kato and Temple bounds its distance from λ_k:
+
+            λ_k - ε² / (q - λ_(k-1)) ≤ q ≤ λ_k + ε² / (λ_(k+1) - q),
+
+        where ε² is (K x - q M x)ᵀ M⁻¹ (K x - q M x) / xᵀM x. Any number in the place of q makes it
+        larger. The inequalities added are q ≥ low - e₁ and q ≤ high + e₂ for the measured range
+        [low, high] of λ_k, with bounds e₁ and e₂ of both fractions over the box.
+
+        Args:
+            cut: Range of the mode's eigenvalue.
+            low: Smallest factors of stiffnesses and masses, shape (2, floors).
+            high: Largest factors.
+        """
+        chain, k = self.chain, cut.mode - 1
+        below = self.eigenvalue_upper[k - 1] if k else -np.inf
+        above = self.eigenvalue_lower[k + 1] if k + 1 < len(self.eigenvalue_lower) else np.inf
+        midpoint, radius = (low + high) / 2, (high - low) / 2
+        values, vectors = chain_modes(chain.stiffness * midpoint[0], chain.mass * midpoint[1])
         shape, value = vectors[:, k], values[k]
         drift = np.diff(shape, prepend=0.0)
+        # xᵀK x and xᵀM x are linear functions of the factors with these coefficients.
         strain, inertia = chain.stiffness * drift**2, chain.mass * shape**2
-        least_quotient = float(strain @ low[0] / (inertia @ high[1]))
-        greatest_quotient = float(strain @ high[0] / (inertia @ low[1]))
-        is_above_last = below < min(self.lowest[k], least_quotient)
-        if not (is_above_last and max(self.highest[k], greatest_quotient) < above):
+        smallest_quotient = float(strain @ low[0] / (inertia @ high[1]))
+        largest_quotient = float(strain @ high[0] / (inertia @ low[1]))
+        is_above_last = below < min(self.eigenvalue_lower[k], smallest_quotient)
+        is_below_next = max(self.eigenvalue_upper[k], largest_quotient) < above
+        if not (is_above_last and is_below_next):
             return
-        shears, force = half[0] * np.abs(chain.stiffness * drift), np.abs(chain.mass * shape)
-        # of K x − λ M x over the box
-        residual = shears + np.append(shears[1:], 0.0) + value * half[1] * force
-        # rounding
+
+        # Bound of |K x - μ M x| over the box at each floor, with the eigenvalue μ of the midpoint,
+        # and rounding.
+        shears = radius[0] * np.abs(chain.stiffness * drift)
+        force = np.abs(chain.mass * shape)
+        residual = shears + np.append(shears[1:], 0.0) + value * radius[1] * force
         residual += 1e-12 * value * force + 1e-13 * np.abs(chain.stiffness).max()
         squared_residual = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
-        error_below = squared_residual / (least_quotient - below) if k else 0.0
-        error_above = squared_residual / (above - greatest_quotient)
+        error_below = squared_residual / (smallest_quotient - below) if k else 0.0
+        error_above = squared_residual / (above - largest_quotient)
+
         unit = float(inertia.sum() * value)
         strains, inertias = strain @ np.array(self.stiffness), inertia @ np.array(self.mass)
         for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):

@@ -1,10 +1,10 @@
 """Parameters of a storey frame from its measured natural modes.
 
-At each level the cuts of all priors and of all measured quantities leave a set of parameters. Where
-the claims among them hold together with P >= 1 − α, the set holds the true parameters with that
-probability, if the opinions and the model are right. A box encloses the set, proved by linear
-relaxations (`enclosure`). Predictions (`Identified.predictions`) are the natural frequencies of its
-frames.
+On each level, the cuts of all priors and of all measured quantities leave a set of parameters. If
+the claims among them hold together with a probability of 1 - α or more, the set contains the true
+parameters with this probability, provided that the opinions and the model are right. A box that
+encloses the set is proved by linear relaxations (`enclosure`). The predictions are the natural
+frequencies of the frames in the box.
 """
 
 from __future__ import annotations
@@ -30,13 +30,9 @@ from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
-LEARNED = "the learned set"
-"""Name of the set of parameters that agree with the modes, which the boxes enclose."""
-ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
-
 
 class RefutedError(FailedError):
-    """The inputs of a refuted frame were asked for: it has none that agree with its modes."""
+    """The inputs of a refuted frame were asked for; no parameters agree with its modes."""
 
 
 def identify(
@@ -45,23 +41,24 @@ def identify(
     modes: Sequence[MeasuredMode],
     *,
     held_out: Sequence[int] = (),
-    alpha: Sequence[float] = ALPHA,
+    alpha: Sequence[float] = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0),
 ) -> Identified:
     """Return boxes of a frame's parameters that agree with its measured natural modes.
 
-    A frame that no parameters fit is refuted; this is a result, see `Identified.refutation`.
+    If no parameters agree with the modes, the frame is refuted. This is a result, see
+    `Identified.refutation`.
 
     Args:
-        frame: The frame; damping, initial motion and outputs do not matter.
-        inputs: Fuzzy numbers of parameters of stiffness and mass, in SI units, as they are known
-            before the measurement.
-        modes: The measured modes, by rising number; see `read_modes` and `measured_mode`.
-        held_out: Numbers of modes that are predicted, and not learned from.
+        frame: The frame; damping, initial state and outputs do not matter.
+        inputs: Parameters of stiffness and mass as they are known before the measurement, as fuzzy
+            numbers by name, in SI units.
+        modes: The measured modes by rising number; see `read_modes` and `measured_mode`.
+        held_out: Numbers of modes that are predicted instead of learned from.
         alpha: Levels, rising within (0, 1].
 
     Raises:
-        RefusedError: An input is no parameter of the modes; a mode, floor or level is not as said;
-            no mode is left to learn from, or one has values without scatter.
+        RefusedError: An input is no parameter of the modes; a mode, floor or level is out of range;
+            no mode is left to learn from, or a mode has values without scatter.
 
     Example:
         >>> from alphacut.frame import measured_mode
@@ -73,45 +70,50 @@ def identify(
         (False, True)
     """
     evidence = Evidence.of(frame, inputs, modes, held_out=held_out, alpha=alpha)
-    numbers, nominal = evidence.prior, evidence.chain.nominal
-    levels, empty = np.asarray(alpha, float), 1.0
-    boxes: list[tuple[Array, Array]] = []  # logarithms of parameters over nominal values
-    for level in map(float, levels):
-        cuts = [evidence.cut(x, level) for x in numbers.values()]
-        low, high = np.log(np.array(cuts).T / nominal)
-        if boxes:  # sets are nested
-            low, high = np.maximum(low, boxes[-1][0]), np.minimum(high, boxes[-1][1])
-        is_empty = (low > high).any()
-        box = None if is_empty else enclosure(evidence.chain, low, high, evidence.modes(level))
+    priors, nominal = evidence.prior.values(), evidence.chain.nominal
+    levels = np.asarray(alpha, float)
+    lower = np.full((len(levels), len(priors)), np.inf)
+    upper = -lower
+    empty = 1.0
+    # The corners of the last box, as logarithms of parameters over their nominal values.
+    low, high = np.full((2, len(priors)), [[-np.inf], [np.inf]])
+    for k, level in enumerate(map(float, levels)):
+        # The sets are nested, so that the box of each level lies inside that of the last one.
+        prior_cuts = np.array([evidence.cut(number, level) for number in priors])
+        prior_low, prior_high = np.log(prior_cuts.T / nominal)
+        low, high = np.maximum(prior_low, low), np.minimum(prior_high, high)
+        box = None
+        if (low <= high).all():
+            box = enclosure(evidence.chain, low, high, evidence.modes(level))
         if box is None:
             empty = level
             break
-        boxes.append(box)
-    if not boxes:
-        nothing = np.full((len(levels), len(numbers)), np.inf)
-        return Identified(evidence, levels, nothing, -nothing, empty)
-    boxes += [boxes[-1]] * (len(levels) - len(boxes))
-    lower, upper = (nominal * np.exp(np.stack(side)) for side in zip(*boxes, strict=True))
-    least, greatest = np.array([widest_cut(x) for x in numbers.values()]).T
-    # rounding of exp, outwards and within the priors
-    lower, upper = np.maximum(lower * (1 - 4e-16), least), np.minimum(upper * (1 + 4e-16), greatest)
+        low, high = box
+        # This level, and all higher ones unless they are computed.
+        lower[k:], upper[k:] = nominal * np.exp(low), nominal * np.exp(high)
+
+    # Rounding of the exponential function, outwards and within the priors.
+    if np.isfinite(lower).all():
+        prior_lower, prior_upper = np.array([widest_cut(number) for number in priors]).T
+        lower = np.maximum(lower * (1 - 4e-16), prior_lower)
+        upper = np.minimum(upper * (1 + 4e-16), prior_upper)
     return Identified(evidence, levels, lower, upper, empty)
 
 
 def widest_cut(number: FuzzyNumber) -> Cut:
-    """Return the widest cut that a number decides."""
+    """Return the support of a number, or the widest cut that a claim determines."""
     return number.cut(number.decided) if isinstance(number, ClaimedNumber) else number.support
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Opinions and claims on a frame's parameters and on its modes.
+    """Opinions and claims on the parameters of a frame and on its modes.
 
     Args:
         chain: The frame.
-        prior: Its parameters before the measurement, in SI.
+        prior: Its parameters before the measurement, in SI units.
         measured: The modes that are learned from, by rising number.
-        held_out: The modes that are not, by rising number.
+        held_out: The modes that are predicted, by rising number.
     """
 
     chain: Chain
@@ -129,55 +131,65 @@ class Evidence:
         held_out: Sequence[int],
         alpha: Sequence[float],
     ) -> Self:
-        """Return what `identify` learns from; refuse what it refuses."""
+        """Check the arguments of `identify` and return the evidence that it learns from.
+
+        Raises:
+            RefusedError: As `identify`.
+        """
         is_frame = isinstance(frame, StructureModel) and frame.floors > 0
         require(is_frame, "frame", value=type(frame).__name__, allowed="a StoreyFrame")
         levels = np.append(0.0, alpha)
-        in_range = len(levels) > 1 and levels[-1] <= 1 and bool((np.diff(levels) > 0).all())
-        require(in_range, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
-        mode_numbers = [mode.mode for mode in modes]
-        are_rising = bool(modes) and sorted(set(mode_numbers)) == mode_numbers
-        require(are_rising, "identify.modes", value=mode_numbers, allowed="one or more, rising")
-        is_part = set(held_out) < set(mode_numbers)
-        shown, allowed = ", ".join(map(str, held_out)), f"some of modes {mode_numbers}, not all"
+        are_rising = bool((np.diff(levels) > 0).all()) and len(alpha) > 0 and levels[-1] <= 1
+        require(are_rising, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
+        numbers = [mode.mode for mode in modes]
+        are_rising = bool(modes) and sorted(set(numbers)) == numbers
+        require(are_rising, "identify.modes", value=numbers, allowed="one or more, rising")
+        is_part = set(held_out) < set(numbers)
+        shown, allowed = ", ".join(map(str, held_out)), f"some of modes {numbers}, not all"
         require(is_part, "identify.held_out", value=shown, allowed=allowed)
-        learned = tuple(mode for mode in modes if mode.mode not in held_out)
-        largest = max(x for mode in learned for x in (mode.mode, mode.reference, *mode.shape))
-        allowed = f"modes and floors from 1 to {frame.floors}"
-        require(largest <= frame.floors, "identify.modes", value=largest, allowed=allowed)
-        for mode in learned:
+
+        measured = tuple(mode for mode in modes if mode.mode not in held_out)
+        for mode in measured:
+            largest = max(mode.mode, mode.reference, *mode.shape)
+            allowed = f"modes and floors from 1 to {frame.floors}"
+            require(largest <= frame.floors, "identify.modes", value=largest, allowed=allowed)
             mode.require_scatter()
-        prior = {
-            name: number if isinstance(number, FuzzyNumber) else Crisp(float(number))
-            for name, number in inputs.items()
-        }
+        prior = {}
+        for name, number in inputs.items():
+            prior[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
         chain = Chain(frame, tuple(prior))
         smallest = min(widest_cut(number).lower for number in prior.values())
         require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
-        rest = tuple(mode for mode in modes if mode.mode in held_out)
-        return cls(chain, prior, learned, rest)
+        return cls(chain, prior, measured, tuple(x for x in modes if x.mode in held_out))
 
     @cached_property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """Parameters first, then the measured quantities."""
-        measured = {name: x for mode in self.measured for name, x in mode.quantities.items()}
-        return {**self.prior, **measured}
+        """Parameters and then measured quantities by name."""
+        numbers = dict(self.prior)
+        for mode in self.measured:
+            numbers |= mode.quantities
+        return numbers
 
     @cached_property
     def joint(self) -> JointRule | None:
-        """Rule by which the claims hold together; None where there is none."""
+        """Rule by which the claims hold together; None if there is no claim."""
         names = tuple(name for name, x in self.numbers.items() if isinstance(x, ClaimedNumber))
         means = "parameter of the measured frame"
         return JointRule(names, independent=False, means=means, named=True) if names else None
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
-        """Return the α-cut of a number, of a claim at the level where all claims hold jointly."""
-        n_claims = len(self.joint.names) if self.joint else 1
-        return number.cut(alpha / n_claims if isinstance(number, ClaimedNumber) else alpha)
+        """Return the α-cut of a number.
+
+        n claims hold together with a probability of 1 - α or more if each holds with a probability
+        of 1 - α/n (Bonferroni). A claim is therefore cut at α/n.
+        """
+        if self.joint is not None and isinstance(number, ClaimedNumber):
+            return number.cut(alpha / len(self.joint.names))
+        return number.cut(alpha)
 
     def modes(self, alpha: float) -> list[ModeCut]:
-        """Return ranges of the measured modes at the joint level α."""
-        return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
+        """Return the ranges of the modes that are learned from on a level."""
+        return [mode.ranges(lambda number: self.cut(number, alpha)) for mode in self.measured]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,11 +198,12 @@ class Identified:
 
     Args:
         evidence: Priors and measured modes.
-        alpha: Levels, shape (A,), rising.
-        lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. From `empty`
-            on they repeat the last one that is not proved empty; of a refuted frame they are +∞.
-        upper: Upper ends; of a refuted frame −∞.
-        empty: Least level whose set is proved empty; 1 if none is.
+        alpha: Levels, rising, shape (levels,).
+        lower: Lower ends of the boxes that contain the sets, shape (levels, parameters), in SI
+            units. From the level `empty` on they repeat the last box. For a refuted frame they are
+            +∞.
+        upper: Upper ends, same shape; for a refuted frame -∞.
+        empty: Lowest level whose set is proved to be empty; 1 if none is.
     """
 
     evidence: Evidence
@@ -201,17 +214,17 @@ class Identified:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters."""
+        """Names of the parameters."""
         return self.evidence.chain.names
 
     @property
     def is_refuted(self) -> bool:
-        """Whether no parameters in their priors agree with the modes at the lowest level."""
+        """Whether no parameters in their priors agree with the modes on the lowest level."""
         return bool(self.empty <= self.alpha[0])
 
     @property
     def refutation(self) -> str:
-        """What the measurement says of a refuted frame; empty of others."""
+        """What the measurement says about a refuted frame; empty for others."""
         if not self.is_refuted:
             return ""
         level = f"{self.alpha[0]:g}"
@@ -225,34 +238,37 @@ class Identified:
     def claim(self) -> JointClaim:
         """Coverage of the boxes: the claims, and the conditions under which they hold."""
         joint = JointClaim.from_inputs(self.evidence.numbers)
-        model = ("the structure is such a storey frame",)
-        return JointClaim(self.evidence.joint, (*joint.conditions, *model), joint.opinions)
+        conditions = (*joint.conditions, "the structure is such a storey frame")
+        return JointClaim(self.evidence.joint, conditions, joint.opinions)
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
-        """Identified parameters as fuzzy numbers, by name, for an envelope.
+        """Identified parameters by name, as fuzzy numbers for an envelope.
 
-        Their cuts are the sides of the boxes, which hold structures that do not agree with the
-        modes: results are those of the box around the learned set, and say so. Below the lowest
-        level they are the prior's support.
-        Where priors or measurements are claims, so are the numbers, with one joint confidence.
+        Their cuts are the sides of the boxes. The boxes also contain structures that do not agree
+        with the modes, so that results are those of the box around the learned set, and say so.
+        Below the lowest level the cuts are the supports of the priors. Where priors or measurements
+        are claims, so are the numbers, with one joint confidence.
 
         Raises:
             RefutedError: The frame is refuted.
         """
         if self.is_refuted:
             raise RefutedError(self.refutation)
-        rule, priors = self.evidence.joint, self.evidence.prior
         numbers: dict[str, FuzzyNumber] = {}
         for column, name in enumerate(self.names):
-            ends = np.stack([self.lower[:, column], self.upper[:, column]])
+            prior = self.evidence.prior[name]
             alpha, decided = self.alpha, float(self.alpha[0])
-            if not isinstance(priors[name], ClaimedNumber):
+            lower, upper = self.lower[:, column], self.upper[:, column]
+            if not isinstance(prior, ClaimedNumber):
                 alpha, decided = np.append(0.0, alpha), 0.0
-                ends = np.column_stack([priors[name].support, ends])
-            numbers[name] = steps = outer_steps(
-                tuple(alpha), tuple(ends[0]), tuple(ends[1]), encloses=LEARNED
+                lower = np.append(prior.support.lower, lower)
+                upper = np.append(prior.support.upper, upper)
+            steps = outer_steps(
+                tuple(alpha), tuple(lower), tuple(upper), encloses="the learned set"
             )
+            numbers[name] = steps
+            rule = self.evidence.joint
             if rule is not None:
                 claim = CoverageClaim(rule.means, self.claim.conditions)
                 numbers[name] = ClaimedNumber(steps, claim, decided, joint=rule)
@@ -260,48 +276,57 @@ class Identified:
 
     @property
     def narrowed(self) -> dict[str, float]:
-        """Width of each parameter's box at the lowest level over that of its prior there."""
+        """Width of the box of each parameter over the width of its prior, on the lowest level."""
         level = float(self.alpha[0])
-        cuts = [self.evidence.cut(number, level) for number in self.evidence.prior.values()]
-        fractions = (self.upper - self.lower)[0] / np.array([cut.width for cut in cuts])
+        widths = [self.evidence.cut(x, level).width for x in self.evidence.prior.values()]
+        fractions = (self.upper[0] - self.lower[0]) / np.array(widths)
         return dict(zip(self.names, fractions.tolist(), strict=True))
 
     def predictions(self) -> Predictions:
-        """Return proved bounds of all n natural frequencies on each level.
+        """Return proved bounds of all natural frequencies on each level.
 
-        Of a refuted frame there are none: lower bounds are +∞ and upper ones −∞.
+        For a refuted frame there are none: lower bounds are +∞ and upper bounds are -∞.
         """
         chain = self.evidence.chain
-        measured = [*self.evidence.measured, *self.evidence.held_out]
-        means = {mode.mode: mode.frequency.nominal for mode in measured}
-        ends = np.full((2, len(self.alpha), len(chain.mass)), np.inf)
-        ends[1] = -np.inf
+        lower = np.full((len(self.alpha), len(chain.mass)), np.inf)
+        upper = -lower
         if not self.is_refuted:
-            boxes = np.log(np.stack([self.lower, self.upper], axis=1) / chain.nominal)  # (A, 2, d)
-            eigenvalues = np.array([eigenvalue_ranges(chain, *box) for box in boxes])  # (A, 2, n)
-            ends = np.sqrt(np.maximum(eigenvalues, 0.0)).swapaxes(0, 1) / (2 * np.pi)
-        learned_from = tuple(mode.mode for mode in self.evidence.measured)
-        return Predictions(self.alpha, ends[0], ends[1], measured=means, learned_from=learned_from)
+            for k in range(len(self.alpha)):
+                low, high = (
+                    np.log(self.lower[k] / chain.nominal),
+                    np.log(self.upper[k] / chain.nominal),
+                )
+                eigenvalues = np.maximum(eigenvalue_ranges(chain, low, high), 0.0)
+                lower[k], upper[k] = np.sqrt(eigenvalues) / (2 * np.pi)
+        modes = (*self.evidence.measured, *self.evidence.held_out)
+        return Predictions(
+            self.alpha,
+            lower,
+            upper,
+            measured={mode.mode: mode.frequency.nominal for mode in modes},
+            learned_from=tuple(mode.mode for mode in self.evidence.measured),
+        )
 
     @cached_property
     def answer(self) -> LearnedInputs:
         """What was learned, as data for tables and files."""
         if self.is_refuted:
             return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
-        cuts = {name: widest_cut(number) for name, number in self.evidence.prior.items()}
+        inputs, prior = {}, {}
+        for column, name in enumerate(self.names):
+            inputs[name] = Ends(self.lower[:, column], self.upper[:, column])
+            before = widest_cut(self.evidence.prior[name])
+            prior[name] = (before.lower, before.upper)
         return LearnedInputs(
             alpha=self.alpha,
-            inputs={
-                name: Ends(self.lower[:, column], self.upper[:, column])
-                for column, name in enumerate(self.names)
-            },
+            inputs=inputs,
             narrowed=self.narrowed,
             units={name: of_storey_frame(name).unit for name in self.names},
             claim=str(self.claim),
             held_out=self.predictions().held_out,
-            prior={name: (cut.lower, cut.upper) for name, cut in cuts.items()},
+            prior=prior,
         )
 
     def __str__(self) -> str:
-        """Return the words of `answer`: each parameter before and after, and the held-out modes."""
+        """Return `answer` as text: each parameter before and after, and the modes held out."""
         return str(self.answer)

@@ -1,25 +1,29 @@
-"""What measured modes teach about the parameters of a frame: the answer, as data and as a table."""
+"""What measured modes teach about the parameters of a frame: the result as data and as a table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from textwrap import fill
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.nature import Nature
-from alphacut.base.number_text import Table, engineering, rounded_ends, text_table
+from alphacut.base.number_text import Table, engineering, rounded_ends
+from alphacut.frame.analyses.answer import Answer, Record
 from alphacut.fuzzy.result import Ends
-
-Record = dict[str, str | float | None]
-"""Numbers and texts of a row, in SI, by the titles of their columns."""
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Measured frequency of a held-out mode, and its proved range at the lowest α, in Hz."""
+    """Prediction of a mode that was not learned from.
+
+    Args:
+        mode: Number of the mode, from 1.
+        measured: Mean measured frequency, in Hz.
+        predicted: Proved range of the frequency on the lowest level, in Hz.
+        inside: Whether the measured frequency lies in the range.
+    """
 
     mode: int
     measured: float
@@ -28,18 +32,18 @@ class Prediction:
 
     @property
     def verdict(self) -> str:
-        """Whether the measured frequency lies inside, in a word."""
+        """The word "inside" or "outside"."""
         return "inside" if self.inside else "outside"
 
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """Proved bounds of all n natural frequencies of a frame, beside those that were measured.
+    """Proved bounds of all natural frequencies of a frame, beside the measured ones.
 
     Args:
-        alpha: Levels, shape (A,), rising.
-        lower: Lower bounds, in Hz, shape (A, n).
-        upper: Upper bounds.
+        alpha: Levels, rising, shape (levels,).
+        lower: Lower bounds of the frequencies, in Hz, shape (levels, modes).
+        upper: Upper bounds, same shape.
         measured: Mean measured frequency by the number of its mode, from 1, in Hz.
         learned_from: Numbers of the modes from which the frame was learned.
     """
@@ -52,18 +56,18 @@ class Predictions:
 
     @property
     def held_out(self) -> tuple[Prediction, ...]:
-        """The measured modes that were not learned from, at the lowest level."""
+        """The measured modes that were not learned from, as far as the frame has them."""
         predictions = []
         for mode in sorted(self.measured.keys() - set(self.learned_from)):
-            if mode > self.lower.shape[1]:
-                continue  # a frame of n floors has n modes
-            low, high = float(self.lower[0, mode - 1]), float(self.upper[0, mode - 1])
-            measured = self.measured[mode]
-            predictions.append(Prediction(mode, measured, (low, high), low <= measured <= high))
+            if mode <= self.lower.shape[1]:
+                low, high = float(self.lower[0, mode - 1]), float(self.upper[0, mode - 1])
+                measured = self.measured[mode]
+                is_inside = low <= measured <= high
+                predictions.append(Prediction(mode, measured, (low, high), is_inside))
         return tuple(predictions)
 
     def __str__(self) -> str:
-        """Return a line for each mode at the lowest level."""
+        """Return a line for each mode on the lowest level."""
         if not np.isfinite(self.lower).all():
             return "no frequency is predicted: the frame is refuted"
         verdicts = {mode.mode: f", {mode.verdict}: held out" for mode in self.held_out}
@@ -78,21 +82,25 @@ class Predictions:
     __repr__ = __str__
 
 
-@dataclass(frozen=True, eq=False)
-class LearnedInputs:
-    """Parameters of a frame that agree with its measured modes; or that none do.
+@dataclass(frozen=True, eq=False, repr=False)
+class LearnedInputs(Answer):
+    """Parameters of a frame that agree with its measured modes, or that none do.
 
     Args:
-        alpha: Levels, shape (A,), rising.
-        inputs: Ends of each parameter's box, in SI, shape (A,) each; none of a refuted frame.
-        narrowed: Width of each parameter's box over that of its prior, at the lowest α.
+        alpha: Levels, rising, shape (levels,).
+        inputs: Ends of the box of each parameter, in SI units, shape (levels,) each; empty for a
+            refuted frame.
+        narrowed: Width of the box of each parameter over the width of its prior, on the lowest
+            level.
         units: SI unit of each parameter.
-        claim: What the boxes contain how often, and under which conditions.
+        claim: What the boxes contain with which probability, and under which conditions.
         held_out: Modes that were not learned from, measured and predicted.
-        prior: Widest decided cut of each parameter before, in SI.
-        refuted: Why no such frame has the measured modes; empty if some have.
+        prior: Widest cut of each parameter before the measurement, in SI units.
+        refuted: Why no such frame has the measured modes; empty if some frames have.
     """
 
+    key = "update"
+    title = "What do measured modes teach?"
     alpha: Array
     inputs: Mapping[str, Ends]
     narrowed: Mapping[str, float]
@@ -108,28 +116,34 @@ class LearnedInputs:
         return bool(self.refuted)
 
     def table(self) -> Table:
-        """Return texts of each parameter before and after, then of each mode that was held out."""
+        """Return a row for each parameter, before and after, and for each mode held out."""
         rows: list[tuple[str, ...]] = []
-        for name, ends in self.inputs.items():
-            unit, after = self.units[name], (float(ends.lower[0]), float(ends.upper[0]))
-            texts = outer_text(self.prior[name], unit), outer_text(after, unit)
-            rows.append((name, *texts, f"{self.narrowed[name]:.0%} of the width"))
+        for name in self.inputs:
+            before = outer_text(self.prior[name], self.units[name])
+            after = outer_text(self._learned(name), self.units[name])
+            rows.append((name, before, after, f"{self.narrowed[name]:.0%} of the width"))
         for mode in self.held_out:
             predicted = outer_text(mode.predicted, "Hz")
             rows.append((f"mode {mode.mode}", f"{mode.measured:.4g} Hz", predicted, mode.verdict))
         return Table(("input or mode", "before, measured", "learned, predicted", ""), rows)
 
+    def _learned(self, name: str) -> tuple[float, float]:
+        """Return the ends of the box of a parameter on the lowest level."""
+        ends = self.inputs[name]
+        return float(ends.lower[0]), float(ends.upper[0])
+
     def records(self) -> list[Record]:
-        """Return the numbers of the table, in SI: parameters at the lowest α, then modes."""
+        """Return the numbers of the table, in SI units."""
         rows: list[Record] = []
-        for name, ends in self.inputs.items():
-            before, after = self.prior[name], (float(ends.lower[0]), float(ends.upper[0]))
-            rows.append(_record(name, self.units[name], before=before, after=after))
-            rows[-1]["narrowed by"] = self.narrowed[name]
+        for name in self.inputs:
+            row = _record(
+                name, self.units[name], before=self.prior[name], after=self._learned(name)
+            )
+            rows.append(row | {"narrowed by": self.narrowed[name]})
         for mode in self.held_out:
-            measured = mode.measured, mode.measured
-            rows.append(_record(f"mode {mode.mode}", "Hz", before=measured, after=mode.predicted))
-            rows[-1]["inside"] = mode.verdict
+            measured = (mode.measured, mode.measured)
+            row = _record(f"mode {mode.mode}", "Hz", before=measured, after=mode.predicted)
+            rows.append(row | {"inside": mode.verdict})
         return rows
 
     def words(self) -> str:
@@ -137,8 +151,8 @@ class LearnedInputs:
         return self.refuted or f"Guaranteed boxes at α = {self.alpha[0]:g}: {self.claim}"
 
     def __str__(self) -> str:
-        """Return the table, then the sentences; of a refuted frame these alone."""
-        return self.refuted or f"{text_table(*self.table())}{fill(self.words(), 100)}"
+        """Return the table and the sentences; for a refuted frame the reason alone."""
+        return self.refuted or super().__str__()
 
     __repr__ = __str__
 
@@ -146,7 +160,7 @@ class LearnedInputs:
 def _record(
     name: str, unit: str, *, before: tuple[float, float], after: tuple[float, float]
 ) -> Record:
-    """Row of numbers of a parameter or a mode, without how far it is narrowed or inside."""
+    """Return a row of numbers; its last columns, on narrowing and predictions, are empty."""
     return {
         "input or mode": name,
         "unit": unit,
@@ -160,6 +174,6 @@ def _record(
 
 
 def outer_text(ends: tuple[float, float], unit: str) -> str:
-    """Return a range with its unit, rounded outwards; one number where its ends agree."""
-    texts = (engineering(end, unit) for end in rounded_ends(*ends, Nature.GUARANTEED))
+    """Return a range with its unit, rounded outwards, or one number if its ends agree."""
+    texts = [engineering(end, unit) for end in rounded_ends(*ends, Nature.GUARANTEED)]
     return " … ".join(dict.fromkeys(texts))

@@ -13,19 +13,20 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.stochastic.particles.csv_columns import fields, number
 
-HEAD = re.compile(r"\s*(mode|frequency(_std)?\s*(\[Hz\])?|shape_std|q[1-9]\d*)\s*")
-ALLOWED = (
-    "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
-    " shape_std may stand before q1"
-)
-
 
 @dataclass(frozen=True, eq=False)
 class ModeRows:
-    """All measurements of one mode: frequencies in Hz and amplitudes by floor, of shape (rows,).
+    """All measurements of one mode.
 
-    Standard deviations are over the mean frequency and over the mode's largest amplitude; None
-    where the file states none.
+    Args:
+        mode: Number of the mode, from 1.
+        frequencies: Frequencies, in Hz, shape (measurements,).
+        amplitudes: Amplitudes by floor, from 1, shape (measurements,) each; empty if no shape was
+            measured.
+        frequency_deviation: Standard deviation of a frequency over the mean frequency; None if the
+            file states none.
+        shape_deviation: Standard deviation of an amplitude over the largest amplitude of the mode;
+            None if the file states none.
     """
 
     mode: int
@@ -36,30 +37,40 @@ class ModeRows:
 
 
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
-    """Reads the measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
+    """Read the measurements of each mode, by rising number, from a CSV file.
 
-    An empty amplitude was not measured. Standard deviations may stand in columns of their own.
+    The header is ``mode,frequency [Hz],q1,q2`` with the floors that were measured. Standard
+    deviations may stand in the columns ``frequency_std [Hz]`` and ``shape_std``. An empty cell
+    means that the amplitude was not measured.
 
     Raises:
-        RefusedError: The file is missing, its header or a row is wrong, or a mode has some
-            amplitudes in one row and not in another.
+        RefusedError: The file is missing, its header or a row is wrong, or a mode has an amplitude
+            in some rows and not in others.
     """
-    (_, head), *rows = fields(path)
-    matches = [HEAD.fullmatch(cell) for cell in head]
-    names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
-    columns = {name: column for column, name in enumerate(names)}
-    is_known = "" not in columns and {"mode", "frequency"} <= columns.keys()
-    is_complete = is_known and len(columns) == len(head)
-    require(is_complete, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
+    (_, header), *rows = fields(path)
+    columns: dict[str, int] = {}
+    for column, cell in enumerate(header):
+        title = re.fullmatch(r"\s*(mode|shape_std|q[1-9]\d*|frequency(_std)?\s*(\[Hz\])?)\s*", cell)
+        name = title[1].partition("[")[0].strip() if title else ""
+        columns[name] = column
+    is_complete = {"mode", "frequency"} <= columns.keys() and len(columns) == len(header)
+    allowed = (
+        "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
+        " shape_std may stand before q1"
+    )
+    is_known = is_complete and "" not in columns
+    require(is_known, f"{path.name}, header", ",".join(header)[:80], allowed)
+
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
-        values = [
-            number(path, row, cells, column) if cells[column : column + 1] != [""] else np.nan
-            for column in range(len(head))
-        ]
-        mode, allowed = values[columns["mode"]], "a mode from 1, frequency and deviations above 0"
+        values = []
+        for column in range(len(header)):
+            is_empty = cells[column : column + 1] == [""]
+            values.append(np.nan if is_empty else number(path, row, cells, column))
+        mode = values[columns["mode"]]
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
+        allowed = "a mode from 1, frequency and deviations above 0"
         require(fits, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
         modes[int(mode)].append(values)
     return tuple(
@@ -70,24 +81,41 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
 def _measurements_of_mode(
     path: Path, mode: int, values: Array, columns: dict[str, int]
 ) -> ModeRows:
-    """The measurements of one mode from its rows, (rows, columns), NaN where none was made."""
-    floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
-    amplitudes = {floor: values[:, column] for floor, column in floors.items()}
-    missing = {floor: np.isnan(x) for floor, x in amplitudes.items()}
-    is_whole = all(gaps.all() or not gaps.any() for gaps in missing.values())
-    allowed = "an amplitude of a floor in every row of a mode, or in none"
-    require(is_whole, f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
-    shape = {floor: x for floor, x in amplitudes.items() if not missing[floor].all()}
-    shape = shape if len(shape) > 1 else {}
-    is_moved, allowed = not shape or any(map(np.any, shape.values())), "a shape that moves a floor"
+    """Return the measurements of one mode from its rows of the file.
+
+    Args:
+        path: The file, for messages.
+        mode: Number of the mode.
+        values: Numbers of the rows, shape (measurements, columns); NaN where a cell is empty.
+        columns: Index of each column by its title.
+
+    Raises:
+        RefusedError: An amplitude is missing in some rows and not in others, or all are zero.
+    """
+    shape = {}
+    for name, column in columns.items():
+        amplitudes = values[:, column]
+        is_missing = np.isnan(amplitudes)
+        if name.startswith("q") and not is_missing.all():
+            allowed = "an amplitude of a floor in every row of a mode, or in none"
+            key = f"{path.name}, mode {mode}"
+            require(not is_missing.any(), key, "an amplitude in some rows", allowed)
+            shape[int(name[1:])] = amplitudes
+    if len(shape) < 2:
+        shape = {}  # the amplitude of one floor alone says nothing
+    is_moved = not shape or any(map(np.any, shape.values()))
+    allowed = "a shape that moves a floor"
     require(is_moved, f"{path.name}, mode {mode}", "0 at every floor", allowed)
+
     frequencies = values[:, columns["frequency"]]
-    sizes = {"frequency_std": frequencies.mean()}
-    sizes |= {"shape_std": max(abs(x).mean() for x in shape.values())} if shape else {}
-    deviations = (  # root mean squares
-        float(np.sqrt((values[:, columns[name]] ** 2).mean()) / sizes[name])
-        if name in columns and name in sizes
-        else None
-        for name in ("frequency_std", "shape_std")
-    )
-    return ModeRows(mode, frequencies, shape, *deviations)
+    deviations = {}  # root mean squares
+    for name in ("frequency_std", "shape_std"):
+        if name in columns:
+            deviations[name] = float(np.sqrt((values[:, columns[name]] ** 2).mean()))
+    frequency_deviation = shape_deviation = None
+    if "frequency_std" in deviations:
+        frequency_deviation = deviations["frequency_std"] / float(frequencies.mean())
+    if "shape_std" in deviations and shape:
+        largest = max(abs(amplitudes).mean() for amplitudes in shape.values())
+        shape_deviation = deviations["shape_std"] / float(largest)
+    return ModeRows(mode, frequencies, shape, frequency_deviation, shape_deviation)

@@ -8,7 +8,7 @@ from pathlib import Path
 from alphacut.base.errors import checked_number, path_of, require
 from alphacut.frame.identify.mode_rows import mode_rows
 from alphacut.frame.identify.modes import MeasuredMode, measured_mode
-from alphacut.frame.identify.uff_modes import ENDINGS, uff_mode_rows
+from alphacut.frame.identify.uff_modes import uff_mode_rows
 
 
 def read_modes(
@@ -20,25 +20,26 @@ def read_modes(
 ) -> tuple[MeasuredMode, ...]:
     """Read the measured natural modes of a frame from a CSV file or a universal file.
 
-    A CSV file has the head ``mode,frequency [Hz],q1,q2`` with the floors that were measured, and a
-    row for each measurement of a mode. ``frequency_std [Hz]`` and ``shape_std``, the standard
+    A CSV file has the header ``mode,frequency [Hz],q1,q2`` with the floors that were measured, and
+    a row for each measurement of a mode. ``frequency_std [Hz]`` and ``shape_std``, the standard
     deviations of an operational modal analysis, may stand before ``q1``. A universal file (ending
     .uff or .unv) has the modes in data sets 55.
 
     Args:
         path: The file.
-        frequency_deviation: Standard deviation of a measured frequency over its mean, where the
-            file has none; the scatter of several rows of a mode where this is None too.
-        shape_deviation: Standard deviation of an amplitude over the largest of its mode, likewise.
-        floors: Of a universal file, the floor of each unknown that was measured, by NODE.DIRECTION,
-            as ``{"12.x": 1}``.
+        frequency_deviation: Standard deviation of a measured frequency over its mean, for modes for
+            which the file states none; by default the scatter of several rows of a mode.
+        shape_deviation: Standard deviation of an amplitude over the largest amplitude of its mode,
+            likewise.
+        floors: For a universal file, the floor of each unknown that was measured, by
+            NODE.DIRECTION, as ``{"12.x": 1}``.
 
     Returns:
         The modes by rising number.
 
     Raises:
-        RefusedError: The file cannot be read, floors are given beside a CSV file or missing beside
-            a universal one, or the measurements contradict their deviation.
+        RefusedError: The file cannot be read, floors are given for a CSV file or missing for a
+            universal file, or the measurements contradict their deviation.
 
     Example:
         >>> modes = read_modes("cases/laboratory-frame.modes.csv", frequency_deviation=0.01)
@@ -50,17 +51,17 @@ def read_modes(
         if deviation is not None:
             checked_number(key, deviation, positive=True)
     file = path_of("path", path)
-    is_universal = file.suffix.lower() in ENDINGS
+    is_universal = file.suffix.lower() in (".uff", ".unv")
     allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
     require(bool(floors) == is_universal, "floors", floors or None, allowed)
-    rows = uff_mode_rows(file, floors or {}) if is_universal else mode_rows(file)
-    return tuple(
-        measured_mode(
-            row.mode,
-            row.frequencies,
-            {floor: [*map(float, amplitudes)] for floor, amplitudes in row.amplitudes.items()},
-            frequency_deviation=row.frequency_deviation or frequency_deviation,
-            shape_deviation=row.shape_deviation or shape_deviation,
+    modes = []
+    for rows in uff_mode_rows(file, floors or {}) if is_universal else mode_rows(file):
+        mode = measured_mode(
+            rows.mode,
+            rows.frequencies,
+            rows.amplitudes,
+            frequency_deviation=rows.frequency_deviation or frequency_deviation,
+            shape_deviation=rows.shape_deviation or shape_deviation,
         )
-        for row in rows
-    )
+        modes.append(mode)
+    return tuple(modes)

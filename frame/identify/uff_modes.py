@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,18 +15,17 @@ from alphacut.frame.identify.mode_rows import ModeRows
 from alphacut.frame.records.text_file import read_bytes
 from alphacut.frame.records.uff import COMPLEX, DIRECTIONS, data_sets, floats
 
-ENDINGS = (".uff", ".unv")
-NORMAL_MODE, COMPLEX_MODES = 2, (3, 7)
-"""Types of analysis in the head of a data set 55."""
-MIN_COLLINEARITY = 0.9
-"""Modal phase collinearity below which a complex shape has no real one (Pappa, Elliott 1993)."""
-
 
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
-    """Reads the modes of a universal file (data sets 55), one measurement each, by rising number.
+    """Read the modes of a universal file, by rising number, with one measurement each.
 
-    `floors` has the floor of each measured unknown, named NODE.DIRECTION, as {"12.x": 1}. Complex
-    shapes are refused below a modal phase collinearity of `MIN_COLLINEARITY`.
+    Args:
+        path: The file.
+        floors: Floor of each measured unknown, named NODE.DIRECTION, such as ``{"12.x": 1}``.
+
+    Raises:
+        RefusedError: The file has no mode, a data set is damaged, a mode is given twice, an unknown
+            is missing, or a shape is complex in earnest.
     """
     content = read_bytes(path)
     try:
@@ -33,69 +33,113 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     except (ValueError, IndexError) as error:
         allowed = "data sets 55 of a universal file"
         raise RefusedError(path.name, str(error)[:80], allowed) from None
-    modes: dict[int, ModeRows] = {}  # by number
-    for mode, frequency, amplitudes in filter(None, sets):
-        is_new, key = mode not in modes, f"{path.name}, data set 55"
-        require(is_new, key, f"mode {mode} again", "each mode once")
+    modes: dict[int, ModeRows] = {}
+    for found in sets:
+        if found is None:
+            continue
+        mode, hertz = found.mode, found.hertz
+        key = f"{path.name}, data set 55"
+        require(mode not in modes, key, f"mode {mode} again", "each mode once")
         key = f"{path.name}, mode {mode}"
-        is_positive, value = 0 < frequency < np.inf, f"{frequency:g} Hz"
-        require(is_positive, f"{key}: frequency", value, "above 0 Hz")
-        shape = _real_amplitudes(key, amplitudes, floors)
-        modes[mode] = ModeRows(mode, np.array([frequency]), shape if len(shape) > 1 else {})
+        require(0 < hertz < np.inf, f"{key}: frequency", f"{hertz:g} Hz", "above 0 Hz")
+        shape = _real_amplitudes(key, found.amplitudes, floors)
+        # The amplitude of one floor alone says nothing.
+        modes[mode] = ModeRows(mode, np.array([hertz]), shape if len(shape) > 1 else {})
     require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
     return tuple(modes[number] for number in sorted(modes))
 
 
-Shape = tuple[int, float, dict[str, complex]]
-"""A data set 55: number of the mode, frequency in Hz, amplitudes by NODE.DIRECTION."""
+class UffShape(NamedTuple):
+    """A mode shape of a data set 55.
+
+    Args:
+        mode: Number of the mode.
+        hertz: Natural frequency, in Hz.
+        amplitudes: Complex amplitudes by NODE.DIRECTION.
+    """
+
+    mode: int
+    hertz: float
+    amplitudes: dict[str, complex]
 
 
-def _parse_shape(head: list[str], values: bytes | list[str]) -> Shape | None:
-    """The mode shape of a data set 55; None of another analysis."""
+def _parse_shape(head: list[str], values: bytes | list[str]) -> UffShape | None:
+    """Return the mode shape of a data set 55, or None for a data set of another analysis.
+
+    Args:
+        head: The eight lines of the head.
+        values: The lines below the head.
+
+    Raises:
+        ValueError: The data set is damaged.
+        IndexError: The data set is damaged.
+    """
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
-    if analysis not in (NORMAL_MODE, *COMPLEX_MODES):
+    is_normal, is_complex = analysis == 2, analysis in (3, 7)
+    if not (is_normal or is_complex):
         return None
-    reals, parts = floats(head[7]), 2 if kind in COMPLEX else 1
-    # of a complex mode the eigenvalue s has |s|/2π
-    hertz = reals[0] if analysis == NORMAL_MODE else abs(complex(*reals[:2])) / (2 * np.pi)
-    amplitudes: dict[str, complex] = {}
+    numbers_of_head = floats(head[7])
+    hertz = numbers_of_head[0]
+    if is_complex:
+        # The first two numbers are the complex eigenvalue s; its frequency is |s| / 2π.
+        hertz = abs(complex(*numbers_of_head[:2])) / (2 * np.pi)
+
+    # Each node has a line with its number, and then its numbers, six in a line.
+    numbers_of_value = 2 if kind in COMPLEX else 1
+    numbers_of_node = numbers_of_value * size
+    step = 1 + ceil(numbers_of_node / 6)
     lines = [str(line) for line in values if str(line).strip()]
-    step = 1 + ceil(parts * size / 6)  # lines of a node: its number, then six numbers a line
+    amplitudes: dict[str, complex] = {}
     for start in range(0, len(lines), step):
         numbers = floats(" ".join(lines[start + 1 : start + step]))
-        if len(numbers) != parts * size:
+        if len(numbers) != numbers_of_node:
             raise ValueError(f"{len(numbers)} numbers at node {lines[start].strip()}")
-        shape = [complex(*numbers[k : k + parts]) for k in range(0, parts * size, parts)]
         node = int(lines[start])
         if f"{node}.x" in amplitudes:
             raise ValueError(f"node {node} twice in a mode")
-        amplitudes |= {f"{node}.{axis}": x for axis, x in zip(DIRECTIONS, shape, strict=False)}
-    return int(head[6].split()[3]), hertz, amplitudes
+        for axis, k in zip(DIRECTIONS, range(0, numbers_of_node, numbers_of_value), strict=False):
+            amplitudes[f"{node}.{axis}"] = complex(*numbers[k : k + numbers_of_value])
+    return UffShape(int(head[6].split()[3]), hertz, amplitudes)
 
 
 def _real_amplitudes(
     key: str, amplitudes: Mapping[str, complex], floors: Mapping[str, int]
 ) -> dict[int, Array]:
-    """Real amplitude of a mode, of shape (1,), on each floor of the unknowns in `floors`."""
+    """Return the real amplitude of a mode on each measured floor, shape (1,) each.
+
+    Args:
+        key: Name of the mode in messages.
+        amplitudes: Complex amplitudes by NODE.DIRECTION.
+        floors: Floor of each measured unknown, by NODE.DIRECTION.
+
+    Raises:
+        RefusedError: An unknown is missing or not finite, or the phases differ too much.
+    """
     missing = [name for name in floors if name.lower() not in amplitudes]
     value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*amplitudes][:8]} …"
     require(not missing, key, value, allowed)
     values = np.array([amplitudes[name.lower()] for name in floors])
     require(np.isfinite(values).all(), key, "not finite", "finite amplitudes")
+    # Below this collinearity a complex shape has no real one (Pappa and Elliott 1993).
+    min_collinearity = 0.9
     collinearity = phase_collinearity(values)
-    allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(collinearity >= MIN_COLLINEARITY, key, f"complex: {collinearity:.3f}", allowed)
-    # the real part, after a turn of all phases that makes it largest
+    allowed = f"a modal phase collinearity from {min_collinearity:g} on"
+    require(collinearity >= min_collinearity, key, f"complex: {collinearity:.3f}", allowed)
+    # All phases are turned by the angle that makes the norm of the real part largest.
     turn = np.exp(-0.5j * np.angle((values**2).sum()))
     real_parts = (values * turn).real
     return {floor: real_parts[k : k + 1] for k, floor in enumerate(floors.values())}
 
 
 def phase_collinearity(shape: Array) -> float:
-    """Modal phase collinearity of a complex shape, 1 where all phases are equal or opposite.
+    """Return the modal phase collinearity of a complex shape.
 
-    (λ₁ − λ₂)²/(λ₁ + λ₂)² with the eigenvalues λ of the covariance of real and imaginary parts
-    (Pappa, Elliott 1993).
+    It is (λ₁ - λ₂)² / (λ₁ + λ₂)² with the eigenvalues λ of the covariance matrix of the real and
+    the imaginary parts (Pappa and Elliott, J. Guidance Control Dyn. 16, 860, 1993). It is 1 if all
+    phases are equal or opposite.
+
+    Args:
+        shape: Complex amplitudes, shape (unknowns,).
     """
     parts = np.stack([shape.real, shape.imag])
     covariance = parts @ parts.T
