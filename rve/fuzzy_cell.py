@@ -20,7 +20,7 @@ from alphacut.base.errors import FailedError, require, require_choice
 from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
-from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 from alphacut.rve.cell.cell import AnyPhase, Phase, Phases
@@ -53,17 +53,28 @@ QUANTITIES = ("E", "nu", "s11", "s12", *FIBRES, *PLANE)
 CUT = ("alpha", "bound")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LossCuts:
     """α-cuts of the loss factors of E, G and K.
 
     Args:
-        cuts: Lower and upper bounds by the names of `CONSTANTS`, shape (levels, 2) each.
-        errors: Their declared absolute errors by name; empty where none are declared.
+        E: Lower and upper bounds of that of Young's modulus, shape (levels,) each.
+        G: Bounds of that of the shear modulus.
+        K: Bounds of that of the bulk modulus.
+        error: Their declared absolute errors by name; empty where none are declared.
+        nature: Guarantee of the bounds.
     """
 
-    cuts: Mapping[str, Array]
-    errors: Mapping[str, float]
+    E: Ends
+    G: Ends
+    K: Ends
+    error: dict[str, float]
+    nature: Nature
+
+    @property
+    def cuts(self) -> dict[str, Array]:
+        """Lower and upper bounds by the names of `CONSTANTS`, shape (levels, 2) each."""
+        return {name: np.stack(getattr(self, name), axis=1) for name in CONSTANTS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -583,17 +594,18 @@ def _cuts_of_losses(
 
     Errors are those of the reference, else the largest of the samples; none of the user's own mesh.
     """
-    cuts = {name: np.empty((len(bounds.alpha), 2)) for name in CONSTANTS}
-    for level in range(len(bounds.alpha)):
-        for column, name in enumerate(CONSTANTS):
-            lowest = bounds.bounds(f"loss_lower[{level}][{column}]").lower
-            highest = bounds.bounds(f"loss_upper[{level}][{column}]").upper
-            cuts[name][level] = lowest[level], highest[level]
+    lower, upper = np.empty((2, len(CONSTANTS), len(bounds.alpha)))
+    for constant, level in np.ndindex(lower.shape):
+        column = f"[{level}][{constant}]"
+        lower[constant, level] = bounds.bounds(f"loss_lower{column}").lower[level]
+        upper[constant, level] = bounds.bounds(f"loss_upper{column}").upper[level]
+    cuts = {name: Ends(low, high) for name, low, high in zip(CONSTANTS, lower, upper, strict=True)}
+    error: dict[str, float] = {}
     assert bounds.samples is not None
     if reference is not None:
         _, errors = loss_bounds(reference, phase_cuts)
+        error = dict(zip(CONSTANTS, map(float, errors), strict=True))
     elif has_particle:
         errors = bounds.samples.values.output("loss_error").max(axis=0)
-    else:
-        return LossCuts(cuts, {})
-    return LossCuts(cuts, dict(zip(CONSTANTS, map(float, errors), strict=True)))
+        error = dict(zip(CONSTANTS, map(float, errors), strict=True))
+    return LossCuts(**cuts, error=error, nature=Nature.ATTAINED)

@@ -160,7 +160,8 @@ class Pipeline:
         results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
         cell.require_tolerance(numbers.error, section.tolerance)
-        cell.require_bounds(numbers.E_GPa[-1], numbers.references, numbers.particles)
+        top = float(numbers.E_GPa.lower[-1]), float(numbers.E_GPa.upper[-1])
+        cell.require_bounds(top, numbers.references, numbers.particles)
 
     def _compute_motion(self) -> None:
         """Computes the identified inputs, then the suite of records or envelopes, and answers."""

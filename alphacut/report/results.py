@@ -21,12 +21,11 @@ from alphacut.base.number_text import (
 from alphacut.frame import Peak, SuitePeaks, Tolerances
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
-from alphacut.fuzzy.result import Nature, rounded
+from alphacut.fuzzy.result import Ends, Nature, rounded
 from alphacut.stages.cell import UPPER_BOUND, constant_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
-from alphacut.stages.modulus import ModulusResult
-from alphacut.stages.store import CutsResult
+from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
 from alphacut.stages.summary import FrameResult, Parts
 
 Row = tuple[str, ...]
@@ -67,12 +66,12 @@ def key_sentences(parts: Parts) -> list[str]:
     return [*natures(parts), *smaller_steps(parts), *drivers(parts)]
 
 
-def cut_text(cuts: CutsResult, level: int, nature: Nature, error: float = 0.0) -> str:
+def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
     """Return one α-cut with five digits; the ends of a guaranteed one contain the error.
 
     The error does not change the sign of the lower end: a modulus is not negative.
     """
-    low, high = (float(end[level]) for end in cuts.ends)
+    low, high = (float(end[level]) for end in infinite_if_unknown(cuts))
     if nature is Nature.GUARANTEED:
         low = max(low - error, min(low, 0.0))
         high += error
@@ -109,7 +108,7 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
     """Yield the row of E of a cell or an image, then those of other constants and loss factors."""
     nature, young = part.nature, part.E_GPa
     error, error_cell = 0.0, error_text(0.0, nature)
-    constants = dict[str, CutsResult]()
+    constants = dict[str, Ends]()
     # Of a cell at most E is guaranteed; of an image every constant is.
     nature_of_constants = nature
     if isinstance(part, ModulusResult):
@@ -143,7 +142,7 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
             yield _row(f"loss factor of {name}", getattr(loss, name), loss.nature, error_cell)
 
 
-def _row(label: str, cuts: CutsResult, nature: Nature, error: str = "") -> Row:
+def _row(label: str, cuts: Ends, nature: Nature, error: str = "") -> Row:
     return label, cut_text(cuts, -1, nature), cut_text(cuts, 0, nature), nature, error
 
 
@@ -179,7 +178,8 @@ def width_text(image: ImageResult) -> str:
         missing.append(f"lower bound of E: {why}")
     if not has_upper:
         # In the plane E = G (3 − G/K). It falls where G, which has no bound, exceeds 3/2 K.
-        which = "lower or upper" if has_lower and image.E_GPa.ends[0][0] <= 0 else "upper"
+        may_be_zero = has_lower and infinite_if_unknown(image.E_GPa).lower[0] <= 0
+        which = "lower or upper" if may_be_zero else "upper"
         missing.append(f"{which} bound of E: a phase may be rigid")
     if missing:
         return f"This program gives no {', and no '.join(missing)}"
@@ -386,7 +386,7 @@ def _compared_entries(parts: Parts) -> Iterator[tuple[str, ShownUnit, float | st
     shown_units, no_unit = parts.shown_units, ShownUnit("", 1.0)
     for result in (parts.modulus, parts.image):
         if result is not None:
-            low, high = (1e9 * float(end[0]) for end in result.E_GPa.ends)
+            low, high = (1e9 * float(end[0]) for end in infinite_if_unknown(result.E_GPa))
             for what, value in (("greatest E", high), ("width of E", high - low)):
                 if math.isfinite(value):
                     yield what, ShownUnit("GPa", 1e-9), value

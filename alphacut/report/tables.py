@@ -20,7 +20,7 @@ from alphacut.io.files import Document
 from alphacut.io.results import ResultsFolder
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
-from alphacut.stages.modulus import ModulusResult
+from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
 from alphacut.stages.summary import Parts
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def radius_map(numbers: Document) -> pd.DataFrame:
 
 def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
     """Return the α-cuts of E, and of a cell those of ν and the error of E, a row for each level."""
-    lower, upper = result.E_GPa.ends
+    lower, upper = infinite_if_unknown(result.E_GPa)
     columns = {"α": result.alpha, "E from [GPa]": lower, "E to [GPa]": upper}
     if isinstance(result, ModulusResult):
         columns["ν from"] = result.nu_cuts.lower

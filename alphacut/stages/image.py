@@ -10,7 +10,8 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.kept_files import file_digest
 from alphacut.case.material import ImageCell
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Ends, Nature
+from alphacut.rve.fuzzy_cell import LossCuts
 from alphacut.rve.image.files import files_of, read_grid
 from alphacut.rve.image.study import (
     GUARANTEE,
@@ -25,8 +26,8 @@ from alphacut.rve.image.study import (
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN
 from alphacut.rve.spheres.result import HILL
 from alphacut.stages.cell import AVERAGES, GPA, References
-from alphacut.stages.modulus import LossResult, constant_cuts
-from alphacut.stages.store import CutsResult, Stage, StageContext, StageResult
+from alphacut.stages.modulus import in_units_of_results
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 SPACE = "along the axes"
 """Definition of the constants of a volume."""
@@ -44,21 +45,21 @@ class ImageResult:
     """
 
     alpha: Array
-    E_GPa: CutsResult
+    E_GPa: Ends
     lower_GPa: Array
     upper_GPa: Array
     nu: dict[str, float | None]
     shear_GPa: dict[str, float | None]
     average: str
-    plane: dict[str, dict[str, CutsResult]]
+    plane: dict[str, dict[str, Ends]]
     nature: Nature
     seconds: float
     widths_GPa: dict[str, float]
     fractions: dict[str, float]
     division: int
     references: References
-    loss: LossResult | None
-    proved_losses: dict[str, CutsResult]
+    loss: LossCuts | None
+    proved_losses: dict[str, Ends]
 
 
 def stage(
@@ -92,18 +93,15 @@ def compute_cuts(
 def image_result(found: FuzzyImageStiffness) -> ImageResult:
     """The numbers of a fuzzy stiffness in the units of results."""
     top, is_space = found.cuts[-1], len(found.lengths) == 3
-    along_axes = dict(constant_cuts(name, bounds) for name, bounds in found.constants.items())
+    along_axes = in_units_of_results(found.constants)
     references = References()
     if found.references is not None:
         lower, upper = found.references.young
         references = {"hashin_shtrikman_E_GPa": (lower / GPA, upper / GPA)}
-    loss = None
-    if found.losses is not None:
-        loss = LossResult.of(found.losses.cuts, found.losses.errors, Nature.ESTIMATED)
     shear = (end / GPA for end in top.bounds.shear(found.average))
     return ImageResult(
         alpha=found.alpha,
-        E_GPa=CutsResult.of(found.young / GPA),
+        E_GPa=Ends(*(found.young / GPA).T),
         lower_GPa=np.asarray(top.bounds.lower / GPA, float),
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
         nu=dict(zip(SIDES, top.poisson, strict=True)),
@@ -116,6 +114,6 @@ def image_result(found: FuzzyImageStiffness) -> ImageResult:
         fractions=dict(found.fractions),
         division=found.division,
         references=references,
-        loss=loss,
-        proved_losses={name: CutsResult.of(cut) for name, cut in found.proved_losses.items()},
+        loss=found.losses,
+        proved_losses={name: Ends(*cut.T) for name, cut in found.proved_losses.items()},
     )

@@ -15,20 +15,20 @@ from alphacut.base.kept_files import file_digest
 from alphacut.fuzzy import FuzzyNumber, General, Reduced, Signed
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fuzzy_cell import (
     FIBRES,
     SUFFIXES,
     FuzzyStiffness,
+    LossCuts,
     fuzzy_number,
     fuzzy_stiffness,
 )
 from alphacut.rve.result.engineering_constants import NAMES
-from alphacut.rve.result.loss_factors import CONSTANTS
 from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit
-from alphacut.stages.store import CutsResult, Stage, StageContext, StageResult
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
     import xarray
@@ -42,25 +42,6 @@ PLANS: dict[str, Plan] = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LossResult:
-    """α-cuts of the loss factors of E, G and K; their errors by name, where they are declared."""
-
-    E: CutsResult
-    G: CutsResult
-    K: CutsResult
-    error: dict[str, float]
-    nature: Nature
-
-    @classmethod
-    def of(
-        cls, cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
-    ) -> LossResult:
-        """The result of cuts (levels, 2) by the names of `CONSTANTS`, and of their errors."""
-        named = {name: CutsResult.of(cuts[name]) for name in CONSTANTS}
-        return cls(**named, error=dict(errors), nature=nature)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class ModulusResult:
     """α-cuts of a cell, moduli in GPa; nature and relative errors of E, references and cost.
 
@@ -70,10 +51,10 @@ class ModulusResult:
     """
 
     alpha: Array
-    E_GPa: CutsResult
-    nu_cuts: CutsResult
-    fibres: dict[str, CutsResult]
-    plane: dict[str, dict[str, CutsResult]]
+    E_GPa: Ends
+    nu_cuts: Ends
+    fibres: dict[str, Ends]
+    plane: dict[str, dict[str, Ends]]
     method: str
     solver: str
     plan: str
@@ -86,40 +67,43 @@ class ModulusResult:
     error: dict[str, float]
     checks: dict[str, float]
     references: References
-    loss: LossResult | None
+    loss: LossCuts | None
 
 
-def constant_cuts(name: str, bounds: Array) -> tuple[str, CutsResult]:
-    """Key and cuts of a constant, moduli in GPa, from bounds (levels, 2) in SI."""
-    key, unit = key_and_unit(name)
-    return key, CutsResult.of(bounds / unit)
+def in_units_of_results(constants: Mapping[str, Array]) -> dict[str, Ends]:
+    """Return the α-cuts of constants as results have them: moduli in GPa, by NAME_GPa.
 
-
-def cuts_of(stiffness: FuzzyStiffness, names: Mapping[str, str]) -> dict[str, CutsResult]:
-    """α-cuts of those constants that a stiffness has, moduli in GPa by NAME_GPa.
-
-    `names` has the name of each constant by that of the output.
+    Args:
+        constants: Lower and upper bounds in SI by the name of the constant, shape (levels, 2) each.
     """
-    return dict(
-        constant_cuts(name, stiffness.cuts(output))
-        for output, name in names.items()
-        if output in stiffness.constants
-    )
+    cuts: dict[str, Ends] = {}
+    for name, bounds in constants.items():
+        key, unit = key_and_unit(name)
+        cuts[key] = Ends(*(bounds / unit).T)
+    return cuts
+
+
+def infinite_if_unknown(cuts: Ends) -> Ends:
+    """Return α-cuts with infinite ends where there is no bound; files have null there."""
+    lower = np.where(np.isnan(cuts.lower), -np.inf, cuts.lower)
+    return Ends(lower, np.where(np.isnan(cuts.upper), np.inf, cuts.upper))
 
 
 def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusResult:
     """The numbers of a fuzzy stiffness in the units of results."""
-    bounds, losses = stiffness.bounds, stiffness.losses
-    plane = {
-        definition: cuts_of(stiffness, {name + suffix: name for name in NAMES})
-        for definition, suffix in SUFFIXES.items()
-    }
+    bounds = stiffness.bounds
+    known = {name: stiffness.cuts(name) for name in stiffness.constants}
+    plane: dict[str, dict[str, Ends]] = {}
+    for definition, suffix in SUFFIXES.items():
+        along_axes = {name: known[name + suffix] for name in NAMES if name + suffix in known}
+        if along_axes:
+            plane[definition] = in_units_of_results(along_axes)
     return ModulusResult(
         alpha=bounds.alpha,
-        E_GPa=CutsResult.of(stiffness.cuts("E") / GPA),
-        nu_cuts=CutsResult.of(stiffness.cuts("nu")),
-        fibres=cuts_of(stiffness, {name: name for name in FIBRES}),
-        plane={definition: cuts for definition, cuts in plane.items() if cuts},
+        E_GPa=Ends(*(known["E"] / GPA).T),
+        nu_cuts=Ends(*known["nu"].T),
+        fibres=in_units_of_results({name: known[name] for name in FIBRES if name in known}),
+        plane=plane,
         method=problem.modulus.method,
         solver=getattr(problem.model(), "solver_text", ""),
         plan=bounds.method,
@@ -132,7 +116,7 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
         error=dict(stiffness.error),
         checks=dict(stiffness.checks),
         references=problem.references(),
-        loss=None if losses is None else LossResult.of(losses.cuts, losses.errors, Nature.ATTAINED),
+        loss=stiffness.losses,
     )
 
 

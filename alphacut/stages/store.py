@@ -14,10 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from alphacut.base.arrays import Array, on_one_blas_thread
+from alphacut.base.arrays import on_one_blas_thread
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.kept_files import whole_file, write_text
 from alphacut.base.progress_bar import Progress, subprogress
@@ -35,30 +32,6 @@ SAMPLES = "samples.db"
 SECONDS = {"modulus": 10.0, "image": 10.0, "envelope": 10.0, "record": 3.0, "incremental": 5.0}
 SECONDS |= {"probability": 5.0, "tolerances": 30.0, "figures": 6.0}
 """Rough seconds of a stage by the first word of its name, else 1, for its part of the progress."""
-
-
-@dataclass(frozen=True, eq=False)
-class CutsResult:
-    """α-cuts of a quantity: its lower and its upper bound on each level, rising."""
-
-    lower: Array
-    upper: Array
-
-    @classmethod
-    def of(cls, bounds: ArrayLike) -> CutsResult:
-        """The cuts of bounds (lower, upper) in the last axis."""
-        lower, upper = np.moveaxis(np.asarray(bounds, float), -1, 0)
-        return cls(lower=lower, upper=upper)
-
-    @property
-    def ends(self) -> tuple[Array, Array]:
-        """Lower and upper bounds, infinite where there is none."""
-        lower = np.where(np.isnan(self.lower), -np.inf, self.lower)
-        return lower, np.where(np.isnan(self.upper), np.inf, self.upper)
-
-    def __getitem__(self, level: int) -> tuple[float, float]:
-        """Both ends on a level."""
-        return float(self.lower[level]), float(self.upper[level])
 
 
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import FailedError, require, require_choice
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.result import Nature, rounded
+from alphacut.fuzzy.result import Ends, Nature, rounded
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fuzzy_cell import LossCuts, fuzzy_number, loss_corners, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -518,4 +518,5 @@ def _estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> Los
     # what the first order leaves out is of the order of the squared difference of losses
     errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
     by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
-    return LossCuts(dict(zip(CONSTANTS, bounds, strict=True)), by_name)
+    ends = {name: Ends(*cut.T) for name, cut in zip(CONSTANTS, bounds, strict=True)}
+    return LossCuts(**ends, error=by_name, nature=Nature.ESTIMATED)
