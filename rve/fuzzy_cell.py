@@ -594,7 +594,8 @@ def _cuts_of_losses(
 
     Errors are those of the reference, else the largest of the samples; none of the user's own mesh.
     """
-    lower, upper = np.empty((2, len(CONSTANTS), len(bounds.alpha)))
+    lower: Array = np.empty((len(CONSTANTS), len(bounds.alpha)))
+    upper: Array = np.empty_like(lower)
     for constant, level in np.ndindex(lower.shape):
         column = f"[{level}][{constant}]"
         lower[constant, level] = bounds.bounds(f"loss_lower{column}").lower[level]
