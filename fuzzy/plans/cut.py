@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from math import inf
 
 import numpy as np
@@ -13,65 +12,88 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.sets.boxes import Domain
-
-_DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
-# the same of the slope at the end of a descent: models that solve to 1e-8 are as noisy
-_LARGE_DIFFERENCE = 1e-4
-_MAX_SLOPE = 0.01  # ranges of the output over the width of a cut: at a kink or jump it is larger
-_FACE = 1e-9  # of the width: a point this close to a face of the cut lies on it
-_STEEPNESS = 4.0  # of the objective's unit: so first steps mostly reach a face at once
-_FLAT = 1e-12  # ranges of the output over the width of the cut: no slope
-# ranges of the output at which a descent ends: by its last step, and by its slope
-_MIN_CHANGE, _MIN_SLOPE = 5e-10, 2.5e-6
-_MAX_ITERATIONS = 50  # of a descent
-_MAX_CORNER_INPUTS = 6  # inputs up to which all corners are evaluated, 64 at most
-_FAILED = 1e6  # ranges of the output that stand for a sample without a value
+from alphacut.fuzzy.plans.settings import SEARCH
+from alphacut.fuzzy.sets.boxes import Domain, corners
 
 
 @dataclass(frozen=True)
 class Bound:
-    """The lower (`sign` 1) or upper bound (−1) of an output: the minimum of sign · output."""
+    """The lower (`sign` 1) or upper (`sign` −1) bound of an output: minimum of sign · output."""
 
     output: str
     sign: float
 
 
 class CutSearch:
-    """One α-cut under search, in unit coordinates of the uncertain inputs: those with a width."""
+    """One α-cut under search, in unit coordinates of its uncertain inputs.
+
+    An input is uncertain if its cut has a width. Unit coordinates are 0 at the lower and 1 at the
+    upper end of the cut of an input.
+
+    Attributes:
+        level: Index of the α-level.
+        lower: Lower ends of the cuts of all inputs, shape (inputs,).
+        upper: Upper ends of the cuts, shape (inputs,).
+        near: Distance from a face of the cut within which a point lies on the face, shape
+            (inputs,).
+        uncertain_inputs: Columns of the uncertain inputs.
+    """
 
     def __init__(self, campaign: Campaign, domain: Domain, level: int) -> None:
-        self.campaign, self.domain, self.level = campaign, domain, level
-        self.lower, self.upper = (ends[level] for ends in domain.boxes)
-        self.near = _FACE * (self.upper - self.lower)
+        self.campaign = campaign
+        self.domain = domain
+        self.level = level
+        lower, upper = domain.boxes
+        self.lower: Array = lower[level]
+        self.upper: Array = upper[level]
+        # This is far above the rounding of a coordinate and far below any distance of interest.
+        self.near = 1e-9 * (self.upper - self.lower)
         self.uncertain_inputs = np.flatnonzero(self.upper > self.lower)
 
     @cached_property
     def corners(self) -> Array:
-        """Corners of the unit cube, (n, uncertain inputs); none for more than six inputs."""
+        """Corners of the unit cube, shape (n, uncertain inputs); none for more than six inputs.
+
+        Six inputs have 64 corners, which is no more than other samples of a search.
+        """
         inputs = len(self.uncertain_inputs)
-        if inputs > _MAX_CORNER_INPUTS:
+        if inputs > 6:
             return np.empty((0, inputs))
-        return np.array(list(product((0.0, 1.0), repeat=inputs)))
+        return corners(np.zeros(inputs), np.ones(inputs))
 
     def points(self, unit: Array) -> Array:
-        """Inputs of points (n, uncertain inputs) of the unit cube, shape (n, inputs)."""
+        """Return the inputs, shape (n, inputs), at points of the unit cube.
+
+        Args:
+            unit: Unit coordinates, shape (n, uncertain inputs).
+        """
         points = np.repeat(self.lower[None], len(unit), axis=0)
         width = (self.upper - self.lower)[self.uncertain_inputs]
         points[:, self.uncertain_inputs] = self.lower[self.uncertain_inputs] + unit * width
         return np.clip(points, self.lower, self.upper)
 
     def unit(self, points: Array) -> Array:
-        """Points (n, inputs) in unit coordinates, shape (n, uncertain inputs)."""
+        """Return points (n, inputs) in unit coordinates, shape (n, uncertain inputs)."""
         width = (self.upper - self.lower)[self.uncertain_inputs]
         return np.asarray(np.clip((points - self.lower)[:, self.uncertain_inputs] / width, 0, 1))
 
     def contains(self, points: Array) -> Mask:
-        """Mask of the points (n, inputs) that lie in the cut, shape (n,)."""
+        """Return which of the points (n, inputs) lie in the cut, shape (n,)."""
         return np.asarray(self.domain.inside(points)[self.level])
 
     def values(self, unit: Array, bound: Bound) -> Array:
-        """Evaluate sign · output at points (n, uncertain inputs), shape (n,); ∞ where it failed."""
+        """Evaluate sign · output at points of the unit cube.
+
+        Args:
+            unit: Unit coordinates, shape (n, uncertain inputs).
+            bound: Output, and sign by which it is multiplied.
+
+        Returns:
+            Values of shape (n,), infinite where the sample failed.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+        """
         if not len(unit):
             return np.empty(0)
         outputs = self.campaign(self.points(unit))
@@ -86,57 +108,93 @@ class CutSearch:
         return span if span >= np.finfo(float).tiny else 1.0
 
     def largest_slope(self, point: Array, output: str) -> float:
-        """Largest slope of an output at a point (inputs,), along inputs inside their cuts there.
+        """Return the largest slope of an output at a point of the cut, to either side.
 
-        It is in ranges of the output over the width of the cut, 0 if all inputs are at an end.
+        Differences are taken along the inputs that are not at an end of their cuts.
+
+        Args:
+            point: Inputs, shape (inputs,).
+            output: Name of the output.
+
+        Returns:
+            The slope, in ranges of the output over the width of the cut; 0 if all inputs are at an
+            end, or no sample beside the point has a value.
         """
+        step = SEARCH.large_difference
         unit = self.unit(point[None])[0]
-        inner = np.flatnonzero((unit > _LARGE_DIFFERENCE) & (unit < 1 - _LARGE_DIFFERENCE))
-        steps = _LARGE_DIFFERENCE * np.eye(len(unit))[inner]
-        probes = np.concatenate([unit[None], unit + steps, unit - steps])  # so that kinks show
-        here, *around = self.values(probes, Bound(output, 1.0))
-        finite = np.array([value for value in around if np.isfinite(value)])
-        slopes = np.abs(finite - here) / _LARGE_DIFFERENCE / self.output_range(output)
+        inner_inputs = np.flatnonzero((unit > step) & (unit < 1 - step))
+        steps = step * np.eye(len(unit))[inner_inputs]
+        # At a kink the slopes to both sides differ, so that one of them is not small.
+        probes = np.concatenate([unit[None], unit + steps, unit - steps])
+        values = self.values(probes, Bound(output, 1.0))
+        around = values[1:]
+        differences = np.abs(around[np.isfinite(around)] - values[0])
+        slopes = differences / step / self.output_range(output)
         return float(slopes.max(initial=0.0))
 
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
         """Return the local optimum that a descent by L-BFGS-B reaches inside the cut.
 
-        The gradient is one of differences. `first_step` limits the first step in unit coordinates:
-        a short one does not leave the basin of the start (uncertain inputs,).
+        Args:
+            start: Unit coordinates where the descent begins, shape (uncertain inputs,).
+            bound: Output and sign that are minimised.
+            first_step: Limit of the first step in unit coordinates. A short one does not leave the
+                basin of the start.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
         """
         from scipy.optimize import minimize
 
         output_range = self.output_range(bound.output)
         start_value = float(self.values(start[None], bound)[0])
 
-        def change(unit: Array) -> tuple[float, Array]:
-            """Change of sign · output from the start, in ranges of the output, and its gradient."""
-            steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
+        def change_and_gradient(unit: Array) -> tuple[float, Array]:
+            """Return the change of sign · output from the start, in ranges, and its gradient."""
+            difference = SEARCH.difference
+            steps = np.where(unit + difference > 1, -difference, difference)
             points = self.points(np.concatenate([unit[None], unit + np.diag(steps)]))
-            rows = self.campaign(points)
-            values = bound.sign * rows.array[:, rows.column(bound.output)]
-            changes = np.nan_to_num((values - start_value) / output_range, nan=_FAILED)
+            outputs = self.campaign(points)
+            values = bound.sign * outputs.array[:, outputs.column(bound.output)]
+            # A sample without a value counts as very bad, so that the line search turns back.
+            changes = np.nan_to_num((values - start_value) / output_range, nan=1e6)
             return float(changes[0]), (changes[1:] - changes[0]) / steps
 
-        # the minimiser begins with a step of one gradient, which the factor makes long or short
-        slope = float(np.linalg.norm(change(start)[1]))
-        factor = min(_STEEPNESS, first_step / max(slope, _FLAT))
+        # The first step of L-BFGS-B is the gradient itself. The objective is multiplied by a factor
+        # that makes this step as long as `first_step`, or by 4, with which first steps mostly reach
+        # a face of the cut at once. A slope below 1e-12 is none.
+        _, start_gradient = change_and_gradient(start)
+        slope = float(np.linalg.norm(start_gradient))
+        factor = min(4.0, first_step / max(slope, 1e-12))
 
-        options = {"ftol": _MIN_CHANGE * factor, "gtol": _MIN_SLOPE * factor}
+        def objective(unit: Array) -> tuple[float, Array]:
+            """Return the change and its gradient times the factor."""
+            change, gradient = change_and_gradient(unit)
+            return factor * change, factor * gradient
+
+        # A descent ends by a step that changes the output by 5e-10 of its range, or where the slope
+        # is 2.5e-6. Both are below the tolerance of values, 1e-5, with room for several steps.
+        options = {"maxiter": 50, "ftol": 5e-10 * factor, "gtol": 2.5e-6 * factor}
         result = minimize(
-            lambda unit: tuple(factor * x for x in change(unit)),
+            objective,
             start,
             jac=True,
             method="L-BFGS-B",
             bounds=[(0.0, 1.0)] * len(start),
-            options={"maxiter": _MAX_ITERATIONS, **options},
+            options=options,
         )
-        value = start_value + output_range * float(result.fun) / factor
-        unit, gradient = result.x, result.jac / factor
+        unit = result.x
+        gradient = result.jac / factor
+        # At a face of the cut a gradient that points out of the cut cannot be followed.
         points_out = ((unit <= 0) & (gradient > 0)) | ((unit >= 1) & (gradient < 0))
-        free_slope = float(np.abs(np.where(points_out, 0.0, gradient)).max(initial=0.0))
-        return Optimum(self, bound, self.points(unit[None])[0], value, free_slope)
+        free_gradient = np.where(points_out, 0.0, gradient)
+        return Optimum(
+            cut=self,
+            bound=bound,
+            point=self.points(unit[None])[0],
+            value=start_value + output_range * float(result.fun) / factor,
+            slope=float(np.abs(free_gradient).max(initial=0.0)),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +205,7 @@ class Optimum:
         cut: The cut in which it was searched.
         bound: Output and sign that were minimised.
         point: Inputs, shape (inputs,).
-        value: sign · output there.
+        value: sign · output at the point.
         slope: Largest slope along an input that can still change, in ranges of the output over the
             width of the cut.
     """
@@ -164,25 +222,27 @@ class Optimum:
 
         Also False if the budget does not allow the samples that decide it.
         """
-        if self.slope <= _MAX_SLOPE:
+        if self.slope <= SEARCH.max_slope:
             return True
         try:
-            return self.cut.largest_slope(self.point, self.bound.output) <= _MAX_SLOPE
+            slope = self.cut.largest_slope(self.point, self.bound.output)
         except SpentError:
             return False
+        return slope <= SEARCH.max_slope
 
     def is_optimum_of(self, cut: CutSearch) -> bool:
-        """Whether the point is a local optimum of another cut as well.
+        """Return whether the point is a local optimum of another cut as well.
 
-        It stays one of a narrower cut (higher α) that contains it, and of a wider cut (lower α)
-        unless it lies on a face of its own cut which the wider one moves outwards.
+        It stays an optimum of a narrower cut (higher α) that contains it. In a wider cut (lower α)
+        it stays one unless it lies on a face of its own cut that the wider cut moves outwards.
         """
         if self.cut.level <= cut.level:
             return bool(cut.contains(self.point[None])[0])
-        is_wider = self.cut.lower > cut.lower, self.cut.upper < cut.upper
-        at_face = (self.point <= self.cut.lower + self.cut.near) & is_wider[0]
-        at_face |= (self.point >= self.cut.upper - self.cut.near) & is_wider[1]
-        return not at_face.any()
+        is_at_lower_face = self.point <= self.cut.lower + self.cut.near
+        is_at_upper_face = self.point >= self.cut.upper - self.cut.near
+        leaves_lower_face = is_at_lower_face & (self.cut.lower > cut.lower)
+        leaves_upper_face = is_at_upper_face & (self.cut.upper < cut.upper)
+        return not (leaves_lower_face | leaves_upper_face).any()
 
 
 def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Mask
-from alphacut.base.errors import FailedError, require
+from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
@@ -24,34 +25,39 @@ class Plan(Protocol):
         """The word for it in a case file."""
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Bounds of every output on every level."""
+        """Return bounds of every output on every level.
+
+        Args:
+            campaign: Evaluates the model, within a budget.
+            domain: Inputs and levels.
+        """
 
 
 def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
     """Return the bounds that samples attain: on each level the extremes of those in its cut.
 
-    For the points of the transformation method this is the retransformation of Hanss (2005). Values
-    are NaN where a sample failed and was skipped.
+    For the points of the transformation method this is the retransformation of Hanss (2005).
+
+    Args:
+        domain: Inputs and levels.
+        samples: Points, and values that are NaN where a sample failed and was skipped.
+        method: Name of the method.
+
+    Raises:
+        FailedError: A cut has no sample with a value of some output.
     """
-    values, inside = samples.values.array, domain.inside(samples.points)
+    values = samples.values.array
+    inside = domain.inside(samples.points)
+    min_rows = _rows_of_minima(values, inside, domain.alpha)  # (levels, outputs)
+    max_rows = _rows_of_minima(-values, inside, domain.alpha)
     columns = np.arange(values.shape[1])
-    rows_of_ends = []
-    for signed in (values, -values):
-        usable, rows_by_level = np.where(np.isnan(signed), np.inf, signed), []
-        for alpha, is_inside in zip(domain.alpha, inside, strict=True):
-            rows = np.flatnonzero(is_inside)
-            if not len(rows) or np.isinf(usable[rows].min(axis=0)).any():
-                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
-            rows_by_level.append(rows[usable[rows].argmin(axis=0)])
-        rows_of_ends.append(np.array(rows_by_level))
-    lowest, highest = rows_of_ends
     return Bounds(
         alpha=np.array(domain.alpha),
-        lower=values[lowest, columns],
-        upper=values[highest, columns],
-        lower_at=samples.points[lowest],
-        upper_at=samples.points[highest],
-        error=np.zeros(lowest.shape),
+        lower=values[min_rows, columns],
+        upper=values[max_rows, columns],
+        lower_at=samples.points[min_rows],
+        upper_at=samples.points[max_rows],
+        error=np.zeros(min_rows.shape),
         nature=Nature.ATTAINED,
         outputs=samples.values.columns,
         inputs=domain.inputs,
@@ -59,10 +65,37 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
     )
 
 
-def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Copy of bounds at corners, guaranteed for the outputs `proved` (outputs,) by the knowledge.
+def _rows_of_minima(values: Array, inside: Mask, alpha: Sequence[float]) -> Ints:
+    """Return the row of the smallest value of each output on each level, shape (levels, outputs).
 
-    It is tested by further samples inside the cuts.
+    Args:
+        values: Values of the samples, shape (samples, outputs); NaN for none.
+        inside: Whether each sample lies in the cut of each level, shape (levels, samples).
+        alpha: Levels, for the message.
+
+    Raises:
+        FailedError: A cut has no sample with a value of some output.
+    """
+    usable = np.where(np.isnan(values), np.inf, values)
+    rows_by_level = []
+    for level, is_inside in zip(alpha, inside, strict=True):
+        rows = np.flatnonzero(is_inside)
+        if not len(rows) or np.isinf(usable[rows].min(axis=0)).any():
+            raise FailedError(f"no sample of the cut at α = {level:g} has a value")
+        rows_by_level.append(rows[usable[rows].argmin(axis=0)])
+    return np.array(rows_by_level)
+
+
+def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
+    """Return a copy of bounds at corners, guaranteed for some outputs by the knowledge.
+
+    The knowledge is tested by further samples inside the cuts, as far as the budget goes. They
+    evaluate the model by `campaign`.
+
+    Args:
+        bounds: Bounds that corners of the cuts attain.
+        campaign: Evaluates the model; its knowledge states the signs of effects.
+        proved: Outputs that corners bound by these signs, shape (outputs,).
 
     Raises:
         RefusedError: A sample contradicts the knowledge.
@@ -71,43 +104,57 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
         return bounds
     domain = Domain(bounds.inputs, tuple(bounds.alpha))
     campaign(_test_points(domain, campaign))
-    samples, knowledge = campaign.samples, campaign.knowledge
-    signs = knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
+    samples = campaign.samples
+    values = samples.values.array
     sampled = bounds_of_samples(domain, samples, "")
-    tolerance = negligible(samples.values.array)
-    below = sampled.lower < bounds.lower - tolerance
-    above = sampled.upper > bounds.upper + tolerance
-    is_exceeded = np.asarray((below | above).any(axis=0))
-    words, allowed = repr(knowledge.words), "facts that hold over the whole supports"
+    tolerance = negligible(values)
+    is_below = sampled.lower < bounds.lower - tolerance
+    is_above = sampled.upper > bounds.upper + tolerance
+    is_exceeded = np.asarray((is_below | is_above).any(axis=0))
+    signs = campaign.knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
     for column in np.flatnonzero(proved):
-        pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
-        agrees, key = pair is None and not is_exceeded[column], bounds.outputs[column]
+        pair = contradiction(samples.points, values[:, column], signs[column])
         cure = "samples contradict it"
         if pair is not None:
-            named = (zip(bounds.inputs, point, strict=True) for point in pair)
-            first, second = (", ".join(f"{name} = {x:.6g}" for name, x in xs) for xs in named)
+            first, second = (_point_text(point, bounds) for point in pair)
             cure += f": at {first} it is larger than at {second}"
-        require(agrees, f"knowledge of {key}", value=words, allowed=allowed, cure=cure)
+        if pair is not None or is_exceeded[column]:
+            raise RefusedError(
+                f"knowledge of {bounds.outputs[column]}",
+                repr(campaign.knowledge.words),
+                "facts that hold over the whole supports",
+                cure,
+            )
     natures = tuple(Nature.GUARANTEED if x else Nature.ATTAINED for x in proved)
     evidence = f"which {len(samples.points):,} samples do not contradict"
     return replace(
         bounds,
         natures=natures,
         nature=Nature.weakest(natures),
-        basis=(f"{knowledge.words}, {evidence}",),
+        basis=(f"{campaign.knowledge.words}, {evidence}",),
         inner=Ends(bounds.lower, bounds.upper),
     )
 
 
+def _point_text(point: Array, bounds: Bounds) -> str:
+    """Return the inputs of a point, shape (inputs,), as "a = 1, b = 2"."""
+    return ", ".join(f"{name} = {x:.6g}" for name, x in zip(bounds.inputs, point, strict=True))
+
+
 def _test_points(domain: Domain, campaign: Campaign) -> Array:
-    """Points inside the cuts at which stated knowledge is tested, shape (n, inputs)."""
-    # the narrowest cut with a width gets all tests, each wider one a quarter as many: points of a
-    # narrower cut lie in the wider ones, too
+    """Return points inside the cuts at which stated knowledge is tested, shape (n, inputs).
+
+    There are no more than the budget allows. The narrowest cut with a width gets as many as the
+    knowledge asks for, and each wider one a quarter of that: points of a narrower cut lie in the
+    wider ones, too.
+    """
     lower, upper = domain.boxes
-    widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
+    widths = upper - lower
+    tests = campaign.knowledge.tests
+    points: list[Array] = []
     ends = np.hstack([lower, upper])
-    differs = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # from the cut below
-    for level in np.flatnonzero(differs & widths.any(axis=1))[::-1]:
+    differs_from_wider = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
+    for level in np.flatnonzero(differs_from_wider & widths.any(axis=1))[::-1]:
         count = -(-tests // 4) if points else tests
         unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
         points += list(lower[level] + widths[level] * unit_points)

@@ -1,9 +1,9 @@
-"""Transformation method, reduced and general (Hanss, 2005), and the signed plan.
+"""Transformation method, reduced and general (Hanss, 2005), and the monotonicity-based plan.
 
 Level j of m counts m + 1 − j points per input: the ends of its cut, and between them the midpoints
 of neighbouring points of the next level up. The general method runs the model on the grid of these
-points, the reduced method on the corners of each cut only. In the signed plan known signs of
-effects name the corner of each bound, and inputs without a sign take all points.
+points, the reduced method on the corners of each cut only. In the monotonicity-based plan known
+signs of effects name the corner of each bound, and inputs without a sign take all points.
 
 A sign is *proved* where the caller states it and no sample contradicts it; samples in which one
 stated input changes alone test it. Otherwise it is *observed*: differences at probes of the box all
@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.base.errors import require, require_choice
+from alphacut.base.errors import RefusedError, require_choice
 from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
@@ -32,16 +32,12 @@ from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 Model = Callable[[Array], Array]
-# share of the support: points of two levels closer than this differ by round-off only
-_ROUND_OFF = 1e-13
-_PROBES = 4  # points inside a box, besides its extreme corners and the nominal point
-_MARGIN = 0.05  # of the range of the slopes over the probes, which the least slope must exceed
-_STEP = 1e-3  # of a finite difference, over the width of the box
+"""Outputs (n, outputs) at points (n, inputs)."""
+Grid = list[list[float]]
+"""Points of each input on one level."""
 
 
-def hanss_points(
-    number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = True
-) -> list[list[float]]:
+def hanss_points(number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = True) -> Grid:
     """Return the points of every level by the recursion of the transformation method (Hanss 2005).
 
     Args:
@@ -67,15 +63,22 @@ def hanss_points(
 
 
 def _listed_point(x: float, points: list[float], width: float) -> float:
-    """The point in the sorted list that equals x but for round-off; else x, which is inserted."""
-    index = bisect_left(points, x - _ROUND_OFF * width)
-    if index < len(points) and points[index] - x <= _ROUND_OFF * width:
+    """Return the point of a list that equals x but for rounding, or x, which is then inserted.
+
+    Args:
+        x: The point.
+        points: Other points in rising order; x may be inserted in place.
+        width: Width of the support, of which 1e-13 is rounding.
+    """
+    rounding = 1e-13 * width
+    index = bisect_left(points, x - rounding)
+    if index < len(points) and points[index] - x <= rounding:
         return points[index]
     points.insert(index, x)
     return x
 
 
-def level_grids(domain: Domain, *, inner: bool) -> list[list[list[float]]]:
+def level_grids(domain: Domain, *, inner: bool) -> list[Grid]:
     """Return `hanss_points` of all inputs, as a list by level of lists by input."""
     columns = [hanss_points(x, domain.alpha, inner=inner) for x in domain.inputs.values()]
     return [list(level) for level in zip(*columns, strict=True)]
@@ -88,17 +91,26 @@ def bounds_at(campaign: Campaign, domain: Domain, points: Array, method: str) ->
 
 
 def corners_suffice(domain: Domain, signs: Signs) -> Mask:
-    """Return the outputs with a sign of every input that has a width, a mask (outputs,)."""
+    """Return the outputs with a sign of every input that has a width, shape (outputs,).
+
+    Args:
+        domain: Inputs and levels.
+        signs: Signs of the effects, 0 for none, shape (outputs, inputs).
+    """
     lower, upper = domain.boxes
     return np.asarray(((signs != 0) | (lower[0] == upper[0])).all(axis=1))
 
 
 def require_budget(samples: float, campaign: Campaign, method: str) -> None:
     """Refuse a design that needs more evaluations than the budget, before any is made."""
-    cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
-    cure += " fewer levels, state signs (Knowledge) for Signed, or take Automatic"
-    remaining, allowed = f"{campaign.remaining:,} evaluations", f"{samples:,.0f} or more"
-    require(samples <= campaign.remaining, "budget", value=remaining, allowed=allowed, cure=cure)
+    if samples > campaign.remaining:
+        raise RefusedError(
+            "budget",
+            f"{campaign.remaining:,} evaluations",
+            f"{samples:,.0f} or more",
+            f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
+            " fewer levels, state signs (Knowledge) for Signed, or take Automatic",
+        )
 
 
 @dataclass(frozen=True)
@@ -109,11 +121,17 @@ class General:
     takes_inner_points: ClassVar[bool] = True
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Bounds by all combinations of points, guaranteed where corners are known to suffice."""
+        """Return bounds by all combinations of points, guaranteed where corners suffice.
+
+        Raises:
+            RefusedError: The budget does not carry the points, or a sample contradicts the
+                knowledge.
+        """
         grids = level_grids(domain, inner=self.takes_inner_points)
-        require_budget(sum(prod(map(len, grid)) for grid in grids), campaign, self.name)
-        points = np.array([point for grid in grids for point in product(*grid)])
-        bounds = bounds_at(campaign, domain, points, self.name)
+        count = sum(prod(len(points) for points in grid) for grid in grids)
+        require_budget(count, campaign, self.name)
+        points = [point for grid in grids for point in product(*grid)]
+        bounds = bounds_at(campaign, domain, np.array(points), self.name)
         signs = campaign.knowledge.stated_signs(domain.names, bounds.outputs)
         return guaranteed_bounds(bounds, campaign, corners_suffice(domain, signs))
 
@@ -128,10 +146,11 @@ class Reduced(General):
 
 @dataclass(frozen=True)
 class Signed:
-    """Two corners per level where all effects have a sign, else the general method's points.
+    """Monotonicity-based plan: two corners per level where all effects have a sign.
 
-    Signs are stated by the caller (`Knowledge.signs`) or seen at probes. Where all are stated, the
-    bounds are guaranteed, else attained.
+    Inputs without a sign take all points of the general method. Signs are stated by the caller
+    (`Knowledge.signs`) or seen at probes. Where all are stated, the bounds are guaranteed, else
+    attained.
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named. The others are as the samples
@@ -150,20 +169,26 @@ class Signed:
     name = "signed"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Bounds by the corners that the signs name, guaranteed where all signs are stated."""
-        columns = campaign.output_names(domain)
+        """Return bounds by the corners that the signs name, guaranteed where all are stated.
+
+        Raises:
+            RefusedError: There is no such output, the budget does not carry the points, or a sample
+                contradicts the knowledge.
+        """
+        all_outputs = campaign.output_names(domain)
         for name in self.outputs:
-            require_choice("output", name, columns)
-        outputs = self.outputs or columns
+            require_choice("output", name, all_outputs)
+        outputs = self.outputs or all_outputs
         signs = find_effects(campaign, domain, outputs)
         grids = level_grids(domain, inner=True)
         require_budget(_sample_count(signs, grids), campaign, self.name)
-        levels = zip(signs, grids, strict=True)
-        points = [_level_points(np.unique(x, axis=0), grid) for x, grid in levels]
+        points = [_level_points(signs[level], grid) for level, grid in enumerate(grids)]
         at_corners = bounds_at(campaign, domain, np.concatenate(points), self.name)
         stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs)
         proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, outputs)
         guaranteed = guaranteed_bounds(at_corners, campaign, proved)
+        # The samples that found and tested the signs may attain more than the corners, of the
+        # outputs that are not proved.
         bounds = bounds_of_samples(domain, campaign.samples, self.name)
         return replace(
             bounds,
@@ -175,103 +200,175 @@ class Signed:
         )
 
 
-def _sample_count(signs: Signs, grids: list[list[list[float]]]) -> float:
-    """Number of samples of the signed plan, a float: there may be too many to list."""
+def _sample_count(signs: Signs, grids: list[Grid]) -> float:
+    """Return the number of samples of the monotonicity-based plan, for `signs` of `find_effects`.
+
+    It is a float, since there may be too many to list.
+    """
     total = 0.0
     for level_signs, grid in zip(signs, grids, strict=True):
         counts = np.array([len(points) for points in grid], float)
-        patterns = np.unique(level_signs == 0, axis=0)
-        total += 2 * np.where(patterns, counts, 1.0).prod(axis=1).sum()
+        has_no_sign = np.unique(level_signs == 0, axis=0)
+        total += 2 * np.where(has_no_sign, counts, 1.0).prod(axis=1).sum()
     return total
 
 
-def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
-    """Return the points of the signed plan on one level, shape (n, inputs)."""
-    # a row of signs names two opposite corners; inputs without a sign take all their points
+def _level_points(signs: Signs, grid: Grid) -> Array:
+    """Return the points of the monotonicity-based plan on one level, shape (n, inputs).
+
+    The signs of an output name two opposite corners. Inputs without a sign take all their points.
+
+    Args:
+        signs: Signs of the effects on each output, shape (outputs, inputs).
+        grid: Points of each input, from the lower to the upper end of its cut.
+    """
+    distinct = np.unique(signs, axis=0)
     rows: list[tuple[float, ...]] = []
-    for pattern in np.concatenate([signs, -signs]):
-        pairs = zip(pattern, grid, strict=True)
-        rows += product(*(x if sign == 0 else [x[0 if sign > 0 else -1]] for sign, x in pairs))
+    for pattern in np.concatenate([distinct, -distinct]):
+        choices = []
+        for sign, points in zip(pattern, grid, strict=True):
+            by_sign = {0: points, 1: points[:1], -1: points[-1:]}
+            choices.append(by_sign[int(sign)])
+        rows += product(*choices)
     return np.array(rows)
 
 
 def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[str, ...]:
     """Return a sentence for each effect of unknown sign, with the highest such level.
 
-    `signs` are of shape (levels, outputs, inputs), as of `find_effects`.
+    Args:
+        domain: Inputs and levels.
+        outputs: Names of the outputs.
+        signs: Signs as of `find_effects`, shape (levels, outputs, inputs).
     """
-    return tuple(
-        f"output {output} is not monotone in input {name}, or not surely, up to α ="
-        f" {domain.alpha[np.flatnonzero(by_level == 0)[-1]]:g}"
-        for row, output in enumerate(outputs)
-        for name, by_level in zip(domain.names, signs[:, row].T, strict=True)
-        if (by_level == 0).any()
-    )
+    notes = []
+    for row, output in enumerate(outputs):
+        for column, name in enumerate(domain.names):
+            unknown_levels = np.flatnonzero(signs[:, row, column] == 0)
+            if len(unknown_levels):
+                alpha = domain.alpha[unknown_levels[-1]]
+                notes.append(
+                    f"output {output} is not monotone in input {name}, or not surely, up to α ="
+                    f" {alpha:g}"
+                )
+    return tuple(notes)
 
 
 def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> Signs:
-    """Return the sign of each input's effect on each output, shape (levels, outputs, inputs).
-
-    It is +1, −1, or 0 where neither holds; an input without width has +1.
+    """Return the sign of each input's effect on each output, and test the stated ones.
 
     Stated signs are tested at pairs of points; the others are observed at probes, from the widest
     box to the narrowest. A sign holds on all narrower boxes.
+
+    Args:
+        campaign: Evaluates the model; its knowledge states signs.
+        domain: Inputs and levels.
+        outputs: Names of the outputs.
+
+    Returns:
+        Signs of shape (levels, outputs, inputs): +1 where the output rises, −1 where it falls, 0
+        where neither is known; +1 for an input without width.
     """
     signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
-    # pairs with an input at either end, the others at nominal values or at an extreme corner
+
+    # Evaluate pairs of points at which a stated input is at either end, and the others at their
+    # nominal values or at an extreme corner. `contradiction` compares them later.
     corners = _extreme_corners(signs, lowers[0], uppers[0])
-    points = np.repeat(np.concatenate([domain.nominal[None], corners]), 2, axis=0)
+    points = np.concatenate([domain.nominal[None], corners])
     for column in np.flatnonzero(signs.any(axis=0)):
-        pairs = points.copy()
-        pairs[::2, column], pairs[1::2, column] = lowers[0, column], uppers[0, column]
-        campaign(np.unique(pairs, axis=0))
+        at_lower = points.copy()
+        at_upper = points.copy()
+        at_lower[:, column] = lowers[0, column]
+        at_upper[:, column] = uppers[0, column]
+        campaign(np.unique(np.concatenate([at_lower, at_upper]), axis=0))
 
     def model(points: Array) -> Array:
-        """The outputs at points (n, inputs), shape (n, outputs)."""
+        """Return the outputs at points (n, inputs), shape (n, outputs)."""
         values = campaign(points)
         return values.array[:, [values.column(name) for name in outputs]]
 
     levels = []
-    for row in range(len(lowers)):
-        box = lowers[row], uppers[row]
-        signs = np.where(box[1] == box[0], np.int8(1), signs)
+    for level in range(len(lowers)):
+        lower: Array = lowers[level]
+        upper: Array = uppers[level]
+        signs = np.where(upper == lower, np.int8(1), signs)
         if (signs == 0).any():
-            signs = np.where(signs == 0, _observed_signs(model, box, domain.nominal, signs), signs)
+            observed = _observed_signs(model, lower, upper, nominal=domain.nominal, stated=signs)
+            signs = np.where(signs == 0, observed, signs)
         levels.append(signs)
     return np.array(levels)
 
 
 def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
-    """Return the corners of least and greatest output for each distinct row of signs."""
+    """Return the corners of a box at which outputs have their minima, and then their maxima.
+
+    Args:
+        signs: Signs of the effects, shape (outputs, inputs); 0 counts as 1.
+        lower: Lower ends of the box, shape (inputs,).
+        upper: Upper ends.
+
+    Returns:
+        Corners of shape (2 n, inputs) for n distinct rows of signs.
+    """
     rises = np.unique(signs >= 0, axis=0)
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
 
-def _observed_signs(model: Model, box: tuple[Array, Array], nominal: Array, stated: Signs) -> Signs:
-    """Return the sign of the slopes at all probes of a box, (outputs, inputs), 0 where unsure."""
-    # unsure: slopes differ in sign, or the smallest is below 5 % of their range; 1 for an input
-    # without any effect; only inputs without a sign in `stated` are probed
-    lower, upper = box
+def _observed_signs(
+    model: Model, lower: Array, upper: Array, *, nominal: Array, stated: Signs
+) -> Signs:
+    """Return the sign that the slopes at all probes of a box have.
+
+    The probes are the nominal point, the extreme corners by the slopes there, and four points
+    inside. A sign is unsure where slopes differ in sign, or the smallest is below 5 % of their
+    range over the probes.
+
+    Args:
+        model: Outputs at points.
+        lower: Lower ends of the box, shape (inputs,).
+        upper: Upper ends.
+        nominal: Nominal point, shape (inputs,).
+        stated: Signs that are known, shape (outputs, inputs). Only inputs with a 0 are probed.
+
+    Returns:
+        Signs of shape (outputs, inputs): 0 where unsure, and 1 for an input without any effect.
+    """
     free = np.flatnonzero((stated == 0).any(axis=0))
-    first = np.nan_to_num(np.sign(_slopes(model, box, nominal[None], free)[0])).astype(np.int8)
+    nominal_slopes = _slopes(model, lower, upper, points=nominal[None], inputs=free)[0]
+    first = np.nan_to_num(np.sign(nominal_slopes)).astype(np.int8)
     corners = _extreme_corners(np.where(stated != 0, stated, first), lower, upper)
-    inside = lower + quasi_random_points(len(lower), _PROBES) * (upper - lower)
-    slopes = _slopes(model, box, np.concatenate([nominal[None], corners, inside]), free)
-    smallest, largest = slopes.min(axis=0), slopes.max(axis=0)
-    margin = _MARGIN * (largest - smallest)
+    inside = lower + quasi_random_points(len(lower), 4) * (upper - lower)
+    probes = np.concatenate([nominal[None], corners, inside])
+    slopes = _slopes(model, lower, upper, points=probes, inputs=free)
+    smallest = slopes.min(axis=0)
+    largest = slopes.max(axis=0)
+    margin = 0.05 * (largest - smallest)
     rises = (smallest > 0) & (smallest >= margin)
     falls = (largest < 0) & (-largest >= margin)
     has_no_effect = (smallest == 0) & (largest == 0)  # either end will do
     return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
 
 
-def _slopes(model: Model, box: tuple[Array, Array], points: Array, inputs: Ints) -> Array:
-    """Return one-sided differences by some inputs inside a box, (n, outputs, inputs)."""
-    (lower, upper), values = box, model(points)
+def _slopes(model: Model, lower: Array, upper: Array, *, points: Array, inputs: Ints) -> Array:
+    """Return one-sided difference quotients by some inputs inside a box.
+
+    Steps are 1e-3 of the width of the box, and go to its inside.
+
+    Args:
+        model: Outputs at points.
+        lower: Lower ends of the box, shape (inputs,).
+        upper: Upper ends.
+        points: Points of the box, shape (n, inputs).
+        inputs: Columns of the inputs that are changed.
+
+    Returns:
+        Slopes of shape (n, outputs, inputs), 0 for the other inputs.
+    """
+    values = model(points)
     slopes = np.zeros((*values.shape, points.shape[1]))
     for column in inputs:
-        step = _STEP * (upper[column] - lower[column])
+        step = 1e-3 * (upper[column] - lower[column])
         steps = np.where(points[:, column] + step > upper[column], -step, step)
         stepped = points.copy()
         stepped[:, column] += steps
