@@ -600,7 +600,7 @@ def _cuts_of_losses(
         column = f"[{level}][{constant}]"
         lower[constant, level] = bounds.bounds(f"loss_lower{column}").lower[level]
         upper[constant, level] = bounds.bounds(f"loss_upper{column}").upper[level]
-    cuts = {name: Ends(low, high) for name, low, high in zip(CONSTANTS, lower, upper, strict=True)}
+    cuts = {name: Ends(lower[k], upper[k]) for k, name in enumerate(CONSTANTS)}
     error: dict[str, float] = {}
     assert bounds.samples is not None
     if reference is not None:

@@ -135,4 +135,4 @@ def test_peaks_pass_through_json_with_their_infinite_bounds():
     # of a least value unknown bounds lie on the other side
     assert (again["min q1"].lower[0], again["min q1"].upper[0]) == (-np.inf, -2.0)
     assert again["min q1"].reached[0] == np.inf
-    assert again["min q1"].outwards.greatest_bounds == again["max q1"].greatest_bounds
+    assert again["min q1"].outwards.max_peak_bounds == again["max q1"].max_peak_bounds
