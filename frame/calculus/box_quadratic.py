@@ -58,8 +58,10 @@ def local_maximum(
     if start is None:
         start = np.zeros(g.shape)
     x = np.array(start, float, order="C")
-    gradients, hessians = np.ascontiguousarray(g, float), np.ascontiguousarray(H, float)
-    lower_ends, upper_ends = np.ascontiguousarray(lower, float), np.ascontiguousarray(upper, float)
+    gradients = np.ascontiguousarray(g, float)
+    hessians = np.ascontiguousarray(H, float)
+    lower_ends = np.ascontiguousarray(lower, float)
+    upper_ends = np.ascontiguousarray(upper, float)
     _ascend(gradients, hessians, lower_ends, upper_ends, x, rounds)
     return x
 
@@ -72,7 +74,9 @@ def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: in
         for _ in range(rounds):
             before = value
             for i in range(x.shape[1]):
-                low, high, curvature = lower[n, i], upper[n, i], H[n, i, i]
+                low = lower[n, i]
+                high = upper[n, i]
+                curvature = H[n, i, i]
                 # along x_i the quadratic is slope x_i + curvature x_i²/2, and `rise` is its value
                 # at the upper end less that at the lower end
                 slope = _slope(g[n], H[n], x[n], i) - curvature * x[n, i]
@@ -112,8 +116,11 @@ def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> fl
     full length, in half and in a quarter, each clipped to the box; x moves, in place, to the best
     of these points that gains.
     """
-    d, best, start = len(x), _value(g, H, x), x.copy()
-    free, step = H.copy(), np.empty((len(x), 1))
+    d = len(x)
+    best = _value(g, H, x)
+    start = x.copy()
+    free = H.copy()
+    step = np.empty((len(x), 1))
     for i in range(d):
         slope = _slope(g, H, x, i)
         step[i, 0] = -slope
@@ -144,7 +151,9 @@ def solve_in_place(matrix: Array, b: Array) -> None:
         matrix: A, not singular, shape (n, n); it is not changed.
         b: Right-hand sides as columns, shape (n, m).
     """
-    n, m, A = len(matrix), b.shape[1], matrix.copy()
+    n = len(matrix)
+    m = b.shape[1]
+    A = matrix.copy()
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -183,14 +192,16 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     Returns:
         Shape (N, d). Where no point has a positive value it is x = 0.
     """
-    d, problems = g.shape[1], np.arange(len(g))
+    d = g.shape[1]
+    problems = np.arange(len(g))
     if d > 6:
         corners = np.where(g > 0, upper, lower)
         from_zero = local_maximum(g, H, lower, upper, np.zeros_like(g))
         from_corner = local_maximum(g, H, lower, upper, corners)
         optima = np.stack([from_zero, from_corner], 1)
         return np.asarray(optima[problems, gain(g, H, optima).argmax(1)])
-    best, best_gain = np.zeros_like(g, order="C"), np.zeros(len(g))
+    best = np.zeros_like(g, order="C")
+    best_gain = np.zeros(len(g))
     for size in range(d + 1):
         for free in combinations(range(d), size):
             points = _face_points(g, H, lower, upper, free)

@@ -38,7 +38,8 @@ class Jet:
     @classmethod
     def constant(cls, value: ArrayLike, directions: int) -> Jet:
         """Return a constant, of shape V, whose derivatives by `directions` parameters are zero."""
-        array, d = np.asarray(value, float), directions
+        array = np.asarray(value, float)
+        d = directions
         terms = np.zeros((1 + d + d * (d + 1) // 2, *array.shape))
         terms[0] = array
         return cls(terms, d)
@@ -149,7 +150,9 @@ class Jet:
         """Return a real power, with derivatives by the chain rule."""
         if exponent == 2:
             return self * self
-        x, k, d = self.value, exponent, self.directions
+        x = self.value
+        k = exponent
+        d = self.directions
         pairs = _pairs(d)
         # (x^k)_i = k x^(k−1) x_i and (x^k)_ij = k x^(k−1) x_ij + k (k − 1) x^(k−2) x_i x_j
         terms = k * x ** (k - 1) * self.terms
@@ -234,7 +237,8 @@ def inverse(a: Jet) -> Jet:
 
     They are X_i = −X A_i X and X_ij = −X A_ij X − X A_i X_j − X A_j X_i.
     """
-    x, d = np.linalg.inv(a.value), a.directions
+    x = np.linalg.inv(a.value)
+    d = a.directions
     pairs = _pairs(d)
     scaled = x @ a.terms[1:]  # X A_i, then X A_ij
     terms = np.concatenate([x[None], -scaled @ x])

@@ -66,8 +66,10 @@ def product_places(d: int, m: int, q: int) -> Ints:
 
     The shape is (monomials of degree m, monomials of degree q).
     """
-    a, b = monomials(d, m), monomials(d, q)
-    first_factors, second_factors = np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))
+    a = monomials(d, m)
+    b = monomials(d, q)
+    first_factors = np.repeat(a, len(b), axis=0)
+    second_factors = np.tile(b, (len(a), 1))
     products = np.sort(np.concatenate([first_factors, second_factors], axis=1), axis=1)
     return places(products, d).reshape(len(a), len(b))
 
@@ -96,15 +98,18 @@ def monomial_values(u: Array, degree: int) -> Array:
     Returns:
         Shape (S, terms): the constant 1, then the monomials of degree 1, and so on.
     """
-    d, coordinates = u.shape[1], np.ascontiguousarray(u.T)
+    d = u.shape[1]
+    coordinates = np.ascontiguousarray(u.T)
     values: Array = np.ones((comb(d + degree, degree), len(u)))
-    first_of_lower_degree, begin = 0, 1
+    first_of_lower_degree = 0
+    begin = 1
     for m in range(1, degree + 1):
         variable, other_factors = _last_factors(d, m)
         end = begin + len(variable)
         lower = values[first_of_lower_degree + other_factors]
         values[begin:end] = lower * coordinates[variable]
-        first_of_lower_degree, begin = begin, end
+        first_of_lower_degree = begin
+        begin = end
     return values.T
 
 

@@ -263,7 +263,8 @@ class TaylorModel:
             low: Lower ends of the sub-box, shape (d,), not below −1.
             high: Upper ends, not above 1.
         """
-        midpoint, radius = (low + high) / 2, (high - low) / 2
+        midpoint = (low + high) / 2
+        radius = (high - low) / 2
         # Taylor's formula: p(midpoint + v) = Σ_k (midpoint·∇)^k p(v) / k!, of which the k-th term
         # turns a part of degree m into one of degree m − k
         shifted = [np.zeros_like(part) for part in self.parts]
@@ -361,15 +362,19 @@ class TaylorModel:
         Raises:
             UnprovedError: A function is not known to be positive on the box.
         """
-        centre, deviation, N = self.value, self.deviation(), self.order
+        centre = self.value
+        deviation = self.deviation()
+        N = self.order
         lower_bound = centre - deviation
         if not (lower_bound > 0).all():
             raise UnprovedError(
                 "a quantity that must be positive is not known to be so over the box",
                 "take narrower inputs",
             )
-        step, binomial = self - centre, 1.0
-        series, step_power = self.like(centre**exponent), self.like(np.ones_like(centre))
+        step = self - centre
+        binomial = 1.0
+        series = self.like(centre**exponent)
+        step_power = self.like(np.ones_like(centre))
         rounding = gamma(4) * centre**exponent
         for k in range(1, N + 1):
             binomial = binomial * (exponent - k + 1) / k
@@ -445,7 +450,8 @@ def all_on_subbox(models: Sequence[TaylorModel], low: Array, high: Array) -> lis
     All models are moved at once as one array of functions, which is faster than one by one.
     """
     joined = concatenate([model.reshaped(-1) for model in models], axis=-1).on_subbox(low, high)
-    moved, first = list[TaylorModel](), 0
+    moved = list[TaylorModel]()
+    first = 0
     for model in models:
         last = first + model.remainder.size
         moved.append(replace(joined[first:last].reshaped(*model.shape), order=model.order))
@@ -519,7 +525,8 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
         UnprovedError: A may be singular somewhere in the box.
     """
     midpoint_inverse: Any = np.linalg.inv(matrix.value)
-    matrix, right = midpoint_inverse @ matrix, midpoint_inverse @ right
+    matrix = midpoint_inverse @ matrix
+    right = midpoint_inverse @ right
     solution = solution_series(matrix, right)
     bound = inverse_bound(matrix)
     if bound is None:
@@ -565,7 +572,8 @@ def _product(
     """
     order = max(a.order, b.order)
     ndim = max(a.remainder.ndim, b.remainder.ndim)
-    a_magnitudes, b_magnitudes = a.part_magnitudes(), b.part_magnitudes()
+    a_magnitudes = a.part_magnitudes()
+    b_magnitudes = b.part_magnitudes()
     # |f g − p q| ≤ |f − p| |g| + |p| |g − q|
     remainder = bilinear(a.remainder, np.asarray(sum(b_magnitudes)) + b.remainder)
     remainder = remainder + bilinear(np.asarray(sum(a_magnitudes)), b.remainder)
@@ -579,7 +587,8 @@ def _product(
         for j, y in enumerate(b.parts):
             omitted_fraction = 1.0  # of the product of two parts, by the polynomial
             if i + j <= order:
-                x_padded, y_padded = _padded(x, ndim), _padded(y, ndim)
+                x_padded = _padded(x, ndim)
+                y_padded = _padded(y, ndim)
                 parts[i + j] += convolve(x_padded, y_padded, (i, j), a.inputs, bilinear)
                 # a monomial of degree i + j splits in at most binomial(i + j, i) ways into factors
                 # of degree i and j, whose products are summed, and i + j + 1 such parts are added

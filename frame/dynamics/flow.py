@@ -214,7 +214,8 @@ class LinearFlow(Flow):
     def __post_init__(self) -> None:
         """Check the arguments; columns that yield are refused too, since they are not linear."""
         super().__post_init__()
-        value, allowed = "of columns that yield", "make_flow, which takes them"
+        value = "of columns that yield"
+        allowed = "make_flow, which takes them"
         is_linear = self.system.dynamics is Dynamics.LINEAR
         require(is_linear, "flow", value=value, allowed=allowed)
 
@@ -250,13 +251,16 @@ class LinearFlow(Flow):
         n = matrices.mass.value.shape[-1]
         all_states = rows.like(np.eye(2 * n)[None])
         states = trajectory(self._step_map(matrices), matrices.start, all_states).value[0]
-        energy, squared_size = np.zeros(len(self.time)), np.zeros(len(self.outputs))
-        displacements, velocities = slice(0, n), slice(n, 2 * n)
+        energy = np.zeros(len(self.time))
+        squared_size = np.zeros(len(self.outputs))
+        displacements = slice(0, n)
+        velocities = slice(n, 2 * n)
         for half, matrix in (
             (displacements, matrices.stiffness.value[0]),
             (velocities, matrices.mass.value[0]),
         ):
-            x, row = states[:, half], rows.value[0, :, half]
+            x = states[:, half]
+            row = rows.value[0, :, half]
             energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
             inverse = np.linalg.pinv(matrix, hermitian=True)
             squared_size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
@@ -335,14 +339,19 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
     Returns:
         Shape (S, steps + 1, m).
     """
-    loads, power = step_map.loads, step_map.transfer
-    nodes, samples, m = len(loads) + 1, len(start.value), rows.value.shape[-2]
+    loads = step_map.loads
+    power = step_map.transfer
+    nodes = len(loads) + 1
+    samples = len(start.value)
+    m = rows.value.shape[-2]
 
     # C T^j for the nodes j of a block, by doubling: shape (S, size m, N)
-    observed, size = rows, 1
+    observed = rows
+    size = 1
     while 2 * size**2 < nodes:
         observed = concatenate([observed, observed @ power], -2)
-        power, size = power @ power, 2 * size
+        power = power @ power
+        size = 2 * size
     blocks = -(-nodes // size)
 
     # what the loads of a block add to its outputs, and to the state at the next block's first node
@@ -364,7 +373,8 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
         carried = power @ first_states[..., :-shift]
         later = first_states[..., shift:] + carried
         first_states = concatenate([first_states[..., :shift], later], -1)
-        power, shift = power @ power, 2 * shift
+        power = power @ power
+        shift = 2 * shift
 
     outputs = observed @ first_states  # (…, S, size m, blocks)
     if from_rest:

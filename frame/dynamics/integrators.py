@@ -63,8 +63,10 @@ class Midpoint:
             step: Length h of a step, in s.
             count: Number of steps.
         """
-        m, h = matrices, step
-        inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
+        m = matrices
+        h = step
+        inertia = m.mass * (1 / h) + m.damping * 0.5
+        spring = m.stiffness * (h / 4)
         implicit_inverse = inverse(inertia + spring)
         # q[k+1] = q_by_q q[k] + q_by_v v[k] + q_by_load load[k]
         # v[k+1] = 2 (q[k+1] − q[k])/h − v[k]
@@ -103,8 +105,11 @@ class Exact:
         """
         # In a substep |λ| h ≤ 2 for all eigenvalues, up to which 26 terms of the exponential are
         # enough: the next one is 2^26/26! = 2e-19.
-        largest_phase, terms, most_substeps = 2.0, 26, 4096
-        A, substeps = state_matrix(matrices), 1
+        largest_phase = 2.0
+        terms = 26
+        most_substeps = 4096
+        A = state_matrix(matrices)
+        substeps = 1
         if loads:
             fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
             fastest = max(fastest, *(load.frequency for load in loads), 1e-300)
@@ -198,7 +203,8 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
     home = np.concatenate([np.arange(count), np.floor(samples[is_inner] / step).astype(int)])
     start = np.concatenate([np.zeros(count), samples[is_inner] - home[count:] * step])
     in_time = np.lexsort((start, home))
-    home, start = home[in_time], start[in_time]
+    home = home[in_time]
+    start = start[in_time]
     end = np.append(start[1:], 0.0)
     is_last_of_step = np.append(np.diff(home) > 0, True)
     end[is_last_of_step] = step

@@ -47,7 +47,8 @@ def modal_trajectory(
     # of each conjugate pair the first one is kept, with weight 2; real modes have weight 1
     weight = 1.0 + np.sign(modes.rate.value.imag)
     kept = int((weight > 0).sum(1).max())
-    rate, weight = modes.rate[:, :kept], weight[:, :kept]
+    rate = modes.rate[:, :kept]
+    weight = weight[:, :kept]
     at_outputs = (rows @ modes.shapes)[..., :kept]
     of_columns = (modes.adjoint @ columns)[:, :kept]
 
@@ -90,7 +91,8 @@ def _factors_of_waves(a: Jet, rate: Jet) -> list[Array]:
         Factors of the values, of first and of second derivatives, shapes (S, m, 3 modes),
         (d, S, m, 3 modes) and (d, d, S, m, 3 modes): of ρ for all modes, of ρ′, then of ρ″.
     """
-    slope, zero = rate.first, 0.0 * a.value
+    slope = rate.first
+    zero = 0.0 * a.value
     of_value = a.value, zero, zero
     of_first = a.first, a.value * slope, 0.0 * a.first
     cross = a.first[:, None] * slope
@@ -118,7 +120,8 @@ def _complex_modes(A: Jet) -> _ComplexModes | None:
     """
     # Below a relative distance of 1e-4 the second derivatives of modes lose more than eight digits.
     # Double eigenvalues at zero split by the root of the rounding, 1e-7 of the largest one.
-    relative_distance, of_largest = 1e-4, 1e-7
+    relative_distance = 1e-4
+    of_largest = 1e-7
     values, vectors = np.linalg.eig(A.value)
     order = np.argsort(-values.imag, axis=-1, kind="stable")
     values = np.take_along_axis(values, order, -1)
@@ -135,7 +138,8 @@ def _complex_modes(A: Jet) -> _ComplexModes | None:
     # λ_ij = diag C_ij and V_ij = V (C_ij / gaps) off the diagonal.
     inverse_gaps = np.where(is_diagonal, 0.0, 1 / np.where(is_diagonal, 1.0, gaps))
     W = np.linalg.inv(V)
-    B, C = W @ A.first @ V, W @ A.second @ V
+    B = W @ A.first @ V
+    C = W @ A.second @ V
     rate_first = np.diagonal(B, axis1=-2, axis2=-1)
     U = B * inverse_gaps
     cross = B[:, None] @ U - U * rate_first[:, None, :, None, :]
@@ -258,8 +262,10 @@ def _march_modes(
         out: Shape (S, T, m).
     """
     samples, n_nodes, m = out.shape
-    n, n_loads = sigma.shape[1], moved.shape[2]
-    integrals, factor = np.empty(4, np.complex128), np.empty(n, np.complex128)
+    n = sigma.shape[1]
+    n_loads = moved.shape[2]
+    integrals = np.empty(4, np.complex128)
+    factor = np.empty(n, np.complex128)
     by_end, by_slope = np.empty((2, n_loads, n), np.complex128)
     for s in range(samples):
         for k in range(n):
@@ -268,7 +274,8 @@ def _march_modes(
             for load in range(n_loads):
                 by_end[load, k] = moved[s, k, load] * integrals[0]
                 by_slope[load, k] = -moved[s, k, load] * integrals[1]
-        real, imaginary = start[s].real.copy(), start[s].imag.copy()
+        real = start[s].real.copy()
+        imaginary = start[s].imag.copy()
         for node in range(n_nodes):
             for i in range((node - 1) * intervals if node else 0, node * intervals):
                 for k in range(n):
@@ -276,7 +283,8 @@ def _march_modes(
                     real[k] = factor[k].real * before - factor[k].imag * imaginary[k]
                     imaginary[k] = factor[k].real * imaginary[k] + factor[k].imag * before
                 for load in range(n_loads):
-                    a, slope = ends[i, load], slopes[i, load]
+                    a = ends[i, load]
+                    slope = slopes[i, load]
                     for k in range(n):
                         real[k] += a * by_end[load, k].real + slope * by_slope[load, k].real
                         imaginary[k] += a * by_end[load, k].imag + slope * by_slope[load, k].imag

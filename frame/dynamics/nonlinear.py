@@ -120,7 +120,8 @@ class LagrangianFlow(Flow):
         """Equations of a step, of the outputs and of the initial state."""
         import sympy
 
-        eq, n = self.system.symbols, self.system.coordinates
+        eq = self.system.symbols
+        n = self.system.coordinates
 
         def column(name: str) -> Any:
             """Return n symbols as a column."""
@@ -128,14 +129,17 @@ class LagrangianFlow(Flow):
 
         fuzzy = [eq.p[name] for name in self.names]
         constants = [x for name, x in eq.p.items() if name not in self.names]
-        new, old, momenta = column("new"), column("old"), column("pi")
+        new = column("new")
+        old = column("old")
+        momenta = column("pi")
         h = sympy.Symbol("h", positive=True)
         coordinates_and_velocities = list(eq.q) + list(eq.v)
         # The discrete Lagrangian takes L and the force F at the mean of q[k] and q[k+1]:
         # π[k] = L_v − h/2 (L_q + F) and π[k+1] = L_v + h/2 (L_q + F)
         mean_state = list((old + new) / 2) + list((new - old) / h)
         at_mean = dict(zip(coordinates_and_velocities, mean_state, strict=True))
-        momentum, impulse = eq.momentum.subs(at_mean), h / 2 * eq.push.subs(at_mean)
+        momentum = eq.momentum.subs(at_mean)
+        impulse = h / 2 * eq.push.subs(at_mean)
         q0, v0 = self.system.start()
         at_start = dict(zip(coordinates_and_velocities, list(q0) + list(v0), strict=True))
         velocity = eq.velocity(momenta)
@@ -153,8 +157,10 @@ class LagrangianFlow(Flow):
     @cached_property
     def _newton(self) -> Tape:
         """Tape of the momenta before a step and their derivatives by the coordinates after it."""
-        momenta, n = self._expressions.momenta, self.system.coordinates
-        before, new_coordinates = momenta.components[:n], momenta.active[:n]
+        momenta = self._expressions.momenta
+        n = self.system.coordinates
+        before = momenta.components[:n]
+        new_coordinates = momenta.active[:n]
         slopes = [momentum.diff(x) for momentum in before for x in new_coordinates]
         return tape(before + slopes, momenta.active, momenta.constants)
 
@@ -169,16 +175,21 @@ class LagrangianFlow(Flow):
         return [with_derivatives(*expressions) for expressions in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        d, tapes = 0, self._plain
+        d = 0
+        tapes = self._plain
         if derivatives:
-            d, tapes = len(self.names), self._deep
+            d = len(self.names)
+            tapes = self._deep
         constants = [x for name, x in self.system.parameters.items() if name not in self.names]
         inputs = np.hstack([points, np.tile(constants, (len(points), 1))])
         inputs = np.ascontiguousarray(inputs, float)
         shape = (len(points), len(self.time), len(self.outputs))
-        values, first, second = np.empty(shape), np.empty((*shape, d)), np.empty((*shape, d, d))
+        values = np.empty(shape)
+        first = np.empty((*shape, d))
+        second = np.empty((*shape, d, d))
         momenta, outputs, initial = tapes
-        n, h = self.system.coordinates, self.step
+        n = self.system.coordinates
+        h = self.step
         is_whole = _march(
             self._newton, momenta, outputs, initial, n, inputs, h, values, first, second
         )
@@ -216,12 +227,16 @@ def _march(
         out1: Receives their first derivatives, shape (S, T, m, d); d may be 0.
         out2: Receives their second derivatives, shape (S, T, m, d, d).
     """
-    size, d, m = 2 * n, out1.shape[3], out.shape[2]
+    size = 2 * n
+    d = out1.shape[3]
+    m = out.shape[2]
     a = size + d
-    flat, arguments = np.empty(m + (m * a + m * a * a if d else 0)), np.empty(size + len(inputs[0]))
+    flat = np.empty(m + (m * a + m * a * a if d else 0))
+    arguments = np.empty(size + len(inputs[0]))
     start = np.empty(size * (1 + d + d * d))
     # derivatives by the inputs of the state and of the inputs themselves
-    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
+    inner1 = np.zeros((a, d))
+    inner2 = np.zeros((a, d, d))
     for i in range(d):
         inner1[size + i, i] = 1.0
     for s in range(len(inputs)):
@@ -262,9 +277,13 @@ def _midpoint_step(
         x1: Its first derivatives by the inputs, shape (2n, d).
         x2: Its second derivatives, shape (2n, d, d).
     """
-    d, m, n_parameters = x1.shape[1], 2 * n, len(p)
-    arguments, flat = np.empty(m + n_parameters + 1), np.empty(n + n * n)
-    residual, jacobian = np.empty((n, 1)), np.empty((n, n))
+    d = x1.shape[1]
+    m = 2 * n
+    n_parameters = len(p)
+    arguments = np.empty(m + n_parameters + 1)
+    flat = np.empty(n + n * n)
+    residual = np.empty((n, 1))
+    jacobian = np.empty((n, n))
     # the new coordinates, of which the old ones are the first guess, and the old ones
     arguments[:n] = arguments[n:m] = x[:n]
     arguments[m : m + n_parameters] = p
@@ -276,12 +295,14 @@ def _midpoint_step(
             for j in range(n):
                 jacobian[i, j] = flat[n + i * n + j]
         solve_in_place(jacobian, residual)
-        change, size = 0.0, 0.0
+        change = 0.0
+        size = 0.0
         for i in range(n):
             arguments[i] -= residual[i, 0]
             if not math.isfinite(arguments[i]):
                 return False
-            change, size = max(change, abs(residual[i, 0])), max(size, abs(arguments[i]))
+            change = max(change, abs(residual[i, 0]))
+            size = max(size, abs(arguments[i]))
         if change <= 1e-12 * (1 + size):
             break
     else:
@@ -289,7 +310,8 @@ def _midpoint_step(
     a = m + d
     flat = np.empty(m + (m * a + m * a * a if d else 0))
     _evaluate(step, arguments, flat)
-    x[:n], x[n:] = arguments[:n], flat[n:m]
+    x[:n] = arguments[:n]
+    x[n:] = flat[n:m]
     if d:
         _step_derivatives(flat, n, x1, x2)
     return True
@@ -314,9 +336,12 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     a = m + d
     J = np.empty((n, n))  # derivatives of the momenta before the step by the new coordinates
     # derivatives of the variables by the inputs
-    inner1, inner2 = np.zeros((a, d)), np.zeros((a, d, d))
-    out1, out2 = np.empty((m, d)), np.empty((m, d, d))
-    new_first, new_second = np.empty((n, d)), np.empty((n, d * d))
+    inner1 = np.zeros((a, d))
+    inner2 = np.zeros((a, d, d))
+    out1 = np.empty((m, d))
+    out2 = np.empty((m, d, d))
+    new_first = np.empty((n, d))
+    new_second = np.empty((n, d * d))
     for i in range(n):
         for j in range(n):
             J[i, j] = flat[m + i * a + j]
@@ -336,7 +361,8 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     solve_in_place(J, new_second)
     for c in range(n):  # coordinates and momenta after the step
         for i in range(d):
-            x1[c, i], x1[n + c, i] = inner1[c, i], out1[n + c, i]
+            x1[c, i] = inner1[c, i]
+            x1[n + c, i] = out1[n + c, i]
             for j in range(d):
                 x2[c, i, j] = new_second[c, i * d + j]
                 total = out2[n + c, i, j]
@@ -357,8 +383,11 @@ def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Ar
         out1: Receives the first derivatives, shape (m, d).
         out2: Receives the second derivatives, shape (m, d, d).
     """
-    m, d, a = len(out1), len(out1[0]), len(inner1)
-    hessian_row, hessian_at = np.empty(a), m + m * a
+    m = len(out1)
+    d = len(out1[0])
+    a = len(inner1)
+    hessian_row = np.empty(a)
+    hessian_at = m + m * a
     for c in range(m):
         for i in range(d):
             total = 0.0
@@ -387,7 +416,9 @@ def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
     for k in range(len(arguments)):
         slots[k] = arguments[k]
     for k in range(len(code)):
-        number, x, y = code[k, 0], slots[code[k, 1]], slots[code[k, 2]]
+        number = code[k, 0]
+        x = slots[code[k, 1]]
+        y = slots[code[k, 2]]
         if number == 0:
             value = x + y
         elif number == 1:

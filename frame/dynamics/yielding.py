@@ -54,7 +54,9 @@ Q, DRIFT, SHEAR, DUCTILITY = range(4)
 """Indices of those kinds whose peaks are found between nodes, too."""
 AT_NODES = ("v", "a", "residual", MOMENT)
 """Kinds whose peaks are sought at nodes alone; dissipated energy never falls."""
-RUNS, COLLAPSED, FAILED = 0, 1, 2
+RUNS = 0
+COLLAPSED = 1
+FAILED = 2
 """How a motion ends: at its last node, by collapse, or with too many events."""
 
 
@@ -114,7 +116,8 @@ class YieldingFlow(Flow):
         Returns:
             Trajectories, shape (S, T, m), and peaks, shape (S, m).
         """
-        system, points = self.system, np.asarray(points, float)
+        system = self.system
+        points = np.asarray(points, float)
         matrices, _ = evaluate(system, self.names, points, derivatives=False)
         storeys, drifts_at_yield = self._storeys(points, matrices)
         start = matrices.start.value[..., 0]
@@ -159,8 +162,11 @@ class YieldingFlow(Flow):
         system = self.system
         named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
         p = {x: Jet.constant(np.zeros(len(points)) + y, 0) for x, y in named.items()}
-        k, hardening, yield_drift = system.springs(p), system.hardenings(p), system.yield_drifts(p)
-        softening, heights = k * 0.0, k * 0.0
+        k = system.springs(p)
+        hardening = system.hardenings(p)
+        yield_drift = system.yield_drifts(p)
+        softening = k * 0.0
+        heights = k * 0.0
         if system.gravity:
             softening = system.softening(p)
         if len(system.lengths):
@@ -265,18 +271,23 @@ def _march(
         peaks: Raised to the largest magnitudes within substeps, shape (m,).
     """
     mass, k, softening, hardening, yield_drift, _, lost_damping = storeys
-    n, inverse_mass = len(mass), 1 / mass
+    n = len(mass)
+    inverse_mass = 1 / mass
     # coefficients of displacements, velocities and drifts by powers of τ
     series = np.zeros((3, n, MAX_TERMS + 1))
     load, rise, tangent, constant = np.zeros((4, n))
-    q, v = start[:n].copy(), start[n:].copy()
+    q = start[:n].copy()
+    v = start[n:].copy()
     # plastic drift, dissipated energy, and direction of yielding: ±1, or 0 of an elastic storey
     plastic, dissipated, direction = np.zeros((3, n))
     for z in range(n):  # as if the start was reached by loading in one direction
         d = _drift(q, z)
         plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
-    before, works, node = _energy(storeys, q, v, plastic), np.zeros(2), 0
-    elastic_damping, damping = damping, damping.copy()
+    before = _energy(storeys, q, v, plastic)
+    works = np.zeros(2)
+    node = 0
+    elastic_damping = damping
+    damping = damping.copy()
     for e in range(len(edges)):
         if is_node[e]:
             _observe(kinds, storeys, damping, (q, v, plastic, dissipated), values[node])
@@ -293,9 +304,11 @@ def _march(
             # net force of a storey: tangent · drift + constant
             for i in range(n):
                 if direction[i] != 0:
-                    spring, fraction = direction[i] * yield_drift[i], hardening[i]
+                    spring = direction[i] * yield_drift[i]
+                    fraction = hardening[i]
                 else:
-                    spring, fraction = -plastic[i], 1.0
+                    spring = -plastic[i]
+                    fraction = 1.0
                 constant[i] = (1 - hardening[i]) * k[i] * spring
                 tangent[i] = fraction * k[i] - softening[i]
             terms = _expand(inverse_mass, damping, tangent, constant, load, rise, h, q, v, series)
@@ -331,7 +344,8 @@ def _march(
                         damping[i - 1, i] += lost_damping[i]
             if event == MAX_EVENTS:
                 return MotionEnd(FAILED, edges[e + 1] - h, z, 0.0)
-    after, dissipation = _energy(storeys, q, v, plastic), works[1] + dissipated.sum()
+    after = _energy(storeys, q, v, plastic)
+    dissipation = works[1] + dissipated.sum()
     exchanged = abs(before) + abs(after) + abs(works[0]) + dissipation
     imbalance = 0.0
     if exchanged > 0:
@@ -360,11 +374,16 @@ def _expand(
             (3, n, MAX_TERMS + 1).
     """
     Q, V, drifts = series
-    n, scale, previous = len(q), 0.0, math.inf
+    n = len(q)
+    scale = 0.0
+    previous = math.inf
     for i in range(n):
-        Q[i, 0], V[i, 0] = q[i], v[i]
+        Q[i, 0] = q[i]
+        V[i, 0] = v[i]
     for term in range(MAX_TERMS + 1):
-        factor, size, below = h / (term + 1), 0.0, 0.0
+        factor = h / (term + 1)
+        size = 0.0
+        below = 0.0
         for i in range(n):
             drifts[i, term] = Q[i, term] - below
             below = Q[i, term]
@@ -372,7 +391,8 @@ def _expand(
         scale = max(scale, size)
         if term == MAX_TERMS or (term > 1 and max(size, previous) <= TERM_ROUNDING * scale):
             return term + 1
-        previous, above = size, 0.0
+        previous = size
+        above = 0.0
         for i in range(n - 1, -1, -1):
             column = tangent[i] * drifts[i, term]
             if term == 0:
@@ -400,10 +420,14 @@ def _first_event(
     An elastic storey yields where |drift − plastic| exceeds the yield drift; a yielding one turns
     elastic where the velocity of its drift changes its sign. Arguments are as in `_march`.
     """
-    first, storey, drifts = 1.0, -1, series[2]
+    first = 1.0
+    storey = -1
+    drifts = series[2]
     margin = np.empty(terms)  # coefficients of a polynomial that is negative after the event
     for z in range(len(plastic)):
-        elastic, variation, sign = drifts[z, 0] - plastic[z], 0.0, direction[z]
+        elastic = drifts[z, 0] - plastic[z]
+        variation = 0.0
+        sign = direction[z]
         for term in range(1, terms):
             variation += (term if sign != 0 else 1) * abs(drifts[z, term])
         # Σ |c_k| bounds the variation of a polynomial Σ c_k τ^k: mostly there is no event
@@ -426,7 +450,8 @@ def _first_event(
                 margin[0] = yield_drift[z] + rounding - side * elastic
                 at = min(at, _first_root(margin, terms, at))
         if at < first:
-            first, storey = at, z
+            first = at
+            storey = z
     return first, storey
 
 
@@ -447,17 +472,23 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
     curvature = 0.0
     for term in range(2, terms):
         curvature += term * (term - 1) * abs(polynomial[term])
-    low, width, left = 0.0, end, polynomial[0]
+    low = 0.0
+    width = end
+    left = polynomial[0]
     while low < end and left >= 0:
         width = min(width, end - low)
         right = _value(polynomial, terms, low + width)
         if min(left, right) > curvature * width**2 / 8 or (width <= RESOLUTION and right >= 0):
-            low, left, width = low + width, right, 2 * width
+            low = low + width
+            left = right
+            width = 2 * width
         elif width <= RESOLUTION or (right < 0 and right - left < -curvature * width**2 / 2):
             # Newton's method from the chord's root, with bisection where a step leaves the interval
-            high, root = low + width, low + width * left / (left - right)
+            high = low + width
+            root = low + width * left / (left - right)
             while high - low > EVENT_ROUNDING:
-                value, slope = polynomial[terms - 1], 0.0
+                value = polynomial[terms - 1]
+                slope = 0.0
                 for term in range(terms - 2, -1, -1):
                     slope = slope * root + value
                     value = value * root + polynomial[term]
@@ -486,8 +517,10 @@ def _add_works(
 
     `works` has shape (2,); h is the length of the substep, other arguments are as in `_expand`.
     """
-    n, V = len(load), series[1]
-    points, weights = at * GAUSS_NODES, at * h * GAUSS_WEIGHTS
+    n = len(load)
+    V = series[1]
+    points = at * GAUSS_NODES
+    weights = at * h * GAUSS_WEIGHTS
     velocity = np.empty((n, len(GAUSS_NODES)))
     for i in range(n):
         velocity[i] = V[i, terms - 1]
@@ -538,17 +571,24 @@ def _add_peaks(
         if kind > DUCTILITY:
             continue
         if kind == Q:
-            polynomial, x, velocity = series[0, z], q[z], v[z]
+            polynomial = series[0, z]
+            x = q[z]
+            velocity = v[z]
         else:
-            polynomial, x, velocity = series[2, z], _drift(q, z), _drift(v, z)
-        scale, shift = 1.0, 0.0
+            polynomial = series[2, z]
+            x = _drift(q, z)
+            velocity = _drift(v, z)
+        scale = 1.0
+        shift = 0.0
         if kind == DUCTILITY:
             scale = 1 / storeys[4, z]
         elif kind == SHEAR:
-            scale, shift = tangent[z] + storeys[2, z], constant[z]
+            scale = tangent[z] + storeys[2, z]
+            shift = constant[z]
         peaks[row] = max(peaks[row], abs(scale * x + shift))
         if polynomial[1] * velocity < 0:  # x turns in between
-            reach, slope = abs(scale * polynomial[0] + shift), np.empty(terms - 1)
+            reach = abs(scale * polynomial[0] + shift)
+            slope = np.empty(terms - 1)
             for term in range(1, terms):
                 slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
                 reach += abs(scale * polynomial[term])
@@ -573,8 +613,10 @@ def _observe(
     for row in range(len(kinds)):
         kind, z = kinds[row]
         mass, k, softening, hardening, yield_drift = storeys[:5, z]
-        drift, offset_force = _drift(q, z), (1 - hardening) * k * plastic[z]
-        force, moment = -_net_force(storeys, q, plastic, z), 0.0
+        drift = _drift(q, z)
+        offset_force = (1 - hardening) * k * plastic[z]
+        force = -_net_force(storeys, q, plastic, z)
+        moment = 0.0
         if z + 1 < len(q):
             force += _net_force(storeys, q, plastic, z + 1)
         for i in range(len(q)):
