@@ -64,7 +64,7 @@ class CaseLimit:
     def value_in_si(self, structure: Structure, key: str) -> float:
         """The limit in the SI unit of its output; a fraction is of the least height or weight."""
         if not self.is_relative:
-            return self.value
+            return self._value_in_unit_of_output(structure, key)
         if self.output == BASE_SHEAR:
             allowed = "a share of the weight beside [frame], or a force, as 90 kN"
             masses = structure.floor_masses
@@ -75,6 +75,25 @@ class CaseLimit:
         if height is None:
             raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")
         return self.value * height.support.lower
+
+    def _value_in_unit_of_output(self, structure: Structure, key: str) -> float:
+        """The limit in the SI unit of its output, which a structure from matrices states itself.
+
+        Raises:
+            RefusedError: The limit is in another unit, or in none.
+        """
+        is_known_before = Output(self.output).unit != "SI"
+        if is_known_before or self.output not in structure.outputs:
+            return self.value
+        unit = structure.unit(self.output)
+        if unit not in quantity.QUANTITIES:
+            return self.value
+        dimension = quantity.QUANTITIES[unit]
+        try:
+            return quantity.parse_number(re.split("[<>]=", self.text)[1].strip(), unit)
+        except ValueError as error:
+            allowed = f'{dimension.name}, as "{dimension.example}"'
+            raise RefusedError(key, self.text, allowed, str(error)) from None
 
     def by_storey(self, structure: Structure) -> tuple[CaseLimit, ...]:
         """The limits of all floors or storeys of a frame that "drift" means; else itself."""

@@ -42,7 +42,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
 
 
-def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
+def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
     try:
         number, _ = parse_fuzzy_in_any_unit(value)
     except ValueError as error:

@@ -49,6 +49,9 @@ STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 LOSS_STAND_IN = Crisp(0.02)
 """Loss factor of a material whose own is yet to be computed."""
+MAX_RATIO_OF_STOREYS = 300.0
+"""Ratio of masses, stiffnesses … of two storeys up to which no unit is doubted; k, M and G of units
+are thousands, and an isolator is some 50 times softer than a storey."""
 NEGLIGIBLE_WEIGHT = 0.1
 """Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
 
@@ -271,7 +274,12 @@ class Frame(StructureSection):
         return any(any(start.support) for start in (*self.displacements, *self.velocities))
 
     def warnings(self, structure: Structure) -> Iterator[str]:
-        """Yield a sentence for each storey on which a large weight is left out (P-Delta)."""
+        """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta)."""
+        for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
+            sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
+            if max(sizes) > MAX_RATIO_OF_STOREYS * min(sizes):
+                ratio = max(sizes) / min(sizes)
+                yield f"frame.{key} of two storeys differ {ratio:,.0f}-fold: is a unit wrong?"
         if self.gravity or self.lengths is None:
             return
         frame = cast("StoreyFrame", structure.model)

@@ -159,7 +159,7 @@ def _wrong_unit(unit: str, si: str) -> str:
         what = f'the unit "{unit}" is a unit of {own}, and no unit of {dimension.name}'
     if cure := unit_cure(unit, si, fits=fits, known=dimension.powers):
         return f"{what}; {cure}"
-    units = ", ".join(dimension.powers) or f"as in {dimension.example}"
+    units = ", ".join([*dimension.powers, *UNITS_HERE.get(si, {})]) or f"as in {dimension.example}"
     if not si:
         return f"{what}; write a number alone, or one with %"
     return f"{what}; units are {units}"

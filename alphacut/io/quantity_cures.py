@@ -8,6 +8,7 @@ from difflib import get_close_matches
 
 NUMBER_CURES = {
     r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
+    r"^[-+\d.]+\s*,\s+[-+\d.]": "several values stand in brackets, as [19, 20, 21] t",
     r"\d,\d": "write a decimal point, as 1.5; several values stand in brackets, as [1, 2]",
     r"^[-+]?[\d.]*\s*[x×*·⋅]?\s*10\s*(?:\^|\*\*|[⁻⁰-⁹])": "write a power of ten as 3e6",
     r"^\d+:\d": "write a time in one unit, as 90 s",
@@ -38,6 +39,8 @@ CONFUSED_PREFIXES = {
     "Ms": "a million seconds; did you mean ms? else write seconds",
     "mt": "a thousandth of a tonne; did you mean t? else write kg",
     "Grad": "a thousand million radians; did you mean deg?",
+    "kt": "a knot or a kilotonne; did you mean t? else write kg, as 1e6 kg",
+    "mHz": "a thousandth of a hertz; did you mean Hz? else write Hz, as 0.05 Hz",
     "Mt": "a million tonnes; did you mean t? else write kg, as 1e9 kg",
 }
 """Units that are right by their letters, but almost always a slip of m (milli) and M (mega)."""
@@ -121,6 +124,7 @@ def _spellings(unit: str) -> Iterator[str]:
     with_symbols = re.sub(r"[A-Za-zµ]+", lambda match: _usual_symbol(match[0]), bare)
     yield with_symbols
     yield re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", " ", with_symbols)
+    yield _usual_symbol(bare.replace(" ", ""))
     yield re.sub(r"\b(kg|lb)\b", r"\1f", with_symbols)
 
 

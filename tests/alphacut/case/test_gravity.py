@@ -67,3 +67,12 @@ def test_check_warns_of_a_weight_that_the_case_leaves_out(tmp_path, capfd):
     assert "storey 2" not in said
     assert main(["check", str(written(tmp_path, 'gravity = "1 g"'))]) == 0
     assert "warning" not in capfd.readouterr().out
+
+
+def test_check_warns_of_a_storey_whose_unit_seems_wrong(tmp_path, capfd):
+    path = written(tmp_path, 'gravity = "1 g"')
+    path.write_text(path.read_text(encoding="utf-8").replace("5 MN/m", "5 GN/m"), encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert "frame.stiffness of two storeys differ 2,463-fold: is a unit wrong?" in (
+        capfd.readouterr().out
+    )

@@ -111,6 +111,26 @@ def test_what_makes_no_structure_is_one_line(folder, old, new, message):
 
 
 @pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("roof <= 40 kN", "is a unit of force, and no unit of length"),
+        ("roof <= 40", "the unit is missing"),
+        ("shear <= 40 mm", "no unit of force"),
+        ("roof <= 40 mm", ""),
+    ],
+)
+def test_a_limit_is_in_the_unit_of_its_output(folder, limit, words):
+    section = f'step = "0.02 s"\n[decision]\nlimits = ["{limit}"]\n'
+    if words:
+        with pytest.raises((BadInput, RefusedError), match=words):
+            loaded(folder, 'step = "0.02 s"\n', section)
+    else:
+        content = loaded(folder, 'step = "0.02 s"\n', section)
+        (found,) = content.decision.limits_of(content.structure)
+        assert found.value == 0.04
+
+
+@pytest.mark.parametrize(
     ("text", "value"),
     [("1", 1.0), ("2*a", 6.0), ("a^2*b**-1", 4.5), ("b/a^2", 2 / 9), ("1e-3 * a / b", 1.5e-3)],
 )
