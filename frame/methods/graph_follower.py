@@ -1,16 +1,19 @@
-"""Graph Follower (section 5.3, eq. 21): envelopes from few graphs and their Taylor models.
+"""Graph Follower (section 5.3 and eq. 21 of the paper): envelopes from few trajectories.
 
-This differs from the paper in: 1. One storage serves all outputs, both sides and all levels: levels
-are treated from the narrowest box to the widest, so that every stored graph is admissible and
-α-cuts are nested by construction. 2. A new graph is computed only where the Taylor model predicts
-more than an explicit tolerance.
+The paper is Computational Mechanics (2019), doi 10.1007/s00466-019-01737-9, which calls a
+trajectory of the outputs over time a graph. The implementation differs from it in two points:
+
+1. One storage serves all outputs, both sides and all levels. The levels are treated from the
+   narrowest box to the widest, so that every stored graph belongs to all later boxes and the
+   α-cuts are nested by construction.
+2. A new graph is computed only if the Taylor model predicts more gain than a tolerance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -23,29 +26,49 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess
 from alphacut.fuzzy.result import Nature
 
-MAX_RATIO = 8.0
-"""Slope along a half width of the box, as a fraction of the output's range, from which on
-neighbouring trajectories part."""
-
 Places = tuple[Ints, ...]
-"""Indices of nodes, outputs and sides, one of each for a place."""
+"""Indices of time nodes, of outputs and of sides, three arrays of one shape (places,). A place is
+an upper bound that is followed: the side 0 is -output, the side 1 is the output."""
+
+
+class ModelMaxima(NamedTuple):
+    """Maxima of Taylor models over a box.
+
+    Args:
+        value: Maxima, shape (places,).
+        point: Unit coordinates at which they are attained, shape (places, inputs).
+    """
+
+    value: Array
+    point: Array
 
 
 class Storage:
-    """All graphs (trajectories) computed so far, and the best of them at each place.
+    """All graphs (trajectories) that were computed, and the best of them at each place.
 
-    Arrays over places have shape (T, m, 2): node, output, and side (−output, output).
+    Args:
+        flow: Response as a function of unit coordinates.
+
+    Attributes:
+        points: Unit coordinates of all graphs, shape (graphs, inputs).
+        top: Largest value of any graph at each place, shape (times, outputs, 2).
+        best: Index of the first graph with this value, same shape.
+        first: First derivatives of the output of this graph by the unit coordinates, shape (times,
+            outputs, 2, inputs).
+        second: Second derivatives, shape (times, outputs, 2, inputs, inputs).
+        steepest: Largest magnitude of a first derivative of any graph, shape (outputs,).
     """
 
     def __init__(self, flow: UnitFlow) -> None:
-        d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
+        d = len(flow.boxes.names)
+        shape = (len(flow.time), len(flow.outputs), 2)
         self.flow = flow
-        self.points: Array = np.empty((0, d))  # of all graphs, in unit coordinates
-        # the best value at each place, and the first graph that has it
-        self.top, self.best = np.full(shape, -np.inf), np.zeros(shape, np.int64)
-        # derivatives of that graph's output
-        self.first, self.second = np.zeros((*shape, d)), np.zeros((*shape, d, d))
-        self.steepest = np.zeros(shape[1])  # slope of any graph along a coordinate, (m,)
+        self.points: Array = np.empty((0, d))
+        self.top = np.full(shape, -np.inf)
+        self.best = np.zeros(shape, np.int64)
+        self.first = np.zeros((*shape, d))
+        self.second = np.zeros((*shape, d, d))
+        self.steepest = np.zeros(len(flow.outputs))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -56,22 +79,31 @@ class Storage:
         return tuple(np.indices(self.top.shape).reshape(3, -1))
 
     def holds(self, point: Array, near: float = 1e-9) -> bool:
-        """Return whether a graph at `point` (d,) is stored, up to the distance `near`."""
-        return bool((np.abs(self.points - point).max(1, initial=0.0) < near).any())
+        """Return whether a graph is stored whose unit coordinates differ by less than `near`."""
+        return bool((np.abs(self.points - point).max(axis=1, initial=0.0) < near).any())
 
     def add(self, points: Array) -> Places:
-        """Compute and store the graphs at unit coordinates (S, d); return where one is now best."""
+        """Compute and store graphs.
+
+        Args:
+            points: Unit coordinates of the graphs, shape (graphs, inputs).
+
+        Returns:
+            The places where one of these graphs is now the best.
+        """
         jet, top = self.flow.taylor(points), self.top.reshape(-1)
         slopes = np.abs(np.moveaxis(jet.first, -1, 0)).reshape(len(self.steepest), -1)
-        self.steepest = np.maximum(self.steepest, slopes.max(1))
-        best_new = np.full(top.shape, -1)  # which of them is the best; −1 for none
-        for s, value in enumerate(jet.value):
-            signed = np.stack([-value, value], -1).ravel()
+        self.steepest = np.maximum(self.steepest, slopes.max(axis=1))
+        best_new = np.full(top.shape, -1)  # index among the new graphs; -1 for none
+        for k, value in enumerate(jet.value):
+            signed = np.stack([-value, value], axis=-1).ravel()
             better = np.flatnonzero(signed > top)
-            top[better], best_new[better] = signed[better], s
+            top[better] = signed[better]  # `top` is a view of `self.top`
+            best_new[better] = k
         improved = np.flatnonzero(best_new >= 0)
         places: Places = np.unravel_index(improved, self.top.shape)
-        best = jet[best_new[improved], *places[:2]]  # by graph, node and output
+        nodes, outputs, _ = places
+        best = jet[best_new[improved], nodes, outputs]
         self.best[places] = len(self) + best_new[improved]
         self.first[places] = best.first.T
         self.second[places] = best.second.T
@@ -86,46 +118,42 @@ class Storage:
         *,
         bend: float = 1.0,
         reach: Array | float = np.inf,
-    ) -> tuple[Array, Array]:
-        """Return maxima (K,) of the best graphs' Taylor models at places, and their points (K, d).
+    ) -> ModelMaxima:
+        """Return the maxima over a box of the Taylor models of the best graphs (eq. 22).
 
-        They are those over a box of unit coordinates (eq. 22 of the paper) within the distance
-        `reach` of each graph, found by `maximise` from g and H of g·x + x·H·x/2 and the ends of x;
-        `bend` is a factor on H, 0 for linear models.
+        Args:
+            places: Places at which the models are maximised.
+            box: Lower and upper ends of the box in unit coordinates, shape (inputs,) each.
+            maximise: Function that returns the maximiser x of g·x + x·H·x / 2 from g, H and the
+                ends of x.
+            bend: Factor of the second derivatives; 0 for linear models.
+            reach: Largest distance from each graph along each coordinate.
         """
-        side, at = 2.0 * places[2] - 1, self.points[self.best[places]]
-        g, H = side[:, None] * self.first[places], bend * side[:, None, None] * self.second[places]
-        x = maximise(g, H, np.maximum(box[0] - at, -reach), np.minimum(box[1] - at, reach))
-        return self.top[places] + gain(g, H, x), np.clip(at + x, *box)
-
-
-@dataclass(eq=False)
-class Followed:
-    """Upper bounds of (−output, output) that the Graph Follower has found, all (A, T, m, 2)."""
-
-    bounds: Array  # after post-processing
-    best: Ints  # index of the graph that reaches each
-    predicted_gain: Array  # over the bounds, by Taylor models
-    guess: Ints  # index of the best stored graph when a node was reached (Figs. 21 to 23)
-    new: Ints  # index of the graph computed there, or −1 where the guess stays
-    storage: Storage  # of all graphs
+        sides = places[2]
+        signs = 2.0 * sides - 1  # -1 for the side 0, 1 for the side 1
+        center = self.points[self.best[places]]
+        g = signs[:, np.newaxis] * self.first[places]
+        H = bend * signs[:, np.newaxis, np.newaxis] * self.second[places]
+        lower, upper = box
+        x = maximise(g, H, np.maximum(lower - center, -reach), np.minimum(upper - center, reach))
+        return ModelMaxima(self.top[places] + gain(g, H, x), np.clip(center + x, lower, upper))
 
 
 @dataclass(frozen=True)
 class GraphFollower:
     """Graph Follower: envelopes of any structure from few trajectories ("graphs").
 
-    At each node Taylor models of the trajectories computed so far point to the inputs that move the
-    output furthest. Where they predict enough, the trajectory of those inputs is computed as well.
+    At each time node, Taylor models of the graphs computed so far point to the inputs at which the
+    output is largest. If they predict enough gain, the graph of these inputs is computed as well.
 
     Args:
         order: Degree κ of the Taylor models, 1 or 2.
-        tolerance: Promised gain above which a new trajectory is computed, as a fraction of each
-            output's peak, or in the unit of the first displacement (the first output without one)
-            where the envelope is not relative.
+        tolerance: Predicted gain above which a new graph is computed, as a fraction of the peak of
+            each output, or in the unit of the first displacement (of the first output if there is
+            none) if the envelope is not relative.
 
     Raises:
-        RefusedError: A switch is out of its range.
+        RefusedError: An option is out of range.
     """
 
     name: ClassVar[str] = "graph-follower"
@@ -138,67 +166,69 @@ class GraphFollower:
         checked_number("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the envelope of all outputs on all levels, estimated or attained.
+        """Return the envelope of all outputs on all levels.
 
-        Its error is the gain that the models still predict, and twice what an independent sample
-        finds beyond the bounds. Where neighbouring trajectories diverge there is none, and the
-        bounds are attained only.
+        The error is estimated: it is the gain that the models still predict, and twice the amount
+        by which an independent sample exceeds the bounds. If neighbouring trajectories diverge
+        there is no estimate, and the bounds are attained only.
         """
-        followed = self.follow(flow, subprogress(progress, 0.0, 0.8))
-        missed, count = independent_excess(flow, followed.bounds, subprogress(progress, 0.8, 1.0))
-        diverges = trajectories_diverge(followed.storage.steepest, followed.bounds[0])
-        error = followed.predicted_gain.max(-1) + SAFETY * missed[:, None]
+        n_levels = len(flow.boxes.alpha)
+        storage = Storage(flow)
+        storage.add(flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis])
+        shape = (n_levels, *storage.top.shape)
+        bounds, predicted_gain = np.zeros(shape), np.zeros(shape)
+        best = np.full(shape, -1)
+        limit = self.tolerance * flow.scale[:, np.newaxis]  # gain worth a graph, (outputs, 1)
+        bend = float(self.order > 1)
+        follow_progress = subprogress(progress, 0.0, 0.8)
+        for done, level in enumerate(reversed(range(n_levels))):
+            tick = subprogress(follow_progress, done / n_levels, (done + 1) / n_levels)
+            box = flow.boxes.unit_ends(level)
+            maxima = storage.predicted(storage.all_places, box, local_maximum, bend=bend)
+            predicted = maxima.value.reshape(storage.top.shape)
+            target = maxima.point.reshape(*storage.top.shape, -1)
+            for node in range(len(flow.time)):
+                tick(node / len(flow.time))
+                is_worth_a_graph = predicted[node] > storage.top[node] + limit
+                points: list[Array] = []
+                for point in target[node][is_worth_a_graph]:
+                    is_new = all(np.abs(point - x).max() > 1e-9 for x in points)
+                    if is_new and not storage.holds(point):
+                        points.append(point)
+                if points:
+                    # Predictions at later nodes change where one of the new graphs is the best.
+                    improved = storage.add(np.array(points))
+                    is_later = improved[0] > node
+                    later = tuple(indices[is_later] for indices in improved)
+                    maxima = storage.predicted(later, box, local_maximum, bend=bend)
+                    predicted[later], target[later] = maxima.value, maxima.point
+            # Post-processing (Fig. 24): at every node the best of all graphs counts.
+            bounds[level], best[level] = storage.top, storage.best
+            predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
+
+        missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
+        diverges = trajectories_diverge(storage.steepest, bounds[0])
+        error = predicted_gain.max(axis=-1) + SAFETY * missed[:, np.newaxis]
         return flow.envelope(
-            followed.bounds,
-            flow.boxes.to_physical(followed.storage.points[followed.best]),
+            bounds,
+            flow.boxes.to_physical(storage.points[best]),
             None if diverges else error,
             method=self.name,
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
-            evaluations=len(followed.storage) + count,
+            evaluations=len(storage) + count,
             facts={"order": self.order, "gain": self.tolerance},
         )
-
-    def follow(self, flow: UnitFlow, progress: Progress | None = None) -> Followed:
-        """Return bounds on all levels by Taylor models, from the narrowest box to the widest."""
-        storage = Storage(flow)
-        storage.add(flow.boxes.to_unit(flow.boxes.nominal)[None])
-        levels, (n_nodes, m, _) = len(flow.boxes.alpha), storage.top.shape
-        shape = (levels, n_nodes, m, 2)
-        zeros, none = np.zeros(shape), np.full(shape, -1)
-        out = Followed(zeros.copy(), none.copy(), zeros, none.copy(), none, storage)
-        limit, bend = self.tolerance * flow.scale[:, None], float(self.order > 1)
-        for done, level in enumerate(reversed(range(levels))):
-            tick = subprogress(progress, done / levels, (done + 1) / levels)
-            box = flow.boxes.unit_ends(level)
-            predicted, target = storage.predicted(storage.all_places, box, local_maximum, bend=bend)
-            predicted, target = predicted.reshape(shape[1:]), target.reshape(*shape[1:], -1)
-            for node in range(n_nodes):
-                tick(node / n_nodes)
-                out.guess[level, node] = storage.best[node]
-                points = list[Array]()
-                for entry in np.argwhere(predicted[node] > storage.top[node] + limit):
-                    point = target[node, *entry]
-                    if storage.holds(point) or any(np.abs(point - x).max() <= 1e-9 for x in points):
-                        continue
-                    out.new[level, node, *entry] = len(storage) + len(points)
-                    points.append(point)
-                if points:  # predict anew where they are the best graphs now
-                    improved = storage.add(np.array(points))
-                    later = tuple(indices[improved[0] > node] for indices in improved)
-                    predicted[later], target[later] = storage.predicted(
-                        later, box, local_maximum, bend=bend
-                    )
-            # post-processing: the best of all graphs at every node (Fig. 24)
-            out.bounds[level], out.best[level] = storage.top, storage.best
-            out.predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
-        return out
 
 
 def trajectories_diverge(steepest: Array, bounds: Array) -> bool:
     """Return whether neighbouring trajectories diverge, so that Taylor models predict nothing.
 
-    `steepest` (m,) is the largest slope of each output along a unit coordinate, `bounds` (T, m, 2)
-    are upper bounds of (−output, output).
+    This is assumed if some first derivative exceeds 8 times the half range of the output (tuned: a
+    chaotic pendulum exceeds it many times, and other structures stay well below).
+
+    Args:
+        steepest: Largest first derivative of each output by a unit coordinate, shape (outputs,).
+        bounds: Upper bounds of (-output, output), shape (times, outputs, 2).
     """
-    width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
-    return bool((steepest > MAX_RATIO * width).any())
+    half_range = (bounds[..., 0].max(axis=0) + bounds[..., 1].max(axis=0)) / 2
+    return bool((steepest > 8.0 * half_range).any())

@@ -1,12 +1,12 @@
-"""Graph Follower in rounds: Taylor models of all nodes propose graphs in batches.
+"""Improved Graph Follower: Taylor models of all time nodes propose trajectories in batches.
 
-The same idea as `graph_follower` (storage, Taylor models, tolerance, post-processing), turned
-around: instead of one node after the other, every round asks the models of the best graphs at all
-nodes, takes the proposal of largest predicted gain in each window of time, and advances these
-graphs together as arrays. Nodes before and after a discovery profit alike, which is what backward
-sweeps are for; the points spread at the start look for basins independently of any model. With many
-inputs basins are also looked for among crossings: optima of some nodes with a few inputs of others.
-Peaks, which are read more than other nodes, are followed to a smaller gain.
+The idea is that of `graph_follower`: stored trajectories ("graphs"), Taylor models, a tolerance and
+a final choice among all graphs. Instead of one node after the other, every round asks the models of
+the best graphs at all nodes, takes the proposal with the largest predicted gain in each window of
+time, and computes these graphs together. Nodes before and after a discovery profit alike. Points
+spread over the box at the start find basins that no model shows. With many inputs, basins are also
+looked for among crossings: optima of some nodes with a few inputs of others. Peaks, which matter
+more than other nodes, are followed to a smaller gain.
 """
 
 from __future__ import annotations
@@ -29,47 +29,28 @@ from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_v
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.result import Nature
 
-MAX_NUMBERS = 64e6
-"""Most numbers of Taylor models computed at a time: 512 MB."""
 BATCH = 32
-"""Graphs computed together."""
+"""Graphs that are computed together (tuned: more are faster, but know less of each other)."""
 MAX_GLOBAL_INPUTS = 4
-"""Inputs up to which Taylor models are maximised globally."""
-REACH = 0.6
-"""Trust region of a Taylor model, as a fraction of the half width of the box."""
-TRIES = 40
-"""Proposals looked at per window of time."""
-SPACING = 0.02
-"""Distance in unit coordinates between graphs of one batch."""
-NEAR_PEAK, PEAK_SHARE = 0.02, 0.02
-"""Distance from a peak, as a fraction of it, within which a gain of this part of the tolerance is
-worth a graph: a Newton step or two for each peak."""
+"""Inputs up to which Taylor models are maximised globally, and above which optima are crossed
+(tuned: the time of a global maximum grows as 3 to the power of the inputs)."""
 LEAST_GAIN = 1e-10
 """Gain, as a fraction of a peak, that may be rounding."""
-SPREAD = 64
-"""Graphs on a spread of points per level that start the search."""
-EXPLORED = 256
-"""Motions of a kind per level whose values alone are looked at, for basins that no model shows."""
-CROSSINGS, MOTIONS_PER_GRAPH, REDRAWN = 8, 8, 2.0
-"""Rounds in which crossed optima of more inputs than `MAX_GLOBAL_INPUTS` are tried, at most; their
-motions, whose values alone are looked at, for each graph; and the inputs drawn anew, on average."""
-SEED_STEP = 100_003
-"""Points of the sequence between those that two seeds spread."""
 
 
 @dataclass(frozen=True)
 class ImprovedFollower:
-    """The method and its switches.
+    """The improved Graph Follower and its options.
 
     Args:
-        tolerance: Predicted gain above which a new graph is computed, as a fraction of each
-            output's peak, or in the unit of the first displacement (the first output without one)
-            where the envelope is not relative.
-        budget: Most graphs over all levels.
-        seed: Which points are spread.
+        tolerance: Predicted gain above which a new graph is computed, as a fraction of the peak of
+            each output, or in the unit of the first displacement (of the first output if there is
+            none) if the envelope is not relative.
+        budget: Largest number of graphs over all levels.
+        seed: Seed of the points that are spread over the boxes.
 
     Raises:
-        RefusedError: A switch is out of its range.
+        RefusedError: An option is out of range.
     """
 
     name: ClassVar[str] = "improved-graph-follower"
@@ -84,32 +65,34 @@ class ImprovedFollower:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope of two passes from different points, with an estimated error.
 
-        The error is twice what the Taylor models still predict and what an independent sample finds
-        beyond the bounds, and twice the difference of the two passes. Where neighbouring
-        trajectories diverge there is none, and the bounds are attained only.
+        The error is twice the sum of what the Taylor models still predict, what an independent
+        sample finds beyond the bounds, and the difference of the two passes. If neighbouring
+        trajectories diverge there is no estimate, and the bounds are attained only.
         """
         from scipy.ndimage import maximum_filter1d
 
         limit = self._limit(flow)
-        passes = [
-            replace(self, seed=self.seed + k).run_pass(
-                flow, subprogress(progress, 0.4 * k, 0.4 * (k + 1))
-            )
-            for k in range(2)
-        ]
-        first, second = passes
-        gains = np.array([x.predicted_gain for x in passes])
-        # gains above the tolerance, which remain where the budget ended a pass, come on top
-        small, large = (np.where(x, gains, 0.0) for x in (gains <= limit, gains > limit))
-        predicted = small.max(0) + large.sum(0)
-        difference = np.abs(second.bounds - first.bounds).max(-1)
-        # the largest over T/20 nodes around, at least a tenth of all
-        near = maximum_filter1d(difference, 2 * (len(flow.time) // 40) + 1, axis=1)
-        difference = np.maximum(near, 0.1 * difference.max(1, keepdims=True))
-        points = np.where((second.bounds > first.bounds)[..., None], second.points, first.points)
+        first = self.run_pass(flow, subprogress(progress, 0.0, 0.4))
+        other_points = replace(self, seed=self.seed + 1)
+        second = other_points.run_pass(flow, subprogress(progress, 0.4, 0.8))
+        is_better = second.bounds > first.bounds
         bounds = np.maximum(first.bounds, second.bounds)
+        points = np.where(is_better[..., np.newaxis], second.points, first.points)
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
-        error = SAFETY * (predicted.max(-1) + limit[:, 0] / 2 + difference + missed[:, None])
+
+        # Gains above the tolerance remain where the budget ended a pass. They are added up.
+        gains = np.array([first.predicted_gain, second.predicted_gain])
+        is_large = gains > limit
+        predicted = np.where(is_large, 0.0, gains).max(axis=0)
+        predicted += np.where(is_large, gains, 0.0).sum(axis=0)
+        # The difference of the passes at a node is the largest one over a twentieth of the nodes
+        # around it, and at least a tenth of the largest of all.
+        difference = np.abs(second.bounds - first.bounds).max(axis=-1)
+        window = 2 * (len(flow.time) // 40) + 1
+        nearby = maximum_filter1d(difference, window, axis=1)
+        difference = np.maximum(nearby, 0.1 * difference.max(axis=1, keepdims=True))
+        left_aside = predicted.max(axis=-1) + limit[:, 0] / 2
+        error = SAFETY * (left_aside + difference + missed[:, np.newaxis])
         steepest = np.maximum(first.storage.steepest, second.storage.steepest)
         diverges = trajectories_diverge(steepest, bounds[0])
         note = f"stopped at the budget of {self.budget} trajectories"
@@ -121,7 +104,7 @@ class ImprovedFollower:
             nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=first.evaluations + second.evaluations + count,
             facts={"gain": self.tolerance, "order": 2},
-            notes=(note,) if large.any() else (),
+            notes=(note,) if is_large.any() else (),
         )
 
     def run_pass(
@@ -129,143 +112,220 @@ class ImprovedFollower:
     ) -> PassBounds:
         """Return the bounds of one pass on all levels, from the narrowest box to the widest.
 
-        `asked` (A, T, m, 2) are the bounds whose gain counts, all unless given.
+        Args:
+            flow: The problem.
+            progress: Called with the completed fraction.
+            asked: Bounds of (-output, output) whose gain counts, shape (levels, times, outputs, 2);
+                all by default.
         """
-        levels, storage, d = len(flow.boxes.alpha), Storage(flow), len(flow.boxes.names)
-        bounds, gains = np.zeros((2, levels, *storage.top.shape))
-        out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
-        states = 2 * len(frequencies(flow.flow.system)) if isinstance(flow.flow, LinearFlow) else 0
-        # of a graph: outputs at all nodes, and powers of the step map within a block of nodes
-        count = max(flow.time.size * len(flow.outputs), (isqrt(flow.time.size) + 1) * states**2)
-        chunk_size = int(np.clip(MAX_NUMBERS / (count * (1 + d + d * d)), 1, BATCH))
-        nominal = flow.boxes.to_unit(flow.boxes.nominal)[None]
-        has_crossings = d > MAX_GLOBAL_INPUTS and states > 0
-        for done, level in enumerate(reversed(range(levels))):
-            # points of the sequence that no other level and no other seed takes
-            box, skip = flow.boxes.unit_ends(level), SEED_STEP * (levels * self.seed + level + 1)
-            tick = subprogress(progress, done / levels, (done + 1) / levels)
-            # graphs at the end of the level, at most, and at its beginning
-            limit, first = self.budget * (done + 1) // levels, len(storage)
-            if (box[1] > box[0]).any():
-                explored = spread_points(*box, EXPLORED, skip)
-                points = np.vstack([nominal, explored[:SPREAD]])
-            else:  # no other points, and none once it is stored
-                explored, points = nominal, nominal[: not len(storage)]
-            models = _LevelModels(
-                storage, box, self._limit(flow), asked if asked is None else asked[level]
-            )
-            if done:  # what a narrower box reaches
+        n_levels, d = len(flow.boxes.alpha), len(flow.boxes.names)
+        storage = Storage(flow)
+        shape = (n_levels, *storage.top.shape)
+        out = PassBounds(np.zeros(shape), np.zeros((*shape, d)), np.zeros(shape), storage)
+        chunk_size = _chunk_size(flow)
+        nominal = flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis]
+        has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
+        for done, level in enumerate(reversed(range(n_levels))):
+            # Points of the quasi-random sequence that no other level and no other seed uses.
+            box, skip = flow.boxes.unit_ends(level), 100_003 * (n_levels * self.seed + level + 1)
+            tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
+            max_graphs, first = self.budget * (done + 1) // n_levels, len(storage)
+            has_width = bool((box[1] > box[0]).any())
+            if has_width:
+                # The values alone of 256 trajectories of each kind are looked at, and 64 graphs are
+                # computed (tuned: fewer miss basins, more take longer).
+                explored = spread_points(*box, count=256, skip=skip)
+                points = np.vstack([nominal, explored[:64]])
+            else:
+                explored = nominal
+                points = nominal if len(storage) == 0 else nominal[:0]
+            asked_on_level = None if asked is None else asked[level]
+            models = _LevelModels(storage, box, self._limit(flow), asked_on_level)
+            if done:  # a wider box contains what a narrower one attains
                 models.sampled[:] = out.bounds[level + 1]
                 models.sampled_at[:] = out.points[level + 1]
             models.explore(explored)
-            for crossing in range(1 + CROSSINGS * (has_crossings and len(explored) > 1)):
+            n_crossings = 8 if has_crossings and has_width else 0  # tuned
+            for crossing in range(1 + n_crossings):
                 if crossing:
                     explored = models.crossed_optima(np.random.default_rng([skip, crossing]))
                     models.explore(explored)
-                    points = models.proposals(limit - len(storage))
+                    points = models.proposals(max_graphs - len(storage))
                 out.evaluations += len(explored)
                 while len(points):
-                    points = points[: max(1, limit - len(storage))]
+                    points = points[: max(1, max_graphs - len(storage))]
                     for chunk in np.array_split(points, -(-len(points) // chunk_size)):
                         models.predict(storage.add(chunk))
-                        tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
-                    points = models.proposals(limit - len(storage))
-            # optima of the models that are not worth a graph are worth their values
-            if has_crossings and (models.predicted > storage.top).any():
-                targets = np.unique(models.target[models.predicted > storage.top], axis=0)
+                        computed, allowed = len(storage) - first, max(1, max_graphs - first)
+                        tick(min(1.0, computed / allowed))
+                    points = models.proposals(max_graphs - len(storage))
+            # Optima of the models that are not worth a graph are worth their values.
+            is_predicted = models.predicted > storage.top
+            if has_crossings and is_predicted.any():
+                targets = np.unique(models.target[is_predicted], axis=0)
                 models.explore(targets)
                 out.evaluations += len(targets)
-            # post-processing of the level
-            better, best_points = models.sampled > storage.top, storage.points[storage.best]
+
+            # Post-processing: the best of all graphs and explored trajectories counts.
+            is_sampled = (models.sampled > storage.top)[..., np.newaxis]
+            graph_points = storage.points[storage.best]
             out.bounds[level] = np.maximum(models.sampled, storage.top)
-            out.points[level] = np.where(better[..., None], models.sampled_at, best_points)
+            out.points[level] = np.where(is_sampled, models.sampled_at, graph_points)
             out.predicted_gain[level] = np.maximum(models.predicted - out.bounds[level], 0.0)
         out.evaluations += len(storage)
         return out
 
     def _limit(self, flow: UnitFlow) -> Array:
-        """Return the gain of each output that is left aside, shape (m, 1), rounding at least."""
+        """Return the gain that is not worth a graph, shape (outputs, 1); at least rounding."""
         allowed = np.maximum(self.tolerance * flow.scale, LEAST_GAIN * flow.peak)
-        return np.asarray(allowed[:, None])
+        return np.asarray(allowed[:, np.newaxis])
+
+
+def _chunk_size(flow: UnitFlow) -> int:
+    """Return how many graphs are computed at a time.
+
+    Their arrays have at most 64 million numbers (512 MB): for each graph the outputs at all nodes,
+    or the powers of the step map within a block of nodes, each with its derivatives.
+    """
+    d, n_times = len(flow.boxes.names), flow.time.size
+    states = 2 * len(frequencies(flow.flow.system)) if isinstance(flow.flow, LinearFlow) else 0
+    count = max(n_times * len(flow.outputs), (isqrt(n_times) + 1) * states**2)
+    return int(np.clip(64e6 / (count * (1 + d + d * d)), 1, BATCH))
 
 
 @dataclass(eq=False)
 class PassBounds:
-    """Reached bounds of (−output, output) of one pass, shape (A, T, m, 2)."""
+    """Attained bounds of (-output, output) of one pass.
+
+    Args:
+        bounds: The bounds, shape (levels, times, outputs, 2).
+        points: Unit coordinates that attain them, shape (levels, times, outputs, 2, inputs).
+        predicted_gain: Gain that the models predict beyond the bounds, same shape as `bounds`. It
+            is above the tolerance where the budget ended the pass.
+        storage: All graphs.
+        evaluations: Number of graphs and of trajectories whose values alone were looked at.
+    """
 
     bounds: Array
-    points: Array  # their unit coordinates, shape (A, T, m, 2, d)
-    predicted_gain: Array  # by the models; above the tolerance where the budget ended the pass
-    storage: Storage  # of all graphs
-    evaluations: int = 0  # graphs, and motions whose values alone were looked at
+    points: Array
+    predicted_gain: Array
+    storage: Storage
+    evaluations: int = 0
 
 
 class _LevelModels:
-    """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2)."""
+    """Predictions of the Taylor models of stored graphs in one box.
+
+    Args:
+        storage: The graphs.
+        box: Lower and upper ends of the box in unit coordinates, shape (inputs,) each.
+        limit: Gain of each output that is not worth a graph, shape (outputs, 1).
+        asked: Bounds whose gain counts, shape (times, outputs, 2); None for all.
+
+    Attributes:
+        sampled: Largest values of explored trajectories, shape (times, outputs, 2).
+        sampled_at: Unit coordinates of these trajectories, shape (times, outputs, 2, inputs).
+        predicted: Largest values that the models predict, shape (times, outputs, 2).
+        target: Unit coordinates at which they are predicted, as `sampled_at`.
+    """
 
     def __init__(
         self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask | None
     ) -> None:
-        self.storage, self.box, self.limit, self.asked = storage, box, limit, asked
-        self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
-        # largest values of explored motions, and where they are, shape (T, m, 2, d)
+        self.storage, self.box = storage, box
+        self.limit, self.asked = limit, asked
         self.sampled: Array = np.full(storage.top.shape, -np.inf)
         self.sampled_at = np.zeros((*storage.top.shape, len(box[0])))
-        # the same of the models
-        self.predicted, self.target = storage.top.copy(), np.zeros(self.sampled_at.shape)
+        self.predicted = storage.top.copy()
+        self.target = np.zeros(self.sampled_at.shape)
         if len(storage):
             self.predict(storage.all_places)
 
+    @property
+    def radius(self) -> Array:
+        """Radii of the box, shape (inputs,)."""
+        lower, upper = self.box
+        return (upper - lower) / 2
+
     def explore(self, points: Array) -> None:
-        """Let the values of motions at points (S, d) count as predictions where they are larger."""
+        """Compute the values of trajectories, which update `sampled` where they are larger.
+
+        Args:
+            points: Unit coordinates, shape (trajectories, inputs).
+        """
         values, index = largest_values(self.storage.flow, points)
         better = values > self.sampled
-        self.sampled[better], self.sampled_at[better] = values[better], points[index][better]
+        self.sampled[better] = values[better]
+        self.sampled_at[better] = points[index][better]
 
     def crossed_optima(self, rng: np.random.Generator) -> Array:
-        """Return optima of random places with some inputs of others or drawn anew, shape (S, d)."""
-        storage, d = self.storage, len(self.box[0])
-        count = MOTIONS_PER_GRAPH * len(storage)
+        """Return optima of random places in which some inputs are replaced.
+
+        Each input is replaced with the probability 2 / (number of inputs): by the input of the
+        optimum of another place, or in half of the points by a random number. There are 8 points
+        for each graph (tuned).
+
+        Returns:
+            Unit coordinates, shape (points, inputs).
+        """
+        storage, d = self.storage, len(self.radius)
+        count = 8 * len(storage)
         optima, partners = storage.points[rng.choice(storage.best.ravel(), (2, count))]
-        # a third of the drawn values at the ends of their range
-        drawn = (
-            np.clip(rng.uniform(-1.5, 1.5, optima.shape), -1, 1) * (self.box[1] - self.box[0]) / 2
-        )
-        drawn += (self.box[0] + self.box[1]) / 2
-        further = np.where(rng.random((count, 1)) < 0.5, drawn, partners)
-        return np.where(rng.random(optima.shape) < REDRAWN / d, further, optima)
+        # A third of the random numbers lies at the ends of the range.
+        unit = np.clip(rng.uniform(-1.5, 1.5, optima.shape), -1, 1)
+        drawn = unit * (self.box[1] - self.box[0]) / 2 + (self.box[0] + self.box[1]) / 2
+        replacements = np.where(rng.random((count, 1)) < 0.5, drawn, partners)
+        return np.where(rng.random(optima.shape) < 2.0 / d, replacements, optima)
 
     def predict(self, places: Places) -> None:
-        """Set the predictions at places from the Taylor models of the best graphs there."""
-        if len(places[0]) and (self.box[1] > self.box[0]).any():
-            maximise = global_maximum if len(self.box[0]) <= MAX_GLOBAL_INPUTS else local_maximum
-            optima = self.storage.predicted(places, self.box, maximise, reach=self.reach)
-            self.predicted[places], self.target[places] = optima
+        """Update predictions at places from the Taylor models of the best graphs there."""
+        if len(places[0]) and (self.radius > 0).any():
+            maximise = global_maximum if len(self.radius) <= MAX_GLOBAL_INPUTS else local_maximum
+            # A Taylor model is trusted up to 0.6 times the radius of the box (tuned: with a larger
+            # region more proposals are wrong, with a smaller one more are needed).
+            reach = 0.6 * np.maximum(self.radius, 1e-300)
+            maxima = self.storage.predicted(places, self.box, maximise, reach=reach)
+            self.predicted[places], self.target[places] = maxima.value, maxima.point
 
     @property
     def least_gains(self) -> Array:
-        """Gain of each bound that is worth a graph, shape (T, m, 2)."""
-        top, peak = self.storage.top, self.storage.flow.peak[:, None]
-        near_peak = top >= (1 - NEAR_PEAK) * np.maximum(top.max(0), 0.0)
-        least = np.maximum(self.limit * np.where(near_peak, PEAK_SHARE, 1.0), LEAST_GAIN * peak)
+        """Gain of each bound that is worth a graph, shape (times, outputs, 2)."""
+        top, peak = self.storage.top, self.storage.flow.peak[:, np.newaxis]
+        # Within 2 % of a peak, 2 % of the tolerance is worth a graph (tuned: this costs a Newton
+        # step or two for each peak).
+        near_peak = top >= (1 - 0.02) * np.maximum(top.max(axis=0), 0.0)
+        least = np.maximum(self.limit * np.where(near_peak, 0.02, 1.0), LEAST_GAIN * peak)
         return least if self.asked is None else np.where(self.asked, least, np.inf)
 
     def proposals(self, count: int) -> Array:
-        """Return distinct points worth a graph, one per window of time, shape (≤ count, d)."""
+        """Return distinct points that are worth a graph, at most one for each window of time.
+
+        Predictions at points whose graphs are stored already were wrong; they are set to the values
+        of these graphs.
+
+        Args:
+            count: Largest number of points.
+
+        Returns:
+            Unit coordinates, shape (points, inputs).
+        """
         gains = (np.maximum(self.predicted, self.sampled) - self.storage.top) / self.least_gains
-        chosen, count = list[Array](), min(count, BATCH)
+        chosen: list[Array] = []
+        count = min(count, BATCH)
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:
-            for k in np.argsort(-gains[window], axis=None)[:TRIES]:
-                t, o, side = np.unravel_index(k, gains[window].shape)
-                place = (window[t], o, side)
+            # The 40 largest gains of a window are looked at (tuned).
+            for k in np.argsort(-gains[window], axis=None)[:40]:
+                node, output, side = np.unravel_index(k, gains[window].shape)
+                place = (window[node], output, side)
                 if gains[place] <= 1:
                     break
                 is_sampled = self.sampled[place] > self.predicted[place]
-                point = (self.sampled_at if is_sampled else self.target)[place]
+                point = self.sampled_at[place] if is_sampled else self.target[place]
                 if self.storage.holds(point, near=1e-7):
-                    self.predicted[place] = self.storage.top[place]  # the model was wrong
-                elif all(np.abs(point - neighbour).max() > SPACING for neighbour in chosen):
+                    self.predicted[place] = self.storage.top[place]
+                elif all(np.abs(point - neighbour).max() > 0.02 for neighbour in chosen):
+                    # Graphs of one batch are at least this far apart in unit coordinates.
                     chosen.append(point)
                     break
-        return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
+        return np.array(chosen)[:count].reshape(-1, len(self.radius))

@@ -1,7 +1,8 @@
-"""Envelopes by motions alone: quasi-random ones or a search of peaks; what others find beyond."""
+"""Envelopes by sampling: quasi-random trajectories, or a search of the largest peaks."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -20,24 +21,25 @@ from alphacut.fuzzy.plans.single_linkage import MIN_SAMPLES, SEED, SingleLinkage
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 
-MAX_NUMBERS = 16e6
-"""Most numbers of trajectories at a time: 128 MB."""
-BATCH = 256
-"""Most trajectories at a time."""
 SAMPLES = 64
-"""Independent points of a kind on each level."""
+"""Independent points of each kind on each level (tuned: the estimate of an error rests on them)."""
 SKIPPED = 100_003
-"""Points of the sequence between those of two levels, which a search does not reach."""
+"""Points of the quasi-random sequence between those of two levels; no search reaches that far."""
 SAFETY = 2.0
-"""Factor on what they find beyond the bounds, and on the gain that models still predict."""
+"""Factor of what independent points find beyond the bounds, and of the gain that models still
+predict (tuned on random structures; a larger one overestimates errors)."""
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """Attained bounds of so many trajectories on each level, from a seed.
+    """Attained bounds of a number of quasi-random trajectories on each level.
+
+    Args:
+        samples: Number of trajectories on each level.
+        seed: Seed of the sequence.
 
     Raises:
-        RefusedError: No trajectory is asked for.
+        RefusedError: The number is below 1.
     """
 
     name: ClassVar[str] = "quasi-monte-carlo"
@@ -48,7 +50,7 @@ class Sampled:
         checked_number("samples", self.samples, whole=True, least=1)
 
     def points(self, lower: Array, upper: Array) -> Array:
-        """Return Sobol points of a box, denser towards its faces, shape (samples, d)."""
+        """Return Sobol points of a box, denser towards its faces, shape (samples, inputs)."""
         from scipy.stats import qmc
 
         unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
@@ -56,38 +58,41 @@ class Sampled:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels."""
-        levels = len(flow.boxes.alpha)
-        shape = (levels, len(flow.time), len(flow.outputs), 2)
-        bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
-        for done, level in enumerate(reversed(range(levels))):
-            if level + 1 < levels:  # what a narrower box attains
+        n_levels = len(flow.boxes.alpha)
+        shape = (n_levels, len(flow.time), len(flow.outputs), 2)
+        bounds = np.full(shape, -np.inf)
+        at = np.zeros((*shape, len(flow.boxes.names)))
+        for done, level in enumerate(reversed(range(n_levels))):
+            if done:  # a wider box contains the trajectories of the narrower one
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit_ends(level))
-            tick = subprogress(progress, done / levels, (done + 1) / levels)
+            tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
             values, index = largest_values(flow, points, tick)
             better = values > bounds[level]
-            bounds[level][better], at[level][better] = values[better], points[index][better]
+            bounds[level][better] = values[better]
+            at[level][better] = points[index][better]
         return flow.envelope(
             bounds,
             flow.boxes.to_physical(at),
             method=self.name,
             nature=Nature.ATTAINED,
-            evaluations=levels * self.samples,
+            evaluations=n_levels * self.samples,
         )
 
 
 @dataclass(frozen=True)
 class PeakSearch:
-    """Peaks by multi-level single linkage, and the band that all motions made attain.
+    """Peaks by multi-level single linkage, and the band attained by all trajectories computed.
 
-    For columns that yield, whose motions have kinks. Peaks of magnitudes are estimated where both
-    their bounds meet the stopping rule (Boender, Rinnooy Kan 1987), though they may lie at kinks,
-    else attained. Their error is `SAFETY` times what independent motions find beyond them, and
-    `tolerance` more.
+    It is made for columns that yield, whose responses have kinks. The peaks of magnitudes are
+    estimated where both of their bounds meet the stopping rule (Boender and Rinnooy Kan,
+    Mathematical Programming 37, 59, 1987), although they may lie at kinks, and attained elsewhere.
+    Their error is `SAFETY` times the amount by which independent trajectories exceed them, and a
+    fraction of each peak.
 
     Args:
-        tolerance: Least error, as a fraction of each peak: descents stall at kinks.
-        budget: Most motions of the search.
+        tolerance: This fraction, since descents stall at kinks.
+        budget: Largest number of trajectories of the search.
     """
 
     name: ClassVar[str] = "single-linkage"
@@ -96,100 +101,161 @@ class PeakSearch:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels, with searched peaks."""
-        cuts, outputs = flow.boxes, tuple(map(str, flow.outputs))
-        domain, motion = Domain(cuts.inputs, tuple(cuts.alpha)), flow.flow
-        assert isinstance(motion, YieldingFlow)
-        bounds = np.full((len(cuts.alpha), len(flow.time), len(outputs), 2), -np.inf)
-        at = np.zeros((*bounds.shape, len(cuts.names)))
-
-        def motion_peaks(**inputs: Array) -> dict[str, Array]:
-            """Return the peaks (S,) of motions by output, after the motions widened the band."""
-            points = np.column_stack([inputs[name] for name in cuts.names])
-            values, peaks = motion.values_and_peaks(points)
-            for level, inside in enumerate(domain.inside(points)):
-                for row in np.flatnonzero(inside):
-                    signed = np.stack([-values[row], values[row]], -1)
-                    better = signed > bounds[level]
-                    bounds[level][better], at[level][better] = signed[better], points[row]
-            return dict(zip(outputs, peaks.T, strict=True))
-
-        call = Call(motion_peaks, cuts.names, vectorised=True)
-        motion_peaks(**dict(zip(cuts.names, cuts.probes.T, strict=True)))  # raises what they do
+        cuts, outputs, yielding_flow = flow.boxes, tuple(map(str, flow.outputs)), flow.flow
+        assert isinstance(yielding_flow, YieldingFlow)
+        domain = Domain(cuts.inputs, tuple(cuts.alpha))
+        band = _Band(flow, domain, yielding_flow)
+        band.peaks(**dict(zip(cuts.names, cuts.probes.T, strict=True)))  # raises their errors here
+        call = Call(band.peaks, cuts.names, vectorised=True)
         campaign = Campaign(call, budget=self.budget, progress=progress)
-        campaign(cuts.nominal[None])
-        linkage, note = SingleLinkage(campaign, domain, outputs, has_kinks=True), ""
+        campaign(cuts.nominal[np.newaxis])
+        linkage = SingleLinkage(campaign, domain, outputs, has_kinks=True)
+        note = ""
         try:
             if linkage.cuts:
-                widest, rng = linkage.cuts[0], np.random.default_rng([SEED, 0])
-                linkage.run(rng.random((MIN_SAMPLES, len(widest.uncertain_inputs))))
+                n_uncertain = len(linkage.cuts[0].uncertain_inputs)
+                linkage.run(np.random.default_rng([SEED, 0]).random((MIN_SAMPLES, n_uncertain)))
                 note = linkage.summary()
         except SpentError as spent:
             note = str(spent)
-        searched, motions = bounds_of_samples(domain, campaign.samples, self.name), len(campaign)
-        excess = np.zeros(searched.lower.shape)
+
+        searched = bounds_of_samples(domain, campaign.samples, self.name)
+        evaluations = len(campaign)
+        excess = np.zeros(searched.lower.shape)  # (levels, outputs)
         for level in range(len(cuts.alpha)):
             points = spread_points(*cuts.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
-            peaks = motion.values_and_peaks(cuts.to_physical(points))[1]
-            distances = searched.lower[level] - peaks.min(0), peaks.max(0) - searched.upper[level]
-            excess[level] = np.maximum(np.max(distances, axis=0), 0.0)
-            motions += len(points)
+            peaks = yielding_flow.values_and_peaks(cuts.to_physical(points))[1]
+            below = searched.lower[level] - peaks.min(axis=0)
+            above = peaks.max(axis=0) - searched.upper[level]
+            excess[level] = np.maximum(np.maximum(below, above), 0.0)
+            evaluations += len(points)
         is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
         natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)
         error = np.where(is_estimate, SAFETY * excess + self.tolerance * searched.upper, 0.0)
-        error[(cuts.lower == cuts.upper).all(1)] = 0.0  # of a level with one motion, which is exact
+        is_point = (cuts.lower == cuts.upper).all(axis=1)
+        error[is_point] = 0.0  # the only trajectory of the level is exact
         return flow.envelope(
-            bounds,
-            at,
+            band.bounds,
+            band.at,
             method=self.name,
             nature=Nature.ATTAINED,
-            evaluations=motions,
+            evaluations=evaluations,
             searched_peaks=replace(searched, error=error, natures=natures),
             notes=(note,) if note else (),
         )
 
 
-def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tuple[Array, int]:
-    """Return how far independent motions exceed the bounds on each level, and their number.
+class _Band:
+    """The band that trajectories attain on each level while their peaks are searched.
 
-    `bounds` (A, T, m, 2) are upper bounds of (−output, output); the excess of each output is the
-    largest over time, shape (A, m).
+    Args:
+        flow: The problem.
+        domain: Its cuts.
+        yielding_flow: Its response as a function of inputs in SI units.
+
+    Attributes:
+        bounds: Largest values of (-output, output), shape (levels, times, outputs, 2).
+        at: Inputs of the trajectories with these values, in SI units, shape (levels, times,
+            outputs, 2, inputs).
     """
-    largest, count = np.zeros((len(bounds), len(flow.outputs))), 0
+
+    def __init__(self, flow: UnitFlow, domain: Domain, yielding_flow: YieldingFlow) -> None:
+        cuts = flow.boxes
+        self.names, self.outputs = cuts.names, tuple(map(str, flow.outputs))
+        self.domain, self.yielding_flow = domain, yielding_flow
+        shape = (len(cuts.alpha), len(flow.time), len(flow.outputs), 2)
+        self.bounds = np.full(shape, -np.inf)
+        self.at = np.zeros((*shape, len(cuts.names)))
+
+    def peaks(self, **inputs: Array) -> dict[str, Array]:
+        """Return the peaks of trajectories by output, and widen the band by the trajectories.
+
+        Args:
+            inputs: Inputs by name, in SI units, shape (trajectories,) each.
+
+        Returns:
+            Peaks by output, shape (trajectories,) each.
+        """
+        points = np.column_stack([inputs[name] for name in self.names])
+        values, peaks = self.yielding_flow.values_and_peaks(points)
+        for level, is_inside in enumerate(self.domain.inside(points)):
+            for row in np.flatnonzero(is_inside):
+                signed = np.stack([-values[row], values[row]], axis=-1)
+                better = signed > self.bounds[level]
+                self.bounds[level][better] = signed[better]
+                self.at[level][better] = points[row]
+        return dict(zip(self.outputs, peaks.T, strict=True))
+
+
+def independent_excess(
+    flow: UnitFlow, bounds: Array, progress: Callable[[float], None]
+) -> tuple[Array, int]:
+    """Return how far independent trajectories exceed bounds, and the number of trajectories.
+
+    Args:
+        flow: The problem.
+        bounds: Upper bounds of (-output, output), shape (levels, times, outputs, 2).
+        progress: Called with the completed fraction.
+
+    Returns:
+        The largest excess over time and over both sides, 0 or more, shape (levels, outputs), and
+        the number.
+    """
+    excess, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
         points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
         values, _ = largest_values(flow, points)
-        largest[level] = np.maximum((values - bounds[level]).max((0, 2)), 0.0)
+        excess[level] = np.maximum((values - bounds[level]).max(axis=(0, 2)), 0.0)
         count += len(points)
         progress((level + 1) / len(bounds))
-    return largest, count
+    return excess, count
 
 
 def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
-    """Return points (S, d) of a box: `count` inside, on faces and edges, and of the corners each.
+    """Return points spread over a box: inside, on faces and edges, and corners.
 
-    The first `skip` points of the sequence are left out.
+    Args:
+        lower: Lower ends of the box, shape (inputs,).
+        upper: Upper ends of the box.
+        count: Number of points of each of the three kinds; there may be fewer corners.
+        skip: Number of points of the quasi-random sequence that are left out.
+
+    Returns:
+        Points, shape (points, inputs).
     """
     d = len(lower)
     inside, wide, ends = (chebyshev_points(d, count, skip=skip + k * count) for k in range(3))
+    on_faces = np.clip(2 * wide, -1, 1)
     ends = np.sign(ends) if 2**d > count else corners(-np.ones(d), np.ones(d))
-    points = np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])
+    points = np.concatenate([inside, on_faces, ends])
     return np.asarray((lower + upper) / 2 + (upper - lower) / 2 * points)
 
 
 def largest_values(
     flow: UnitFlow, points: Array, progress: Progress | None = None
 ) -> tuple[Array, Ints]:
-    """Return the largest (−output, output) of motions, shape (T, m, 2), and which has it."""
+    """Return the largest values of (-output, output) of trajectories, and which ones have them.
+
+    Args:
+        flow: The problem.
+        points: Unit coordinates of the trajectories, shape (trajectories, inputs).
+        progress: Called with the completed fraction.
+
+    Returns:
+        The values and the indices of the trajectories, shape (times, outputs, 2) each.
+    """
     largest: Array = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
     index: Ints = np.zeros(largest.shape, np.int64)
-    size = int(np.clip(MAX_NUMBERS / largest.size, 1, BATCH))
+    # At most 256 trajectories or 16 million numbers (128 MB) are computed at a time.
+    size = int(np.clip(16e6 / largest.size, 1, 256))
     for first in range(0, len(points), size):
         values = flow.values(points[first : first + size])
-        signed = np.stack([-values, values], -1)
-        best = signed.argmax(0)
-        value = np.take_along_axis(signed, best[None], 0)[0]
+        signed = np.stack([-values, values], axis=-1)
+        best = signed.argmax(axis=0)
+        value = np.take_along_axis(signed, best[np.newaxis], axis=0)[0]
         better = value > largest
-        largest[better], index[better] = value[better], first + best[better]
+        largest[better] = value[better]
+        index[better] = first + best[better]
         if progress:
             progress(first / len(points))
     return largest, index
