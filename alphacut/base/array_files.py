@@ -59,14 +59,15 @@ class ArrayHead:
         self.order: Literal["C", "F"] = "F" if is_fortran else "C"
         self.offset = stream.tell()
         is_known = self.dtype.kind in kinds and self.dtype.itemsize <= LONGEST_HEAD
-        cures = {"c": "save its real part, array.real", "O": "save numbers, array.astype(float)"}
-        cure = cures.get(self.dtype.kind, "")
+        cure = "save numbers, as array.astype(float)"
+        if self.dtype.kind == "c":
+            cure = "save its real part, array.real"
         require(is_known, name, f"{self.dtype} of shape {self.shape}", ALLOWED, cure)
         is_shape = len(self.shape) <= MAX_DIMENSIONS and all(n >= 0 for n in self.shape)
         require(is_shape, name, f"of shape {self.shape}", ALLOWED)
         expected = self.offset + math.prod(self.shape) * self.dtype.itemsize
         value = f"of {size} bytes, where its head states shape {self.shape} of {self.dtype}"
-        require(size == expected, name, value, f"{expected} bytes")
+        require(size == expected, name, value, f"{expected} bytes", "copy or save the file anew")
 
 
 def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:

@@ -38,8 +38,21 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             unknowns = info.data.get("unknowns", ())  # missing where they are refused themselves
             rows = len(unknowns) or MAX_ROWS
             path = case_file(name, info)
-            return Monomial.parse(factor), read_matrix(path, name=member, max_rows=rows)
+            array = read_matrix(path, name=member, max_rows=rows)
+            if unknowns:
+                _require_shape(path.name, array, rows)
+            require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
+            return Monomial.parse(factor), array
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
+
+
+def _require_shape(name: str, array: Array, n: int) -> None:
+    """Refuse an array in a file that is not a matrix of n rows and n columns."""
+    cure = f"the case names {n} unknowns, and a matrix has a row and a column for each"
+    if array.shape == (n,):
+        cure = "of a diagonal make a matrix, by numpy.diag"
+    value = f"of shape ({', '.join(map(str, array.shape))})"
+    require(array.shape == (n, n), name, value, f"({n}, {n})", cure)
 
 
 def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:

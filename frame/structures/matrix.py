@@ -158,7 +158,10 @@ class MatrixStructure(LinearSystem):
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
-        cure = "turn its sign: this seems to be −M" if np.trace(mass) < 0 else ""
+        cure = "all rows and columns of unknowns that move have mass, coupled by a positive matrix"
+        traces = np.trace(self.nominal_terms("mass"), axis1=1, axis2=2)
+        if (traces < 0).any():
+            cure = f"turn the sign of term {int(traces.argmin()) + 1}: it seems to be −M"
         require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
         self._require_stable(stiffness)
         if not len(b):

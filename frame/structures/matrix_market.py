@@ -51,7 +51,9 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     if found := NO_NUMBER.search(text):
         row = text[: found.start()].count(b"\n")
         value = f"with {body[row][:40].decode('latin-1')!r}"
-        raise RefusedError(name, value, "numbers such as 1.25 or 1e-3")
+        cures = {b",": "write decimal points", b"d": "write 1e3 in place of 1D3"}
+        cure = cures.get(found[0].lower(), "mend this line, or load the file anew")
+        raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", cure)
     sizes = _numbers(name, body[0]) if body else np.empty(0)
     entries = _numbers(name, b" ".join(body[1:]))
     is_sparse = layout == "coordinate"
@@ -65,7 +67,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     shape = int(sizes[0]), int(sizes[1])
     mirrored = MIRRORED[symmetry]
     is_square = shape[0] == shape[1] or not mirrored
-    require(is_square, name, f"{symmetry}, {shape[0]} × {shape[1]}", "a square matrix")
+    value = f"{symmetry}, {shape[0]} × {shape[1]}"
+    require(is_square, name, value, "a square matrix", "mend the line of sizes, as 18 18 42")
     if not is_sparse:
         require(kind != "pattern", name, "an array of a pattern", ALLOWED)
         return _dense(name, entries, shape, symmetry=symmetry)
@@ -80,6 +83,13 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     matrix = dense_of_entries(name, shape, rows=rows, columns=cols, values=values)
     if mirrored:
         is_beside = rows != cols
+        both = np.intersect1d(
+            rows[is_beside] * shape[0] + cols[is_beside],
+            cols[is_beside] * shape[0] + rows[is_beside],
+        )
+        value = f"{symmetry}, with entries on both sides of the diagonal"
+        cure = "write general in the first line, or leave one triangle out"
+        require(both.size == 0, name, value, "one triangle of a symmetric matrix", cure)
         matrix += dense_of_entries(
             name,
             shape,
@@ -94,7 +104,7 @@ def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:
     """Refuse a matrix with a side of 0 or of more than `max_rows`."""
     fits = all(0 < n <= max_rows for n in shape)
     allowed = f"up to {max_rows} rows and columns"
-    cure = "a matrix has as many as there are unknowns; condense what the motion does not need"
+    cure = "a matrix has a row and a column for each unknown, without heads or numbers of rows"
     require(fits, name, " × ".join(map(str, shape)), allowed, cure)
 
 

@@ -37,6 +37,8 @@ CURES_OF_CELLS = {
     r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
     r"^\s*%%": "a file of Matrix Market is NAME.mtx",
     r",\s*(,|$)|;\s*(;|$)": "cells are empty: write 0, and nothing behind the last number",
+    r"\d['’_]\d{3}": "write thousands without separators",
+    r'"': "write numbers without quotes",
     r"\d\.?[dD][-+]?\d": "write 1e3 in place of 1D3",
     r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
     r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",

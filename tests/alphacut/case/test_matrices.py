@@ -44,6 +44,9 @@ def folder(tmp_path):
     scipy.io.mmwrite(tmp_path / "lower.mtx", scipy.sparse.coo_matrix([[1.0, 0.0], [0.0, 0.0]]))
     springs = np.array([[1.0, -1.0], [-1.0, 1.0]])
     np.savez(tmp_path / "upper.npz", springs=springs, other=np.eye(2))
+    (tmp_path / "short.csv").write_text("1,0\n")
+    np.save(tmp_path / "diagonal.npy", np.ones(2))
+    np.save(tmp_path / "zeros.npy", np.zeros((2, 2)))
     times = 0.02 * np.arange(40)
     rows = [f"{t:.2f},{np.sin(9 * t):.8f}" for t in times]
     (tmp_path / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + "\n".join(rows))
@@ -89,6 +92,9 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ('direction = "x"', 'direction = "y"', "matrices.direction"),
         ('direction = "x"', 'direction = ["x", "y"]', "of a list make a table"),
         ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
+        ('"lower.mtx"', '"short.csv"', "short.csv is of shape (1, 2); allowed: (2, 2); the case"),
+        ('"lower.mtx"', '"diagonal.npy"', "of a diagonal make a matrix, by numpy.diag"),
+        ('"lower.mtx"', '"zeros.npy"', "zeros.npy is zeros throughout"),
         ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
         (
             "roof =",

@@ -34,6 +34,8 @@ def test_commas_semicolons_and_blanks_part_numbers(tmp_path, mark):
         ("1,2,\n3,4,\n", "cells are empty"),
         ("1,,2\n3,4,5\n", "cells are empty"),
         ("1,5 2,5\n3,5 4,5\n", "write decimal points"),
+        ("1'500,0\n0,1\n", "thousands without separators"),
+        ('"1","0"\n"0","1"\n', "numbers without quotes"),
         ("1D3,0\n0,1D3\n", "1e3 in place of 1D3"),
         ("1 kN,0\n0,1 kN\n", "in SI units"),
         ("[[1,0],\n[0,1]]\n", "without brackets"),

@@ -115,6 +115,13 @@ HEAD = "%%MatrixMarket matrix coordinate real general\n"
         (HEAD + "2 2 1\n3 1 5.0\n", "index 3 of rows, counted from 1; allowed: .* from 1 to 2"),
         (HEAD + "2 2 1\n3 1 5.0\n", "the file states 2 × 2: mend the line of sizes, or the index"),
         (HEAD + "2 2 1\n1 0 5.0\n", "index 0 of columns, .* count from 0 need 1 added"),
+        (
+            HEAD.replace("general", "symmetric") + "2 2 3\n1 1 5.0\n2 1 1.0\n1 2 1.0\n",
+            "write general in the first line, or leave one triangle out",
+        ),
+        (HEAD.replace("general", "symmetric") + "2 3 1\n1 1 5.0\n", "mend the line of sizes"),
+        (HEAD + "2 2 1\n1 1 5,0\n", "write decimal points"),
+        (HEAD + "2 2 1\n1 1 5D3\n", "1e3 in place of 1D3"),
         (HEAD + "2 2\n1 1 5.0\n", "as 18 18 42 for 18 rows, 18 columns and 42 entries"),
         (HEAD.replace("general", "symetric") + "1 1 1\n1 1 5.0\n", "mend or write the first line"),
         (HEAD + "2 2 1\n1 1.5 5.0\n", "index 1.5 of columns"),
