@@ -134,9 +134,7 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
             if every_constant or name == "E":
                 label = f"loss factor of {name}, to first order"
                 yield _row(label, cuts, nature, error_text(0.0, nature))
-        if not every_constant:
-            return
-    if (loss := part.loss) is not None:
+    elif isinstance(part, ModulusResult) and (loss := part.loss) is not None:
         for name in "EGK" if every_constant else "E":
             error_cell = error_text(loss.error[name], loss.nature) if loss.error else ""
             yield _row(f"loss factor of {name}", getattr(loss, name), loss.nature, error_cell)

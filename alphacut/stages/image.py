@@ -11,7 +11,6 @@ from alphacut.base.arrays import Array
 from alphacut.base.kept_files import file_digest
 from alphacut.case.material import ImageCell
 from alphacut.fuzzy.result import Ends, Nature
-from alphacut.rve.fuzzy_cell import LossCuts
 from alphacut.rve.image.files import files_of, read_grid
 from alphacut.rve.image.study import (
     GUARANTEE,
@@ -40,8 +39,8 @@ class ImageResult:
     On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
     (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
     `plane` has the constants along the axes by definition and name, `proved_losses` loss factors
-    at nominal moduli to first order, `loss` estimates beside them of an image; `widths_GPa` has the
-    widths of E by cause. Bounds that pores or rigid phases leave unknown are null.
+    at nominal moduli to first order; `widths_GPa` has the widths of E by cause. Bounds that pores
+    or rigid phases leave unknown are null.
     """
 
     alpha: Array
@@ -58,7 +57,6 @@ class ImageResult:
     fractions: dict[str, float]
     division: int
     references: References
-    loss: LossCuts | None
     proved_losses: dict[str, Ends]
 
 
@@ -114,6 +112,5 @@ def image_result(found: FuzzyImageStiffness) -> ImageResult:
         fractions=dict(found.fractions),
         division=found.division,
         references=references,
-        loss=found.losses,
         proved_losses={name: Ends(*cut.T) for name, cut in found.proved_losses.items()},
     )

@@ -5,105 +5,139 @@ So with the moduli of one phase times 1 + t,
 
     [c(t) − c(0)]/t ≤ c′(0) ≤ [c(0) − c(−t)]/t   for any 0 < t < 1,
 
-and bounds of c bound c′(0)/c(0), the phase's share of the energy. The loss factor is the mean of
-the phases' by these shares, to first order in the loss factors; their squares are left out.
+and bounds of c bound c′(0)/c(0), the fraction of the energy that belongs to the phase. The loss
+factor is the mean of those of the phases by these fractions, to first order in the loss factors;
+their squares are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
+from alphacut.rve.image.bounds import Enclosure, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.energy import UNIT
 from alphacut.rve.image.model import ImageModel, ImageSolution
 from alphacut.rve.image.phases import ModuliImages
 
-MIN_CHANGE, MAX_CHANGE = 1e-6, 0.5
-CURVATURE = 0.5  # −c″/c of two phases in series with equal shares is 1/2
-ROUNDING = 64 * UNIT  # of quotients and differences, relative to 1/t
+ROUNDING = 64 * UNIT
+"""Bound of the rounding of quotients and differences, derived by counting operations."""
 
 
-def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, tuple[float, float]]:
-    """Bounds in Pa of constants that are least energies: E along axes, G and K of an average."""
+def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, Enclosure]:
+    """Return bounds in Pa of constants that are least energies, by name.
+
+    They are E along the axes, and G and K of an average of the plane, or of Hill's average.
+    """
     low, high = bounds.constants()[: bounds.dimension].T
-    values = {f"E_{'xyz'[k]}": (float(low[k]), float(high[k])) for k in range(len(low))}
+    values = {f"E_{'xyz'[k]}": Enclosure(float(low[k]), float(high[k])) for k in range(len(low))}
     return {**values, "G": bounds.shear(average), "K": bounds.bulk}
 
 
-def energy_shares(
+def energy_fractions(
     model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, n_phases: int
 ) -> dict[str, Array]:
-    """Bounds of each phase's share of the energy, (phases, 2), by the name of the constant.
+    """Return bounds of the fraction of the energy that belongs to each phase.
 
     Args:
-        model: The model of the solution.
-        solution: Solution of one image.
-        images: Its moduli, the least equal to the greatest.
+        model: Model of the solution.
+        solution: Solution of one image without pores, whose upper and lower moduli are the same.
+        images: Its moduli.
         phase: Number of the phase of each pixel or voxel.
         n_phases: Number of phases.
+
+    Returns:
+        Bounds by the name of the constant, shape (phases, 2) each.
     """
     unchanged = concave_constants(solution.bounds, model.average)
-    shares = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
-    gap = max(high / low - 1 for low, high in unchanged.values())
-    # the error gap/t + CURVATURE t/2 is least here
-    t = float(np.clip(np.sqrt(2 * gap / CURVATURE), MIN_CHANGE, MAX_CHANGE))
+    fractions = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
+    # Each quotient is off by at most gap/t + |c″/c| t/2, which is least at t = √(2 gap/|c″/c|). Of
+    # two phases in series with equal fractions |c″/c| is 1/2. Any t is proved.
+    gap = max(ends.upper / ends.lower - 1 for ends in unchanged.values())
+    t = float(np.clip(np.sqrt(2 * gap / 0.5), 1e-6, 0.5))
     for k in range(n_phases):
-        changed_lower = {}  # lower bounds of c(t) and c(−t)
-        for change in (t, -t):
-            factor = np.where(phase == k, 1 + change, 1.0)
-            moduli = factor * images.bulk[0], factor * images.shear[0]
-            stresses = model.solve_side(0, *moduli, solution.lower)
-            assert stresses is not None  # phases that have losses are no pores
-            below = inverse_below(stresses.energy.upper)
-            bounds = concave_constants(StiffnessBounds(below, below), model.average)
-            changed_lower[change] = {name: low for name, (low, _) in bounds.items()}
+        stiffer = _lower_bounds_with(1 + t, k, model, solution, images, phase)
+        softer = _lower_bounds_with(1 - t, k, model, solution, images, phase)
         for name, (low, high) in unchanged.items():
-            # c′(0), and its share of c(0), which is within low … high
-            least_slope = (changed_lower[t][name] - high) / t
-            greatest_slope = (high - changed_lower[-t][name]) / t
-            least = least_slope / (high if least_slope > 0 else low)
-            greatest = greatest_slope / (low if greatest_slope > 0 else high)
-            shares[name][k] = np.clip((least - ROUNDING / t, greatest + ROUNDING / t), 0, 1)
-    return shares
+            # c′(0) is between these slopes, and c(0) between low and high
+            min_slope = (stiffer[name] - high) / t
+            max_slope = (high - softer[name]) / t
+            lower = min_slope / (high if min_slope > 0 else low)
+            upper = max_slope / (low if max_slope > 0 else high)
+            ends = lower - ROUNDING / t, upper + ROUNDING / t
+            fractions[name][k] = np.clip(ends, 0, 1)
+    return fractions
 
 
-def mean_loss(
-    shares: Array, lowest: Sequence[float], highest: Sequence[float]
-) -> tuple[float, float]:
-    """Bounds of Σ share · loss, where the shares, within (phases, 2), sum to 1.
+def _lower_bounds_with(
+    factor: float,
+    changed_phase: int,
+    model: ImageModel,
+    solution: ImageSolution,
+    images: ModuliImages,
+    phase: Ints,
+) -> dict[str, float]:
+    """Return lower bounds of the constants with the moduli of one phase times a factor."""
+    factors = np.where(phase == changed_phase, factor, 1.0)
+    moduli = factors * images.bulk[0], factors * images.shear[0]
+    stresses = model.solve_side(0, *moduli, solution.lower)
+    assert stresses is not None  # None beside pores alone
+    stiffness = inverse_below(stresses.energy.upper)
+    bounds = concave_constants(StiffnessBounds(stiffness, stiffness), model.average)
+    return {name: ends.lower for name, ends in bounds.items()}
+
+
+def mean_loss(fractions: Array, lowest: Array, highest: Array) -> Enclosure:
+    """Return bounds of Σ fraction · loss, where the fractions sum to 1.
 
     Args:
-        shares: Bounds of the shares.
-        lowest: Least loss factor of each phase.
-        highest: Greatest loss factor of each phase.
+        fractions: Bounds of the fraction of each phase, shape (phases, 2).
+        lowest: Lower bound of the loss factor of each phase.
+        highest: Upper bound of it.
     """
-    return _least_mean(shares, np.array(lowest)), -_least_mean(shares, -np.array(highest))
+    lower = _min_mean(fractions, np.asarray(lowest))
+    return Enclosure(lower, -_min_mean(fractions, -np.asarray(highest)))
 
 
-def _least_mean(shares: Array, losses: Array) -> float:
-    """Least Σ share · loss: what the least shares leave goes to the phases of the least loss."""
-    share, remaining = shares[:, 0].copy(), 1 - shares[:, 0].sum()
+def _min_mean(fractions: Array, losses: Array) -> float:
+    """Return the least Σ fraction · loss over fractions within bounds that sum to 1.
+
+    It is attained where phases take as much as they can in the order of rising loss, and the others
+    their smallest fraction.
+    """
+    used = fractions[:, 0].copy()
+    remaining = 1 - used.sum()
     for k in np.argsort(losses):
-        added = min(remaining, shares[k, 1] - share[k])
-        share[k], remaining = share[k] + added, remaining - added
-    common = losses.min()  # equal losses are exact
-    return float(common + share @ (losses - common) - ROUNDING * np.abs(losses).max())
+        added = min(remaining, fractions[k, 1] - used[k])
+        used[k] += added
+        remaining -= added
+    common = losses.min()  # taken out, so that equal losses are exact
+    return float(common + used @ (losses - common) - ROUNDING * np.abs(losses).max())
 
 
-def loss_of_young(bounds: StiffnessBounds, bulk: Array, shear: Array, average: str) -> Array:
-    """Bounds of the loss factor of an average's E from those of its K and G, (levels, 2) each.
+def loss_of_young(bounds: StiffnessBounds, losses: Mapping[str, Array], average: str) -> Array:
+    """Return bounds of the loss factor of E of an average, shape (levels, 2).
 
-    Of E = 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain; positive by the bounds.
+    E is 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain. So d ln E = w d ln K +
+    (1 − w) d ln G with w = G/(3 K + G) or, in the plane, w = G/(3 K − G). The sum is bilinear in w
+    and the loss factors, so that it is extreme at their ends.
+
+    Args:
+        bounds: Bounds of the stiffness, by which E is positive.
+        losses: Bounds of the loss factors of "K" and "G", shape (levels, 2) each.
+        average: Average of the plane.
     """
-    # d ln E = w d ln K + (1 − w) d ln G with w = G/(3 K + G), of the plane G/(3 K − G)
-    (low_bulk, high_bulk), (low_shear, high_shear) = bounds.bulk, bounds.shear(average)
+    min_bulk, max_bulk = bounds.bulk
+    min_shear, max_shear = bounds.shear(average)
     sign = 1 if bounds.dimension == 3 else -1
-    weights = [
-        low_shear / (3 * high_bulk + sign * low_shear),
-        high_shear / (3 * low_bulk + sign * high_shear),
+    min_weight = min_shear / (3 * max_bulk + sign * min_shear)
+    max_weight = max_shear / (3 * min_bulk + sign * max_shear)
+    values = [
+        w * of_bulk + (1 - w) * of_shear
+        for w in (min_weight, max_weight)
+        for of_bulk in losses["K"].T
+        for of_shear in losses["G"].T
     ]
-    means = [w * k + (1 - w) * g for w in weights for k in bulk.T for g in shear.T]
-    return np.stack([np.min(means, axis=0), np.max(means, axis=0)], axis=-1)
+    return np.stack([np.min(values, axis=0), np.max(values, axis=0)], axis=-1)

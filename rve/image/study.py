@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -18,16 +17,17 @@ import numpy as np
 
 from alphacut.base.array_files import read_npy
 from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.csv_text import csv_text
 from alphacut.base.errors import FailedError, require, require_choice
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.result import Ends, Nature, rounded
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.rve.cell.cell import Phase
-from alphacut.rve.fuzzy_cell import LossCuts, fuzzy_number, loss_corners, phase_loss_cuts
+from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import needed_memory, read_grid, require_memory
-from alphacut.rve.image.losses import energy_shares, loss_of_young, mean_loss
-from alphacut.rve.image.model import ImageCut, ImageModel, phase_energies, usual_division
+from alphacut.rve.image.losses import energy_fractions, loss_of_young, mean_loss
+from alphacut.rve.image.model import ImageCut, ImageModel, ImageSolution, usual_division
 from alphacut.rve.image.phases import (
     RIGID,
     ModuliImages,
@@ -36,32 +36,28 @@ from alphacut.rve.image.phases import (
     require_phases,
     threshold_ranges,
 )
+from alphacut.rve.image.raw import HEADS
 from alphacut.rve.result.engineering_constants import NAMES
-from alphacut.rve.result.loss_factors import CONSTANTS, first_order
-from alphacut.rve.result.moduli import ISOTROPIC, plane_constants
+from alphacut.rve.result.moduli import ISOTROPIC
 from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
-from alphacut.rve.result.result import PhaseEnergies
 from alphacut.stochastic.segmentation import segment
 
 if TYPE_CHECKING:
     import xarray
 
-ACCURACY = 1e-5
-"""Relative energy that the solver may leave."""
 GUARANTEE = Nature.GUARANTEED
-"""What all bounds promise: they are proved of the image as segmented, repeated periodically."""
-AXES = {2: ["11", "22", "12"], 3: ["11", "22", "33", "23", "13", "12"]}
+"""Guarantee of all bounds: they are proved of the image as segmented, repeated periodically."""
 CONSTANT_NAMES = {
     2: NAMES,
     3: ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy"),
 }
-"""Constants along the axes of an image in plane strain, and of a volume."""
+"""Constants along the axes of an image in plane strain, and of a volume, by the dimension."""
 SIDES = "lower", "upper"
-VOLUMES = (".mhd", ".mha", ".nhdr", ".nrrd")
+"""Names of the two bounds."""
 AlphaLevel = float | None
 """α-level, or None for the nominal values alone."""
 PhaseRanges = Callable[[AlphaLevel], tuple[Ints, Ints]]
-"""Function to the least and greatest phase of each pixel at a level."""
+"""Function from a level to the lowest and the highest number of the phase of each pixel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +95,18 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
     dimension = len(lengths) if len(lengths) > 1 else _dimension_of(file)
     require(len(lengths) in (1, dimension), "spacing", spacing, f"one length, or {dimension}")
     require(min(lengths) > 0, "spacing", spacing, "positive lengths in m")
-    in_order = (lengths * dimension if len(lengths) == 1 else lengths)[::-1]
-    sides = [length / in_order[-1] for length in in_order]
-    return GreyImage(read_grid(file, sides), in_order)
+    if len(lengths) == 1:
+        lengths *= dimension
+    image_lengths = lengths[::-1]
+    sides = [length / image_lengths[-1] for length in image_lengths]
+    return GreyImage(read_grid(file, sides), image_lengths)
 
 
 def _dimension_of(file: Path) -> int:
+    """Return 2 for a picture and 3 for a volume."""
     if file.suffix.lower() == ".npy":
         return int(np.ndim(read_npy(file, kinds="buifc")))
-    return 3 if file.is_dir() or file.suffix.lower() in VOLUMES else 2
+    return 3 if file.is_dir() or file.suffix.lower() in HEADS else 2
 
 
 @dataclass(frozen=True)
@@ -127,11 +126,10 @@ class ImagePhase:
     @classmethod
     def of(cls, values: Mapping[str, FuzzyNumber | float]) -> ImagePhase:
         """Return the phase of a mapping with modulus, poisson and, if asked for, loss."""
-        for name in values:
+        numbers = {}
+        for name, value in values.items():
             require_choice("key of a phase", name, ("modulus", "poisson", "loss"))
-        numbers = {
-            name: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for name, x in values.items()
-        }
+            numbers[name] = _as_fuzzy(value)
         for name in ("modulus", "poisson"):
             require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
         return cls(**numbers)
@@ -142,6 +140,11 @@ class ImagePhase:
         return self.modulus.support.lower > 0 and self.modulus.support.upper < RIGID
 
 
+def _as_fuzzy(value: FuzzyNumber | float) -> FuzzyNumber:
+    """Return a number as a fuzzy number."""
+    return value if isinstance(value, FuzzyNumber) else Crisp(float(value))
+
+
 @dataclass(frozen=True, eq=False)
 class ImageStudy:
     """An image ready to be solved.
@@ -150,7 +153,7 @@ class ImageStudy:
         image: Its values.
         phases: Its phases, dark first.
         names: Their names.
-        phase_ranges: The phases that each pixel may be of, at a level.
+        phase_ranges: Function to the phases that each pixel may be of, at a level.
         fuzzy_threshold: Whether these depend on the level.
     """
 
@@ -176,27 +179,31 @@ class ImageStudy:
         return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
 
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
-        """Return least and greatest moduli of each pixel, at levels of threshold and phases."""
-        moduli = [
-            ModuliInterval.of_young(
-                cut_or_nominal(phase.modulus, phases),
-                cut_or_nominal(phase.poisson, phases),
-                self.dimension,
-            )
-            for phase in self.phases
-        ]
-        return moduli_images(*self.phase_ranges(threshold), moduli)
+        """Return the lower and upper moduli of each pixel, at levels of threshold and phases."""
+        moduli = []
+        for phase in self.phases:
+            modulus = _cut_or_nominal(phase.modulus, phases)
+            poisson = _cut_or_nominal(phase.poisson, phases)
+            moduli.append(ModuliInterval.of_young(modulus, poisson, self.dimension))
+        first, last = self.phase_ranges(threshold)
+        return moduli_images(first, last, moduli)
+
+    @property
+    def nominal_phase(self) -> Ints:
+        """Number of the phase of each pixel or voxel at the nominal threshold."""
+        first, _ = self.phase_ranges(None)
+        return first
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Fraction of each phase at the nominal values by the phase's name, dark first."""
-        phase = self.phase_ranges(None)[0]
+        """Fraction of each phase at the nominal threshold by the phase's name, dark first."""
+        phase = self.nominal_phase
         counts = np.bincount(phase.ravel(), minlength=len(self.phases))
         return dict(zip(self.names, map(float, counts / phase.size), strict=True))
 
 
-def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
-    """Return the cut of a number at a level, or its nominal value twice."""
+def _cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
+    """Return the cut of a number at a level, or its nominal value twice where the level is None."""
     return (number.nominal, number.nominal) if level is None else number.cut(level)
 
 
@@ -219,39 +226,49 @@ def image_study(
         RefusedError: A threshold or a label does not fit the image, or its sides are too unlike.
     """
     ImageModel(image.sides)  # refuses sides too unlike
-    count, has_one = len(labels) or len(thresholds) + 1, bool(labels) != bool(thresholds)
+    count = len(labels) or len(thresholds) + 1
+    has_one = bool(labels) != bool(thresholds)
     require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
     require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
-    grey = image.values
     if labels:
-        phase = np.full(grey.shape, -1)
-        for number, label in enumerate(labels):
-            phase[grey == label] = number
-        values = {float(x) for x in np.unique(grey)}
-        wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
-        allowed = "every value of the image, and no other"
-        require(not wrong, "cell.labels", value=wrong, allowed=allowed)
-        names = tuple(f"label {label:g}" for label in labels)
-        return ImageStudy(image, tuple(phases), names, lambda level: (phase, phase), False)
-    require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
+        return _labelled_study(image, tuple(phases), labels)
+
+    grey = image.values
+    require_phases(grey, [number.cut(0.0) for number in thresholds])
     is_fuzzy = any(number.support.width > 0 for number in thresholds)
-    segmentation = None  # of a volume, whose noise is not judged
+    segmentation = None  # the noise of a volume is not judged
     if grey.ndim == 2:
         segmentation = segment(grey, [number.nominal for number in thresholds])
         segmentation.require_certain()
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
-        """Return least and greatest phase of each pixel at a level."""
+        """Return the lowest and the highest phase of each pixel at a level."""
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if segmentation is not None and level is not None and not is_fuzzy:
             return segmentation.ranges()
-        return threshold_ranges(grey, [cut_or_nominal(number, level) for number in thresholds])
+        return threshold_ranges(grey, [_cut_or_nominal(number, level) for number in thresholds])
 
     greys = [f"{number.nominal:g}" for number in thresholds]
     between = [f"grey {low} … {high}" for low, high in pairwise(greys)]
     names = (f"grey below {greys[0]}", *between, f"grey above {greys[-1]}")
     is_open = segmentation is not None and segmentation.open_fraction > 0
     return ImageStudy(image, tuple(phases), names, phase_ranges, is_fuzzy or is_open)
+
+
+def _labelled_study(
+    image: GreyImage, phases: tuple[ImagePhase, ...], labels: Sequence[float]
+) -> ImageStudy:
+    """Return the study of a labelled image; RefusedError where labels and values are not alike."""
+    grey = image.values
+    phase = np.full(grey.shape, -1)
+    for number, label in enumerate(labels):
+        phase[grey == label] = number
+    values = {float(x) for x in np.unique(grey)}
+    wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
+    allowed = "every value of the image, and no other"
+    require(not wrong, "cell.labels", value=wrong, allowed=allowed)
+    names = tuple(f"label {label:g}" for label in labels)
+    return ImageStudy(image, phases, names, lambda level: (phase, phase), False)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -264,11 +281,11 @@ class FuzzyImageStiffness:
         alpha: Levels, shape (A,).
         cuts: Bounds at each of them.
         average: Average that E and ν of the plane are of; of a volume it is Hill's.
-        widths: Width of E at the lowest level by what it comes from, in Pa, the largest first.
+        widths: Width of E at the lowest level by its cause, in Pa, the largest first; empty where
+            E has one bound alone.
         fractions: Fraction of each phase by its name.
         proved_losses: Loss factors at nominal moduli, to first order, by the name of the constant,
             shape (A, 2) each; empty where phases have none.
-        losses: Estimates of those of E, G and K of an image beside them.
         references: Classical bounds of isotropic composites; None beside pores or rigid phases.
         division: Elements along each side of a pixel or voxel.
         seconds: Wall time.
@@ -283,7 +300,6 @@ class FuzzyImageStiffness:
     widths: Mapping[str, float]
     fractions: Mapping[str, float]
     proved_losses: Mapping[str, Array]
-    losses: LossCuts | None
     references: ReferenceBounds | None
     division: int
     seconds: float
@@ -315,7 +331,7 @@ class FuzzyImageStiffness:
         return dict(zip(CONSTANT_NAMES[len(self.lengths)], values, strict=True))
 
     def widths_by_cause(self) -> str:
-        """Return the width of E at the lowest level by what it comes from, in words."""
+        """Return the width of E at the lowest level by its cause, in words."""
         if not self.widths:
             return "no width of E: one of its bounds is not known beside pores or rigid phases"
         texts = (f"{cause} {width / 1e9:.3g} GPa" for cause, width in self.widths.items())
@@ -324,24 +340,25 @@ class FuzzyImageStiffness:
     def __str__(self) -> str:
         """Return the guarantee, a line for each constant, and the fractions."""
         kind = "image" if len(self.lengths) == 2 else "volume"
-        first, last = self.alpha[[0, -1]]
         lines = [f"bounds {GUARANTEE} of the {kind}, repeated periodically; {self.seconds:.2g} s"]
         for name, bounds in {"E": self.young, **self.constants}.items():
-            lowest, highest = (_range_text(bounds[row]) for row in (0, -1))
-            lines.append(f"{name}: α = {first:g}: {lowest}; α = {last:g}: {highest}")
-        shares = ", ".join(f"{name} {share:.1%}" for name, share in self.fractions.items())
-        return "\n".join([*lines, f"phases: {shares}"])
+            texts = [f"α = {self.alpha[row]:g}: {_range_text(bounds[row])}" for row in (0, -1)]
+            lines.append(f"{name}: {'; '.join(texts)}")
+        fractions = (f"{name} {fraction:.1%}" for name, fraction in self.fractions.items())
+        lines.append(f"phases: {', '.join(fractions)}")
+        return "\n".join(lines)
 
     __repr__ = __str__
 
     def to_csv(self, path: str) -> None:
         """Write a row for each constant and level: bounds in SI."""
-        lines = ["constant,alpha,lower,upper,guarantee"]
+        rows = []
         for name, bounds in {"E": self.young, **self.constants}.items():
             for row, alpha in enumerate(self.alpha):
                 lower, upper = float(bounds[row, 0]), float(bounds[row, 1])
-                lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{GUARANTEE}")
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+                rows.append((name, f"{alpha:g}", f"{lower!r}", f"{upper!r}", str(GUARANTEE)))
+        text = csv_text(("constant", "alpha", *SIDES, "guarantee"), rows)
+        Path(path).write_text(text, encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
         """Return a dataset of the bounds on each level, in SI, and of the phase of each pixel.
@@ -362,8 +379,8 @@ class FuzzyImageStiffness:
             "phase": (grid, self.phase.astype(np.float32)),
             "is_open": (grid, self.is_open.astype(np.uint8)),
         }
-        axes = {"alpha": self.alpha, "bound": [*SIDES]}
-        axes |= dict.fromkeys(("row", "column"), AXES[self.phase.ndim])
+        voigt = ["11", "22", "33", "23", "13", "12"] if len(grid) == 3 else ["11", "22", "12"]
+        axes = {"alpha": self.alpha, "bound": [*SIDES], "row": voigt, "column": voigt}
         attributes = {
             "nature": str(GUARANTEE),
             "lengths": self.lengths,
@@ -394,7 +411,7 @@ def fuzzy_image_stiffness(
 
     Args:
         image: The periodic cell; see `read_image`.
-        phases: Of each phase, dark first, its modulus (Pa), poisson and, if asked for, loss.
+        phases: For each phase, dark first, its modulus (Pa), poisson and, if asked for, loss.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
         alpha: Rising levels.
@@ -406,7 +423,7 @@ def fuzzy_image_stiffness(
         RefusedError: A value is not allowed, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other.
     """
-    numbers = [x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for x in thresholds]
+    numbers = [_as_fuzzy(threshold) for threshold in thresholds]
     listed = [ImagePhase.of(values) for values in phases]
     study = image_study(image, listed, thresholds=numbers, labels=labels)
     with progress_reporter(progress) as tick:
@@ -418,105 +435,114 @@ def fuzzy_image_stiffness(
 def solve_study(
     study: ImageStudy, *, alpha: Sequence[float], average: str, device: str, tick: Progress
 ) -> FuzzyImageStiffness:
-    """Return the bounds of a study on α-levels, and what widens them; see above."""
-    start, phases = perf_counter(), study.phases
+    """Return the bounds of a study on α-levels, and what widens them.
+
+    The arguments and exceptions are those of `fuzzy_image_stiffness`; `tick` is called with the
+    completed fraction.
+    """
+    start = perf_counter()
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     division = usual_division(nominal)
     require_memory(nominal.bulk[0].shape, division)
-    solver = ConjugateGradient(ACCURACY)
+    solver = ConjugateGradient(accuracy=1e-5)
     model = ImageModel(study.image.sides, division, solver, average, device)
-    crisp = model.solve(nominal)
-    n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths of two sources
+    solution = model.solve(nominal)
+    n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
     images = [study.images(level, level) for level in alpha]
-    of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
-    cuts = model.cuts(images, (nominal, crisp), of_cuts)
+    progress_of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
+    cuts = model.cuts(images, (nominal, solution), progress_of_cuts)
     model.require_consistent(images, cuts)
     _require_positive(cuts[0])
     tick((len(alpha) + 3) / n_solutions)
 
-    def width(threshold: AlphaLevel, of_phases: AlphaLevel) -> float:
-        """Return the width of E in Pa at levels of the threshold and of the phases."""
-        (cut,) = model.cuts([study.images(threshold, of_phases)], (nominal, crisp))
-        return float(cut.modulus[1] - cut.modulus[0])
-
     widths = dict[str, float]()
-    has_both_bounds = bool(np.isfinite(cuts[0].bounds.width))
-    if has_both_bounds:
-        base, lowest = width(None, None), alpha[0]
-        widths["discretisation"] = base
-        if study.fuzzy_threshold:
-            widths["threshold"] = max(0.0, width(lowest, None) - base)
-        if any(x.support.width > 0 for phase in phases for x in (phase.modulus, phase.poisson)):
-            widths["phases"] = max(0.0, width(None, lowest) - base)
-    proved, estimates = dict[str, Array](), None
-    nominal_phase = study.phase_ranges(None)[0]
-    losses = [phase.loss for phase in phases if phase.loss is not None]
-    if losses:
-        require(len(losses) == len(phases), "loss", f"of {len(losses)} phases", "each, 0 for none")
-        phase_cuts = phase_loss_cuts(losses, alpha)
-        shares = energy_shares(model, crisp, nominal, nominal_phase, len(phases))
-        proved = {
-            name: np.array([mean_loss(parts, *cut) for cut in phase_cuts])
-            for name, parts in shares.items()
-        }
-        young = loss_of_young(crisp.bounds, proved["K"], proved["G"], average)
-        proved = {"E": young, **proved}
-        if study.dimension == 2:
-            energies = phase_energies(model, crisp, nominal, nominal_phase, len(phases))
-            estimates = _estimated_losses(energies, phase_cuts, average)
     references = None
-    if has_both_bounds and all(phase.is_solid for phase in phases):
-        isotropic = [Phase(phase.modulus.nominal, phase.poisson.nominal) for phase in phases]
-        of_phases = [*study.fractions.values()]
-        is_space = study.dimension == 3
-        references = reference_bounds(isotropic, fractions=of_phases, space=is_space)
+    if np.isfinite(cuts[0].bounds.width):
+        widths = _widths_by_cause(study, model, solution, lowest=alpha[0])
+        if all(phase.is_solid for phase in study.phases):
+            references = _reference_bounds(study)
     first, last = study.phase_ranges(alpha[0])
     return FuzzyImageStiffness(
         alpha=np.array(alpha, float),
         cuts=cuts,
         average=average,
-        widths={cause: widths[cause] for cause in sorted(widths, key=lambda x: -widths[x])},
+        widths=widths,
         fractions=study.fractions,
-        proved_losses=proved,
-        losses=estimates,
+        proved_losses=_proved_losses(study, model, solution, alpha),
         references=references,
-        division=model.division,
+        division=division,
         seconds=perf_counter() - start,
-        phase=nominal_phase,
+        phase=study.nominal_phase,
         is_open=first != last,
         lengths=study.image.lengths,
     )
 
 
+def _widths_by_cause(
+    study: ImageStudy, model: ImageModel, solution: ImageSolution, *, lowest: float
+) -> dict[str, float]:
+    """Return the width of E in Pa by its cause, the largest first.
+
+    The width at nominal values comes from the discretisation. What a fuzzy threshold or fuzzy
+    phases add alone, at the level `lowest`, comes from these. `solution` is that of the nominal
+    values.
+    """
+
+    def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
+        """Return the width at levels of the threshold and of the phases."""
+        nominal = study.images(None, None)
+        (cut,) = model.cuts([study.images(threshold, phases)], (nominal, solution))
+        return float(cut.modulus.upper - cut.modulus.lower)
+
+    at_nominal = width(None, None)
+    widths = {"discretisation": at_nominal}
+    if study.fuzzy_threshold:
+        widths["threshold"] = max(0.0, width(lowest, None) - at_nominal)
+    numbers = [x for phase in study.phases for x in (phase.modulus, phase.poisson)]
+    if any(number.support.width > 0 for number in numbers):
+        widths["phases"] = max(0.0, width(None, lowest) - at_nominal)
+    return dict(sorted(widths.items(), key=lambda item: -item[1]))
+
+
+def _proved_losses(
+    study: ImageStudy, model: ImageModel, solution: ImageSolution, alpha: Sequence[float]
+) -> dict[str, Array]:
+    """Return bounds of loss factors at nominal moduli, shape (levels, 2), by constant.
+
+    They are empty where no phase has a loss factor. `solution` is that of the nominal values.
+    """
+    phases = study.phases
+    losses = [phase.loss for phase in phases if phase.loss is not None]
+    if not losses:
+        return {}
+    require(len(losses) == len(phases), "loss", f"of {len(losses)} phases", "each, 0 for none")
+    cuts = phase_loss_cuts(losses, alpha)
+    fractions = energy_fractions(
+        model, solution, study.images(None, None), study.nominal_phase, len(phases)
+    )
+    proved = {
+        name: np.array([mean_loss(of_constant, lowest, highest) for lowest, highest in cuts])
+        for name, of_constant in fractions.items()
+    }
+    return {"E": loss_of_young(solution.bounds, proved, model.average), **proved}
+
+
+def _reference_bounds(study: ImageStudy) -> ReferenceBounds:
+    """Return the classical bounds of an isotropic composite of the nominal phases."""
+    phases = [Phase(phase.modulus.nominal, phase.poisson.nominal) for phase in study.phases]
+    fractions = list(study.fractions.values())
+    return reference_bounds(phases, fractions=fractions, space=study.dimension == 3)
+
+
 def _require_positive(widest: ImageCut) -> None:
     """Refuse bounds that do not tell that E is positive, where there are two."""
+    if widest.modulus.lower > 0 or not np.isfinite(widest.bounds.width):
+        return  # beside pores and rigid phases there are no better ones
     low, high = (end / 1e9 for end in widest.modulus)
-    if low <= 0 and np.isfinite(widest.bounds.width):  # pores and rigid phases have no better
-        ends = [(float(x), float(y)) for x, y in widest.constants / 1e9]
-        along = zip("xyz"[: widest.bounds.dimension], ends, strict=False)
-        along_axes = ", ".join(f"E_{name} {x:.4g} … {y:.4g} GPa" for name, (x, y) in along)
-        what = f"the bounds of E, {low:.4g} … {high:.4g} GPa, do not tell that it is positive"
-        raise FailedError(what, f"take a finer image, or {along_axes}")
-
-
-def _estimated_losses(energies: PhaseEnergies, cuts: Array, average: str) -> LossCuts:
-    """Return loss factors of E, G and K of an image at nominal moduli.
-
-    Args:
-        energies: Parts of the phases in the strain energy.
-        cuts: Loss factors of the phases, shape (levels, 2, phases).
-        average: Average that E and ν are of.
-    """
-    constants_of = partial(plane_constants, average=average)
-    fractions, _ = energies.energy_fractions(constants_of)
-    corners = loss_corners(cuts, fractions)
-    # level l, end e, constant c, phase p, K or G x
-    bounds = np.einsum("lecpx,pxc->cle", corners, fractions)
-    largest = corners[0, 1, 0]
-    _, errors = first_order(energies, largest, constants_of)
-    # what the first order leaves out is of the order of the squared difference of losses
-    errors = errors + np.ptp(largest) ** 2 * bounds[:, 0, 1]
-    by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
-    ends = {name: Ends(*cut.T) for name, cut in zip(CONSTANTS, bounds, strict=True)}
-    return LossCuts(**ends, error=by_name, nature=Nature.ESTIMATED)
+    texts = []
+    for axis, constant in zip("xyz", range(widest.bounds.dimension), strict=False):
+        lower, upper = widest.constants[constant] / 1e9
+        texts.append(f"E_{axis} {lower:.4g} … {upper:.4g} GPa")
+    what = f"the bounds of E, {low:.4g} … {high:.4g} GPa, do not tell that it is positive"
+    raise FailedError(what, f"take a finer image, or {', '.join(texts)}")

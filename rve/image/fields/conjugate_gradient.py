@@ -1,6 +1,6 @@
-"""Preconditioned conjugate gradients on several loads, stopped by a bound of the energy to gain.
+"""Preconditioned conjugate gradients, stopped by a bound of the energy that is still to be gained.
 
-Fields lack at most (residual · preconditioned residual) / λ, where λ is a lower bound of the
+A field lacks at most (residual · preconditioned residual) / λ, where λ is a lower bound of the
 spectrum of the preconditioned operator, here from the materials. The lengths of the steps sharpen
 that bound without further cost: it is the rule of Gauss and Radau for the same integral (Golub and
 Meurant 1997; in this form Meurant and Tichý 2013), above the true energy at every step. So the
@@ -14,118 +14,106 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
 
 LOG = logging.getLogger(__name__)
 
-LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
-
-
 LinearMap = Callable[[Fields], Fields]
-"""A symmetric linear map of fields, shape (loads, unknowns, *grid)."""
+"""A symmetric linear map of a field, shape (1, unknowns, *grid)."""
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Fields with operator(fields) = load.
+    """The linear system operator(x) = load of a field x.
 
     Args:
-        operator: Positive on fields that matter.
+        operator: Symmetric map, positive on the fields that matter.
         preconditioner: Inverse of the operator of one constant material.
-        load: Right-hand sides, shape (loads, unknowns, *grid).
-        scale: Energy that an accuracy refers to, shape (loads,).
-        least: Energy of any field over the one that it has in the constant material, at least.
-        start: First guess, of the load's shape; None: zero.
+        load: Right-hand side, shape (1, unknowns, *grid).
+        scale: Energy that an accuracy refers to.
+        min_energy_ratio: Positive lower bound of the energy x · operator(x) of any field over its
+            energy in the constant material.
+        start: First guess, of the shape of `load`; None for zero.
     """
 
     operator: LinearMap
     preconditioner: LinearMap
     load: Fields
-    scale: Array
-    least: float
+    scale: float
+    min_energy_ratio: float
     start: Fields | None = None
 
 
 @dataclass(frozen=True)
 class ConjugateGradient:
-    """The solver's stopping rule.
+    """The solver and its stopping rule.
 
     Args:
-        accuracy: Energy that the fields may lack, relative to the system's scale, in (0, 0.1]; a
-            bound of the stiffness is then within three times that of the one of solved fields.
-        watch: Called before every iteration; what it raises ends it.
+        accuracy: Energy that the field may lack, over the scale of its system, in (0, 0.1]. A bound
+            of the stiffness is then within three times that of the bound by solved fields.
+        watch: Function that is called before every iteration; what it raises ends the solution.
     """
 
     accuracy: float = 3e-6
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
-    def solve(self, system: System) -> tuple[Fields, int]:
-        """Fields of all loads with an energy error within the accuracy, and number of iterations.
+    def solve(self, system: System) -> Fields:
+        """Return a field whose energy error is within the accuracy.
 
         Raises:
-            FailedError: `LIMIT` iterations are not enough.
+            FailedError: The largest number of iterations does not suffice.
         """
+        max_iterations = 2000  # with the preconditioner, contrasts of 1e6 need fewer
         if system.start is None:
-            x, r = namespace(system.load).zeros_like(system.load), system.load.copy()
+            x = namespace(system.load).zeros_like(system.load)
+            residual = system.load.copy()
         else:
-            x, r = system.start.copy(), system.load - system.operator(system.start)
-        p = system.preconditioner(r)
-        gamma = inner(r, p)  # residual · preconditioned residual
-        # energy error ≤ error_factor · gamma, by the lower bound of the spectrum
-        error_factor = np.full(gamma.shape, 1 / system.least)
-        allowed = self.accuracy * system.scale
-        is_solved = np.zeros(gamma.shape, bool)
-        for number in range(LIMIT):
+            x = system.start.copy()
+            residual = system.load - system.operator(x)
+        direction = system.preconditioner(residual)
+        gamma = inner(residual, direction)
+        # The energy error is at most error_factor · gamma: gamma is the energy that the field lacks
+        # in the constant material.
+        error_factor = 1 / system.min_energy_ratio
+        for iteration in range(max_iterations):
             self.watch()
-            is_solved |= error_factor * gamma <= allowed
-            if is_solved.all():
-                LOG.debug("fields on %s points: %d iterations", x.shape[2:], number)
-                return x, number
-            Ap = system.operator(p)
-            # a load that is solved rests: its directions are rounding, and so are their steps
-            alpha = np.where(is_solved, 0, _ratio(gamma, inner(p, Ap)))
-            _add_multiple(x, alpha, p)
-            _add_multiple(r, -alpha, Ap)
-            del Ap  # memory for the preconditioner
-            z = system.preconditioner(r)
-            last_gamma, gamma = gamma, inner(r, z)
-            beta = _ratio(gamma, last_gamma)
-            error_factor = _radau(error_factor - alpha, beta, system.least)
-            _add_multiple(z, beta, p)
-            p = z
-        energy_error = float((error_factor * gamma / system.scale).max())
+            if error_factor * gamma <= self.accuracy * system.scale:
+                LOG.debug("a field on %s points: %d iterations", x.shape[2:], iteration)
+                return x
+            forces = system.operator(direction)
+            curvature = inner(direction, forces)
+            step = gamma / curvature if curvature > 0 else 0.0  # 0 by rounding alone
+            _add_multiple(x, step, direction)
+            _add_multiple(residual, -step, forces)
+            del forces  # leaves memory for the preconditioner
+            preconditioned = system.preconditioner(residual)
+            last_gamma = gamma
+            gamma = inner(residual, preconditioned)
+            beta = gamma / last_gamma
+            # the Gauss-Radau rule with the node min_energy_ratio (Meurant and Tichý 2013); rounding
+            # may exhaust what is left of the factor, and the bound without the steps holds then
+            excess = error_factor - step
+            error_factor = 1 / system.min_energy_ratio
+            if excess > 0:
+                error_factor = excess / (system.min_energy_ratio * excess + beta)
+            _add_multiple(preconditioned, beta, direction)
+            direction = preconditioned
+        energy_error = error_factor * gamma / system.scale
         raise FailedError(
-            f"the image's fields lack up to {energy_error:.1e} of the energy after {LIMIT}"
-            f" iterations, {self.accuracy:.1e} is allowed",
+            f"the image's fields lack up to {energy_error:.1e} of the energy after"
+            f" {max_iterations} iterations, {self.accuracy:.1e} is allowed",
             "lower the contrast of the phases or allow more",
         )
 
 
-def inner(first: Fields, second: Fields) -> Array:
-    """Inner products of fields, shape (loads,)."""
+def inner(first: Fields, second: Fields) -> float:
+    """Return the inner product of two arrays of one shape."""
     xp = namespace(first)
-    left, right = (xp.reshape(x, (x.shape[0], 1, -1)) for x in (first, second))
-    products = left @ xp.moveaxis(right, 1, 2)
-    return np.array([float(product) for product in products[:, 0, 0]])
+    return float(xp.vdot(xp.reshape(first, (-1,)), xp.reshape(second, (-1,))))
 
 
-def _radau(excess: Array, beta: Array, least: float) -> Array:
-    """Next factor of the energy error's bound by the Gauss–Radau rule (Meurant, Tichý 2013)."""
-    sharper = _ratio(excess, least * excess + beta)
-    return np.where(excess > 0, sharper, 1 / least)
-
-
-def _add_multiple(fields: Fields, factors: Array, added: Fields) -> None:
-    """Add the other fields, times a factor a load, in place and by slabs."""
-    for slab in slabs(fields):
-        for load, factor in enumerate(factors):
-            fields[load][:, slab] += float(factor) * added[load][:, slab]
-
-
-def _ratio(above: Array, below: Array) -> Array:
-    """Quotient, 0 where the divisor is 0: a system that is solved stays."""
-    return np.divide(above, below, out=np.zeros_like(above), where=below > 0)
+def _add_multiple(x: Fields, factor: float, added: Fields) -> None:
+    """Add a multiple of a field to `x` in place, by slabs, which bound the memory."""
+    for slab in slabs(x):
+        x[:, :, slab] += factor * added[:, :, slab]

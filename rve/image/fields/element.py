@@ -19,133 +19,179 @@ components, and k is K (in the plane K + G/3); with 1/(n² k), 1/(4 G) for stres
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, reduce
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 
-Polynomials = tuple[tuple[int, ...], ...]  # coefficients of 1, x, x², … on [0, 1]
-LEGENDRE: Polynomials = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
+Polynomials = tuple[tuple[int, ...], ...]
+"""Polynomials on [0, 1], each by its coefficients of 1, x, x², …"""
+
+
+class Place(NamedTuple):
+    """Place of an unknown in its cell along one axis.
+
+    Attributes:
+        coordinate: Distance from the origin of the cell, in widths of the cell.
+        is_odd: Whether the unknown changes its sign when the axis is mirrored, as a slope does.
+    """
+
+    coordinate: float = 0.0
+    is_odd: bool = False
 
 
 @dataclass(frozen=True)
 class Basis:
-    """Functions of one coordinate; their products are those of an element.
+    """Functions of one coordinate, whose products over the axes are the functions of an element.
 
     Args:
-        functions: Those that do not vanish on a cell.
-        owners: Of each its number among the unknowns of a cell, and how many cells further that is.
-        places: Of each unknown its place in a cell, and whether its sign changes in a mirror.
-        linear: Of each the functions at the origin (value 0, slope 1) whose sum is its unknown in
-            any linear function; none where that is not subtracted.
+        functions: The functions that do not vanish on a cell.
+        owners: For each function the number of its unknown among those of a cell, and how many
+            cells further along the axis this cell is.
+        places: Where each unknown of a cell lies.
     """
 
     functions: Polynomials
     owners: tuple[tuple[int, int], ...]
-    places: tuple[tuple[float, bool], ...] = ((0.0, False),)
-    linear: tuple[tuple[int, ...], ...] = ((), (), ())
+    places: tuple[Place, ...] = (Place(),)
 
 
 LINEAR = Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
 B_SPLINES = Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2)))
-QUADRATIC = Basis(  # values at 0, 1/2 and 1
+QUADRATIC = Basis(  # with the values at 0, 1/2 and 1 as unknowns
     functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
     owners=((0, 0), (1, 0), (0, 1)),
-    places=((0.0, False), (0.5, False)),
-    linear=((0,), (0,), (0,)),
+    places=(Place(), Place(0.5)),
 )
-HERMITE = Basis(  # value and slope at 0, value and slope at 1
+HERMITE = Basis(  # with value and slope at 0, and value and slope at 1, as unknowns
     functions=((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1)),
     owners=((0, 0), (1, 0), (0, 1), (1, 1)),
-    places=((0.0, False), (0.0, True)),
-    linear=((0,), (1,), (0, 1), (1,)),
+    places=(Place(), Place(is_odd=True)),
 )
 BASES = {(2, False): QUADRATIC, (2, True): HERMITE, (3, False): LINEAR, (3, True): B_SPLINES}
-"""By the dimension and whether of stresses."""
-SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}  # Voigt's order: 12, or 23, 13, 12
+"""Basis by the dimension and by whether it is that of stresses."""
+SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}
+"""Indices of the shear components in Voigt's order, by the dimension: 12, or 23, 13, 12."""
+
+
+class LocalUnknown(NamedTuple):
+    """An unknown that acts on a cell.
+
+    Attributes:
+        unknown: Its number among the unknowns of the cell that owns it.
+        offset: How many cells further this cell is along each axis of the grid.
+    """
+
+    unknown: int
+    offset: tuple[int, ...]
+
+
+class SplineProducts(NamedTuple):
+    """The element as products over the axes, for kernels that work axis by axis.
+
+    Attributes:
+        tables: Matrices from functions to Legendre modes of their derivatives, shape (axes, orders
+            of the derivative, modes, functions).
+        terms: Rows (Voigt component, number of the unknown function, order of its derivative along
+            each axis of the grid), sorted by the unknown function and the last order.
+        groups: First row, and one past the last row, of the terms that are alike in both, shape
+            (groups, 2).
+        factors: Factor of each term.
+    """
+
+    tables: Array
+    terms: Ints
+    groups: Ints
+    factors: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """Unknowns of a pixel or voxel and the modes that they cause.
+    """Unknowns of a pixel or voxel, and the strain or stress modes that they cause.
 
-    The axes of a grid are (y, x) or (z, y, x); lengths are in widths along x.
+    The axes of a grid are (y, x) or (z, y, x). Lengths are in widths of a cell along x.
 
     Args:
         sides: Sides of a cell along the axes.
-        unknowns: Number of values of the field in every cell of the periodic grid.
-        local: For each of the cell's local unknowns its number among these, and the neighbour that
-            owns it, so many cells further along each axis of the grid.
+        unknowns: Number of unknowns that each cell of the periodic grid owns.
+        local: The unknowns that act on a cell.
         modes: Matrix from local unknowns to modes, shape (modes, local unknowns).
-        magnitude: Sums of the absolute terms of each entry, by which rounding is bounded.
-        bulk_rows: The first so many modes belong to the trace.
-        of_voigt: Constant modes of uniform fields in Voigt order, shape (modes, components).
-        subtracted: For each local unknown those to subtract from it, so that a field without strain
-            or stress is taken away.
-        places: Of each unknown its place in a cell of side 1 along the axes, and whether it
-            changes its sign where space is mirrored at a point.
-        stress: Whether the modes are those of a stress, else of a strain.
-        products: Tables to modes, (axis, order, mode, function); terms (component, unknown, orders
-            along the grid's axes), sorted by unknown and last order; first and one past the last of
-            each group of terms that are alike in both; factors of the terms.
+        magnitude: Sums of the absolute terms of each entry of `modes`, by which rounding is
+            bounded.
+        bulk_rows: Number of modes that belong to the trace; they come first.
+        of_voigt: Modes of uniform fields in Voigt order, shape (modes, components).
+        places: Coordinates of each unknown in its cell along the axes, in widths of the cell along
+            each, shape (unknowns, axes).
+        is_odd: Whether each unknown changes its sign when space is mirrored at a point, shape
+            (unknowns,).
+        stress: Whether the modes are those of a stress, else those of a strain.
+        products: The same element as products over the axes.
     """
 
     sides: tuple[float, ...]
     unknowns: int
-    local: tuple[tuple[int, tuple[int, ...]], ...]
+    local: tuple[LocalUnknown, ...]
     modes: Array
     magnitude: Array
     bulk_rows: int
     of_voigt: Array
-    subtracted: tuple[tuple[int, ...], ...]
-    places: tuple[tuple[tuple[float, ...], bool], ...]
+    places: Array
+    is_odd: Array
     stress: bool
-    products: tuple[Array, Ints, Ints, Array]
+    products: SplineProducts
 
     @property
     def dimension(self) -> int:
         """2 in the plane, 3 in space."""
-        return len(self.local[0][1])
+        return len(self.sides)
 
     @property
     def reach(self) -> int:
-        """Cells along an axis to the farthest that owns a local unknown."""
-        return max(max(offset) for _, offset in self.local)
+        """Largest number of cells along an axis to the owner of a local unknown."""
+        return max(max(local.offset) for local in self.local)
 
     @property
     def parts(self) -> tuple[slice, slice]:
-        """Rows of the modes of the trace, and of those of the deviator."""
+        """Rows of the modes of the trace, and rows of the modes of the deviator."""
         return slice(0, self.bulk_rows), slice(self.bulk_rows, None)
 
     @property
     def trace_in_deviator(self) -> float:
-        """Greatest c with ∫ deviator² ≥ c ∫ trace² for every periodic fluctuation.
+        """Largest c with ∫ deviator² ≥ c ∫ trace² for every periodic fluctuation.
 
-        A displacement's wave has 2 dev:dev = 2 (1 − 1/n) tr² + |rotation|², a stress is a tensor in
-        the n − 1 directions across its wave, so that its σ:σ is at least tr²/(n − 1).
+        The strain of a wave of displacements has 2 dev:dev = 2 (1 − 1/n) tr² + |rotation|². The
+        stress of a wave is a tensor in the n − 1 directions across the wave, so that its σ:σ is at
+        least tr²/(n − 1).
         """
         n = self.dimension
         return 2 / (n * (n - 1)) if self.stress else 2 * (1 - 1 / n)
 
     def mean_modes(self, loads: Array) -> Array:
-        """Modes of uniform fields in Voigt order, shape (loads, components) → (modes, loads)."""
+        """Return the modes of uniform fields, shape (modes, loads).
+
+        `loads` are strains or stresses in Voigt order, shape (loads, components).
+        """
         return np.asarray(self.of_voigt @ np.asarray(loads).T)
 
 
 def isotropic_parts(dimension: int, *, stress: bool) -> Array:
-    """Matrix from Voigt components to the trace (row 0) and the parts of the deviator.
+    """Return the matrix from Voigt components to the trace (row 0) and the parts of the deviator.
 
-    Their squares sum to 2 dev:dev. The shear components of strains are twice those of the tensor.
+    The squares of the parts of the deviator sum to 2 dev:dev. Shear components of strains are twice
+    those of the tensor.
     """
     shears = len(SHEARS[dimension])
     parts = np.zeros((dimension + shears, dimension + shears))
     parts[0, :dimension] = 1
     for k in range(1, dimension):  # 11 − 22, then (11 + 22 − 2·33)/√3
-        parts[k, :k], parts[k, k] = 1, -k
+        parts[k, :k] = 1
+        parts[k, k] = -k
         parts[k] *= math.sqrt(2 / (k * (k + 1)))
     parts[dimension:, dimension:] = np.eye(shears) * (2 if stress else 1)
     return parts
@@ -153,106 +199,156 @@ def isotropic_parts(dimension: int, *, stress: bool) -> Array:
 
 @cache
 def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
-    """Element of stresses or of displacements of a cell with `sides` along the grid's axes."""
+    """Return the element of stresses or of displacements of a cell with `sides` along the axes."""
     n = len(sides)
     basis = BASES[n, stress]
     derivatives = stress_derivatives(n) if stress else strain_derivatives(n)
-    potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
-    tables = [
-        [table / side**order for order, table in enumerate(_derivative_modes(basis.functions))]
-        for side in sides
-    ]
-    terms = [
-        (component, potentials.index(potential), *orders[::-1], factor)
-        for component, of_component in enumerate(derivatives)
-        for factor, potential, orders in of_component
-    ]
-    terms.sort(key=lambda term: (term[1], term[-2]))  # kernels share derivatives along x
+    names = unknown_functions(derivatives)
+    tables = np.array([_derivative_modes(basis.functions, side) for side in sides])
+    spline_products = _spline_products(tables, derivatives, names)
+
+    # Matrices to the modes of each Voigt component are Kronecker products over the axes; the axes
+    # of `components` are (component, mode, unknown function, function of the basis).
     functions = list(product(range(len(basis.functions)), repeat=n))
-    shape = (len(derivatives), len(functions), len(potentials), len(functions))
-    components = np.zeros(shape)  # (Voigt component, mode, potential, function)
-    for component, potential, *orders, factor in terms:
+    components = np.zeros((len(derivatives), len(functions), len(names), len(functions)))
+    for k, factor in enumerate(spline_products.factors):
+        component, name = spline_products.terms[k, :2]
+        orders = spline_products.terms[k, 2:]
         along_axes = (table[order] for table, order in zip(tables, orders, strict=True))
-        components[component, :, potential] += factor * reduce(np.kron, along_axes)
-    parts, by_unknown = isotropic_parts(n, stress=stress), components.reshape(*shape[:2], -1)
-    modes = np.tensordot(parts, by_unknown, axes=1)
+        components[component, :, name] += factor * reduce(np.kron, along_axes)
+    by_unknown = components.reshape(len(derivatives), len(functions), -1)
+
+    # Kernels number all modes of space; in the plane those that are always zero are left out.
+    parts = isotropic_parts(n, stress=stress)
+    modes = np.tensordot(parts, by_unknown, axes=1)  # (part, mode, local unknown)
     magnitude = np.tensordot(abs(parts), abs(by_unknown), axes=1)
-    is_kept = magnitude.max(axis=-1) > 0  # (part, mode)
-    is_kept |= n == 3  # kernels number all modes of space
+    is_kept = (magnitude.max(axis=-1) > 0) | (n == 3)
     of_voigt = np.zeros((*is_kept.shape, len(parts)))
-    of_voigt[:, 0] = parts
-    unknowns = list(product(range(len(basis.places)), repeat=n))
-    local, subtracted = [], []
-    for potential, function in product(range(len(potentials)), functions):
-        numbers, offsets = zip(*(basis.owners[f] for f in function), strict=True)
-        local.append((potential * len(unknowns) + unknowns.index(numbers), offsets))
-        at_origin = product(*(basis.linear[f] for f in function))
-        first = potential * len(functions)
-        subtracted.append(tuple(first + functions.index(f) for f in at_origin if sum(f) <= 1))
-    places = [list(zip(*(basis.places[k] for k in numbers), strict=True)) for numbers in unknowns]
-    table: Ints = np.array(terms)
-    indices, factors = table[:, :-1].copy(), table[:, -1].astype(float)
-    starts = 1 + np.flatnonzero(np.diff(indices[:, [1, -1]], axis=0).any(axis=1))
-    ends = np.array([0, *starts, len(terms)])
-    groups = np.stack([ends[:-1], ends[1:]], axis=1)
+    of_voigt[:, 0] = parts  # a uniform field has the mode 1 alone
+
+    # A function of the element is a product of functions of one coordinate, and so is its unknown.
+    numbers = list(product(range(len(basis.places)), repeat=n))
+    local = []
+    for name, function in product(range(len(names)), functions):
+        owners = [basis.owners[f] for f in function]
+        number = numbers.index(tuple(owner[0] for owner in owners))
+        offset = tuple(owner[1] for owner in owners)
+        local.append(LocalUnknown(name * len(numbers) + number, offset))
+    places = [[basis.places[k] for k in number] for number in numbers] * len(names)
     return Element(
         sides=sides,
-        unknowns=len(potentials) * len(unknowns),
+        unknowns=len(places),
         local=tuple(local),
         modes=np.ascontiguousarray(modes[is_kept]),
         magnitude=magnitude[is_kept],
         bulk_rows=int(is_kept[0].sum()),
         of_voigt=of_voigt[is_kept],
-        subtracted=tuple(subtracted),
-        places=tuple((place, sum(odd) % 2 == 1) for place, odd in places) * len(potentials),
+        places=np.array([[along.coordinate for along in place] for place in places]),
+        is_odd=np.array([sum(along.is_odd for along in place) % 2 == 1 for place in places]),
         stress=stress,
-        products=(np.array(tables), indices, groups, factors),
+        products=spline_products,
     )
 
 
-Derivatives = list[list[tuple[int, tuple[int, int], tuple[int, ...]]]]
-"""By Voigt component: terms (factor, indices of the unknown, orders along x, y, z)."""
+def _spline_products(
+    tables: Array, derivatives: Derivatives, names: Sequence[tuple[int, int]]
+) -> SplineProducts:
+    """Return the terms of strains or stresses, in the order that kernels work in."""
+    rows = [
+        (component, names.index(term.function), *term.orders[::-1], term.factor)
+        for component, terms in enumerate(derivatives)
+        for term in terms
+    ]
+    rows.sort(key=lambda row: (row[1], row[-2]))  # kernels share derivatives along x
+    table: Ints = np.array(rows)
+    terms = table[:, :-1].copy()
+    is_first = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
+    ends = np.array([0, *(1 + np.flatnonzero(is_first)), len(rows)])
+    groups = np.stack([ends[:-1], ends[1:]], axis=1)
+    return SplineProducts(tables, terms, groups, table[:, -1].astype(float))
+
+
+class Derivative(NamedTuple):
+    """A term of a strain or stress component.
+
+    Attributes:
+        factor: Factor of the derivative.
+        function: Indices of the function: (i, 0) of the displacement u_i, (m, n) with m ≤ n of the
+            potential Φ_mn, from 0.
+        orders: Orders of the derivative along x, y and, in space, z.
+    """
+
+    factor: int
+    function: tuple[int, int]
+    orders: tuple[int, ...]
+
+
+Derivatives = list[list[Derivative]]
+"""Terms of each Voigt component."""
+
+
+def unknown_functions(derivatives: Derivatives) -> list[tuple[int, int]]:
+    """Return the indices of the functions that occur in strains or stresses, sorted."""
+    return sorted({term.function for terms in derivatives for term in terms})
 
 
 def strain_derivatives(dimension: int) -> Derivatives:
-    """ε_ii = ∂i u_i and 2 ε_ij = ∂i u_j + ∂j u_i."""
-    first = [tuple(int(i == j) for j in range(dimension)) for i in range(dimension)]
-    normal: Derivatives = [[(1, (i, 0), first[i])] for i in range(dimension)]
-    shear: Derivatives = [
-        [(1, (j, 0), first[i]), (1, (i, 0), first[j])] for i, j in SHEARS[dimension]
+    """Return the terms of ε_ii = ∂i u_i and of 2 ε_ij = ∂i u_j + ∂j u_i."""
+    axes = range(dimension)
+    first = [tuple(int(i == j) for j in axes) for i in axes]  # orders of ∂i
+    normal = [[Derivative(1, (i, 0), first[i])] for i in axes]
+    shear = [
+        [Derivative(1, (j, 0), first[i]), Derivative(1, (i, 0), first[j])]
+        for i, j in SHEARS[dimension]
     ]
     return [*normal, *shear]
 
 
 def stress_derivatives(dimension: int) -> Derivatives:
-    """Derivatives of Beltrami's potentials; in the plane Φ_33, which varies with x and y alone."""
+    """Return the terms of Beltrami's σ_ij = Σ ε_ikm ε_jqr ∂k ∂q Φ_mr.
+
+    In the plane Φ_33 is left alone, which varies with x and y.
+    """
     signs = {(0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1, (2, 1, 0): -1, (1, 0, 2): -1, (0, 2, 1): -1}
-    by_component: Derivatives = []
+    by_component = []
     for i, j in [*((i, i) for i in range(dimension)), *SHEARS[dimension]]:
         factors: dict[tuple[tuple[int, int], tuple[int, ...]], int] = {}
         for (a, k, m), (b, q, r) in product(permutations(range(3)), repeat=2):
-            if (a, b) != (i, j) or max(k, q) >= dimension or (dimension == 2 and (m, r) != (2, 2)):
+            is_of_plane = dimension == 3 or (m, r) == (2, 2)
+            if (a, b) != (i, j) or max(k, q) >= dimension or not is_of_plane:
                 continue
             orders = tuple((k == axis) + (q == axis) for axis in range(dimension))
             term = (min(m, r), max(m, r)), orders
             factors[term] = factors.get(term, 0) + signs[a, k, m] * signs[b, q, r]
-        by_component.append([(f, pair, orders) for (pair, orders), f in factors.items() if f])
+        terms = [Derivative(f, function, orders) for (function, orders), f in factors.items() if f]
+        by_component.append(terms)
     return by_component
 
 
-def _derivative_modes(basis: Polynomials) -> list[Array]:
-    """Matrices (polynomials, functions) to orthonormal Legendre modes of derivatives 0, 1 and 2."""
-    functions, matrices = list(basis), []
+def _derivative_modes(basis: Polynomials, side: float) -> Array:
+    """Return matrices from functions to orthonormal Legendre modes of their derivatives.
+
+    Args:
+        basis: Functions of x/side on [0, 1].
+        side: Side of the cell along this axis.
+
+    Returns:
+        For the derivatives of order 0, 1 and 2 along the axis, shape (3, modes, functions). An
+        entry is an exact integral that is rounded, times a root and a power of the side.
+    """
+    legendre: Polynomials = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
+    functions = list(basis)
     count = max(map(len, basis))
     norms = np.sqrt(2 * np.arange(float(count)) + 1)
-    for _ in range(3):
-        exact = [[_integral(polynomial, f) for f in functions] for polynomial in LEGENDRE[:count]]
-        matrices.append(np.array(exact, dtype=float) * norms[:, None])
+    matrices = []
+    for order in range(3):
+        exact = [[_integral(polynomial, f) for f in functions] for polynomial in legendre[:count]]
+        matrices.append(np.array(exact, dtype=float) * norms[:, None] / side**order)
         functions = [tuple(n * c for n, c in enumerate(f))[1:] for f in functions]
-    return matrices
+    return np.array(matrices)
 
 
 def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:
-    """Integral of the product of two polynomials over [0, 1]."""
+    """Return the integral of the product of two polynomials over [0, 1]."""
     pairs = product(enumerate(first), enumerate(second))
     return sum((Fraction(a * b, i + j + 1) for (i, a), (j, b) in pairs), Fraction(0))

@@ -1,17 +1,16 @@
 """One side of the bounds: fields of least energy in one of two spaces, and their mean energies.
 
 Every rounding error of an energy is bounded. The floating-point numbers of a field are taken as
-exact: whatever the solver left in them, they are a field of the space. Rounded are the differences
-from the cell's linear function, the modes, and the sums of some products of modes; the sum of these
-is exact (`math.fsum`).
+exact: whatever the solver left in them, they are a field of the space. Rounded are the modes and
+the sums of some products of modes; the sum of these is exact (`math.fsum`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,24 +30,23 @@ from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows
 from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
-UNIT = 2.0**-53  # rounding unit
-SAFETY = 1.01  # for the rounding of the error bound itself and for terms of second order
-PIECE = 64  # products that are summed in rounded steps
-LONG_PIECE = 4096  # the same where the exact sum of many pieces would take longer than their fields
-SMALL = 1 << 17  # cells up to which the loads are solved together, to save memory beyond
-COEFFICIENT = 8  # rounding units that a coefficient may be off by
-ENTRY = 16  # rounding units that the terms of an entry of the modes' matrix may be off by
-
-Weighted = tuple[slice, Fields]  # rows of the modes, and what they count in each cell
+UNIT = 2.0**-53
+"""Rounding unit of doubles."""
+SAFETY = 1.01
+"""Factor for the rounding of an error bound itself and for terms of second order."""
+COEFFICIENT = 8
+"""Rounding units by which a coefficient of trace or deviator may be off."""
+PIECE = 64
+"""Number of products that are summed in rounded steps; a larger one bounds rounding more widely."""
 
 
 @dataclass(frozen=True, eq=False)
 class Energies:
-    """Mean products of the modes of fields, by weight.
+    """Mean products of the modes of pairs of fields, by trace and deviator.
 
     Args:
-        value: Symmetric, shape (weights, fields, fields).
-        by_modes: Bound of what the modes' rounding adds to each, same shape.
+        value: Products by the trace and by the deviator, symmetric, shape (2, fields, fields).
+        by_modes: Bound of what the rounding of modes adds to each, of the same shape.
         summed: Relative rounding of products and sums.
     """
 
@@ -58,56 +56,64 @@ class Energies:
 
     @property
     def rounding(self) -> Array:
-        """Bound of the absolute error of each product, shape (weights, fields, fields)."""
+        """Bound of the absolute error of each product, shape (2, fields, fields)."""
+        # |Σ a b| ≤ √(Σ a²) √(Σ b²), so the roots of the diagonal bound the sums of magnitudes.
         size = np.sqrt(SAFETY * np.maximum(np.diagonal(self.value, axis1=1, axis2=2), 0))
         by_sums = self.summed * size[:, :, None] * size[:, None, :]
         return np.asarray(SAFETY * (self.by_modes + by_sums))
 
     @property
     def upper(self) -> Array:
-        """A matrix above the sum over the weights in the Loewner order, shape (fields, fields)."""
+        """A matrix above the total energy in the Loewner order, shape (fields, fields)."""
         value = self.value.sum(axis=0)
-        terms = 2 * (len(self.value) + 2) * UNIT * np.abs(self.value).sum(axis=0)
-        off = self.rounding.sum(axis=0) + terms
-        # by Gershgorin's circles for D off D⁻¹, with D so that loads of any size count alike
+        error_of_sum = 2 * (len(self.value) + 2) * UNIT * np.abs(self.value).sum(axis=0)
+        error = self.rounding.sum(axis=0) + error_of_sum
+        # By Gershgorin's circles the diagonal matrix of the row sums of D⁻¹ error D⁻¹ is above any
+        # symmetric matrix whose entries are that small. D makes loads of any size count alike.
         scale = np.sqrt(np.maximum(np.diagonal(value), np.finfo(float).tiny))
-        return np.asarray(value + np.diag(SAFETY * (off / scale).sum(axis=1) * scale))
+        return np.asarray(value + np.diag(SAFETY * (error / scale).sum(axis=1) * scale))
 
 
 def energies(
     element: Element,
     fields: Fields,
     mean_modes: Array,
-    weights: Sequence[Weighted],
+    coefficients: tuple[Fields, Fields],
     field_errors: Fields | None = None,
 ) -> Energies:
-    """Mean energy products of all pairs of fields, with a bound of their rounding errors.
+    """Return mean energy products of all pairs of fields, with a bound of their rounding errors.
 
     Args:
         element: Unknowns and modes of a cell.
         fields: Periodic fluctuations, shape (fields, unknowns, *grid).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        weights: Pairs of rows of modes and their coefficient in each cell, of the grid's shape,
-            not negative, with a rounding error of up to `COEFFICIENT` units.
-        field_errors: Bounds of what `fields` are off from those that are meant; None: nothing.
+        coefficients: Coefficients of trace and of deviator, of the shape of the grid, not negative,
+            each with a rounding error of up to `COEFFICIENT` units.
+        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
+            shape; None for no distance.
     """
-    xp, count, cells = namespace(fields), fields.shape[0], math.prod(fields.shape[2:])
-    piece = PIECE if cells <= SMALL else LONG_PIECE
-    sums: list[list[Array]] = [[] for _ in weights]
-    by_modes = np.zeros((len(weights), count, count))
+    xp = namespace(fields)
+    count = fields.shape[0]
+    cells = math.prod(fields.shape[2:])
+    # The exact sum of many pieces would take longer than the fields of a large grid.
+    piece = PIECE if cells <= 1 << 17 else 4096
+    sums: tuple[list[Array], list[Array]] = ([], [])
+    by_modes = np.zeros((2, count, count))
     for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
-        for k, (rows, weight) in enumerate(weights):
-            factor = xp.reshape(weight[slab], (-1,))
+        for k, (rows, coefficient) in enumerate(zip(element.parts, coefficients, strict=True)):
+            factor = xp.reshape(coefficient[slab], (-1,))
             weighted = modes[rows] * factor
             products = _piecewise_products(modes[rows], weighted, piece)
             sums[k].append(np.apply_along_axis(math.fsum, 0, products))
-            # errors δa, δb of modes change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa
-            spread = amplification[rows].T
-            larger = xp.tensordot(spread, xp.abs(weighted), axes=1)
-            larger += xp.tensordot(spread @ spread.T / 2, local * factor, axes=1)
+            # Errors δa, δb of modes a, b change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa.
+            # Here δ = amplification @ local, and one of both summands is formed.
+            transposed = amplification[rows].T
+            larger = xp.tensordot(transposed, xp.abs(weighted), axes=1)
+            larger += xp.tensordot(transposed @ transposed.T / 2, local * factor, axes=1)
             mixed = xp.sum(larger @ xp.moveaxis(local, 1, 2), axis=0)
             by_modes[k] += on_host(mixed + mixed.T)
-    value = np.array([np.apply_along_axis(math.fsum, 0, np.array(parts)) for parts in sums]) / cells
+    totals = [np.apply_along_axis(math.fsum, 0, np.array(of_slabs)) for of_slabs in sums]
+    value = np.array(totals) / cells
     size = np.sqrt(np.diagonal(value, axis1=1, axis2=2))
     by_modes += 2 * UNIT * cells * size[:, :, None] * size[:, None, :]  # `UNIT` · |modes| each
     relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
@@ -115,29 +121,52 @@ def energies(
 
 
 def _piecewise_products(modes: Fields, weighted: Fields, piece: int) -> Array:
-    """Products of all pairs of fields, symmetric, (sums, fields, fields), of `piece` terms each."""
-    xp, (count, n_fields, cells) = namespace(modes), modes.shape
+    """Return products of all pairs of fields, summed over pieces of the cells.
+
+    Args:
+        modes: Shape (modes, fields, cells).
+        weighted: The same modes times a coefficient of each cell.
+        piece: Number of cells that are summed in rounded steps.
+
+    Returns:
+        Sums, symmetric in the fields, shape (modes × pieces, fields, fields).
+    """
+    xp = namespace(modes)
+    count, n_fields, cells = modes.shape
     piece = min(piece, cells)
     padding = xp.zeros((count, n_fields, -cells % piece))
 
-    def cut(values: Fields) -> Fields:
-        """Values by piece, padded with zeros: shape (modes, pieces, fields, piece)."""
+    def by_piece(values: Fields) -> Fields:
+        """Return values padded with zeros, shape (modes, pieces, fields, piece)."""
         padded = xp.concatenate([values, padding], axis=2) if padding.size else values
         return xp.moveaxis(xp.reshape(padded, (count, n_fields, -1, piece)), 1, 2)
 
-    products = on_host(cut(modes) @ xp.moveaxis(cut(weighted), 2, 3))
+    products = on_host(by_piece(modes) @ xp.moveaxis(by_piece(weighted), 2, 3))
     products = products.reshape(-1, n_fields, n_fields)
     return np.asarray((products + np.swapaxes(products, 1, 2)) / 2)
 
 
-Modes = Iterator[tuple[Any, Fields, Fields, Fields]]
-"""Slab; modes (modes, fields, cells of the slab); A and b: errors ≤ A @ b + `UNIT` · |modes|."""
+class SlabModes(NamedTuple):
+    """Modes of some cells of a grid, with a bound of their rounding errors.
+
+    Attributes:
+        slab: Index of the cells in an array of the grid's shape.
+        modes: Shape (modes, fields, cells).
+        amplification: Matrix A, shape (modes, unknowns or local unknowns).
+        local: Magnitudes b of these unknowns, shape (unknowns or local unknowns, fields, cells).
+            The modes are off by at most A b + `UNIT` · |modes|.
+    """
+
+    slab: Any
+    modes: Fields
+    amplification: Fields
+    local: Fields
 
 
 def modes_of(
     element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
-) -> Modes:
-    """Yield modes by slabs with bounds of their rounding: of voxels of NumPy by kernels."""
+) -> Iterator[SlabModes]:
+    """Yield the modes of fields plus uniform fields by slabs; the arguments are of `energies`."""
     if isinstance(fields, np.ndarray) and element.dimension == 3:
         return _modes_by_rows(element, fields, mean_modes, field_errors)
     return modes_by_matrices(element, fields, mean_modes, field_errors)
@@ -145,80 +174,64 @@ def modes_of(
 
 def modes_by_matrices(
     element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
-) -> Modes:
+) -> Iterator[SlabModes]:
     """As `modes_of`, with the element's matrix, in any library: what kernels are judged by."""
     xp = namespace(fields)
-    matrix, magnitude = xp.asarray(element.modes), xp.asarray(element.magnitude)
+    matrix = xp.asarray(element.modes)
+    magnitude = xp.asarray(element.magnitude)
+    # Rounded are the sums of the product, in which zeros add no error, and each entry of the
+    # matrix, whose terms are off by up to 16 units.
     terms = int((element.magnitude > 0).sum(axis=1).max())
+    relative_error = (terms + 16) * UNIT
     for slab in slabs(fields):
-        pair = _subtract_linear(element, gather(element, fields, slab))
-        local, error = (xp.reshape(x, (*x.shape[:2], -1)) for x in pair)
-        # the sums of the product, in which zeros add no error, and the entries of the matrix
-        error += (terms + ENTRY) * UNIT * xp.abs(local)
+        local = gather(element, fields, slab)
+        local = xp.reshape(local, (*local.shape[:2], -1))
+        error = relative_error * xp.abs(local)
         if field_errors is not None:
-            error += xp.reshape(
-                _with_linear(element, gather(element, field_errors, slab)), error.shape
-            )
+            error += xp.reshape(gather(element, field_errors, slab), error.shape)
         modes = xp.tensordot(matrix, local, axes=1)
         modes += xp.asarray(mean_modes)[:, :, None]
-        yield slab, modes, magnitude, error
+        yield SlabModes(slab, modes, magnitude, error)
 
 
 def _modes_by_rows(
     element: Element, fields: Array, mean_modes: Array, field_errors: Array | None
-) -> Modes:
-    """As `modes_of`, in pieces of a layer, so that few modes are in memory."""
-    count, (nz, ny, nx) = len(fields), fields.shape[2:]
-    n_rows, width = max(1, SLAB_CELLS // (count * nx)), 1 + element.reach
-    unknown = np.array([u for u, _ in element.local])
+) -> Iterator[SlabModes]:
+    """As `modes_of`, in pieces of a layer of voxels, so that few modes are in memory."""
+    nz, ny, nx = fields.shape[2:]
+    n_rows = max(1, SLAB_CELLS // (len(fields) * nx))
+    width = 1 + element.reach
+    unknown = np.array([local.unknown for local in element.local])
     by_unknown = [element.magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
     amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
     for z in range(nz):
         layers = np.arange(z, z + width) % nz
         sizes = np.abs(fields[:, :, layers])
-        if field_errors is not None:  # as a part of what modes are rounded by
+        if field_errors is not None:  # counted in units of the rounding of modes
             sizes += field_errors[:, :, layers] / (ROUNDINGS * UNIT)
+        # largest value of each unknown over the cells that own local unknowns of a voxel
         greatest = sizes.max(axis=2)
-        for axis in (2, 3):  # of the values of an unknown at a voxel
+        for axis in (2, 3):
             greatest = np.max([np.roll(greatest, -k, axis) for k in range(width)], axis=0)
         for first in range(0, ny, n_rows):
             rows = slice(first, min(first + n_rows, ny))
             modes = modes_by_rows(element, fields, z, rows.start, rows.stop)
             modes += mean_modes[:, :, None]
             local = np.moveaxis(greatest[:, :, rows], 1, 0).reshape(-1, *modes.shape[1:])
-            yield (z, rows), modes, amplification, local
-
-
-def _subtract_linear(element: Element, raw: Fields) -> tuple[Fields, Fields]:
-    """Local unknowns less a function without strain or stress; a bound of the rounding error."""
-    local, error = raw.copy(), namespace(raw).zeros_like(raw)
-    for k, subtracted in enumerate(element.subtracted):
-        for other in subtracted:
-            local[k] -= raw[other]
-            error[k] += UNIT * abs(local[k])
-    return local, error
-
-
-def _with_linear(element: Element, errors: Fields) -> Fields:
-    """Errors of local unknowns less a linear function: of all numbers that enter, summed."""
-    total = errors.copy()
-    for k, subtracted in enumerate(element.subtracted):
-        for other in subtracted:
-            total[k] += errors[other]
-    return total
+            yield SlabModes((z, rows), modes, amplification, local)
 
 
 def solved_loads(dimension: int) -> Array:
-    """Loads near an isotropic stiffness's own, a row each, in Voigt order.
+    """Return loads near the eigenvectors of an isotropic stiffness, a row each, in Voigt order.
 
-    So the soft ones are not drowned in the stiff ones where ν is near 1/2 or −1.
+    With them soft loads are not drowned in stiff ones where ν is near 1/2 or −1.
     """
     parts = isotropic_parts(dimension, stress=False)
     return np.asarray(parts / np.abs(parts).max(axis=1, keepdims=True))
 
 
-def coefficients(element: Element, bulk: Fields, shear: Fields) -> tuple[Fields, Fields]:
-    """Coefficients of trace and deviator: those of strains, or of stresses in n dimensions."""
+def coefficients_of(element: Element, bulk: Fields, shear: Fields) -> tuple[Fields, Fields]:
+    """Return the coefficients of trace and deviator: of strains, or of stresses in n dimensions."""
     if element.stress:
         return 1 / element.dimension**2 / bulk, 0.25 / shear
     return bulk, shear
@@ -226,11 +239,15 @@ def coefficients(element: Element, bulk: Fields, shear: Fields) -> tuple[Fields,
 
 @dataclass(frozen=True, eq=False)
 class SideSolution:
-    """Fields for the unit loads, (loads, unknowns, *grid); energies whose `upper` bounds."""
+    """Solution of one side of the bounds.
+
+    Args:
+        fields: Fields for unit loads in Voigt order, shape (loads, unknowns, *grid).
+        energy: Their energies, whose `upper` bounds the stiffness or the compliance from above.
+    """
 
     fields: Fields
     energy: Energies
-    iterations: int
 
 
 def solve_side(
@@ -242,23 +259,24 @@ def solve_side(
     division: int = 1,
     start: Fields | None = None,
 ) -> SideSolution | None:
-    """Fields of least energy under the unit loads; None where pores leave no stress.
+    """Return fields of least energy under the unit loads; None where pores leave no stress.
 
     Stresses vanish in pores, whose bulk or shear modulus is 0; see `pores`.
 
     Args:
-        element: Of displacements, whose energy bounds the stiffness from above, or of stresses,
-            whose energy bounds the compliance.
-        bulk: Bulk modulus of each cell (of the plane: K + G/3), any unit.
-        shear: Shear modulus, same shape and unit; of displacements both are positive.
-        solver: Stopping rule.
-        division: Parts along each side into which every cell is divided: the same image, a larger
-            space of fields.
-        start: Fields to start from, on the divided cells.
+        element: Element of displacements, whose energy bounds the stiffness from above, or of
+            stresses, whose energy bounds the compliance.
+        bulk: Bulk modulus of each cell (of the plane: K + G/3), in any unit.
+        shear: Shear modulus, of the same shape and unit; of displacements both are positive.
+        solver: Solver with its stopping rule.
+        division: Number of elements along each side of a cell: the same image, a larger space of
+            fields.
+        start: Fields to start from, in the shape of the result.
     """
     xp = namespace(bulk)
     for axis in range(element.dimension if division > 1 else 0):
-        bulk, shear = (xp.repeat(x, division, axis=axis) for x in (bulk, shear))
+        bulk = xp.repeat(bulk, division, axis=axis)
+        shear = xp.repeat(shear, division, axis=axis)
     is_pore = (bulk == 0) | (shear == 0)
     potentials = None
     if element.stress and bool(is_pore.any()):
@@ -268,48 +286,76 @@ def solve_side(
         potentials = PorePotentials.of_nodes(element, nodes)
         # stiff there for the preconditioner, as there is no stress that could have an energy
         bulk, shear = (xp.where(is_pore, x.max(), x) for x in (bulk, shear))
-    trace, deviator = coefficients(element, bulk, shear)
+    trace, deviator = coefficients_of(element, bulk, shear)
+    fields = _least_energy_fields(element, trace, deviator, solver, potentials, start)
+    field_errors = None
+    if potentials is not None:
+        field_errors = potentials.impose(fields)
+        trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
+    unit_modes = element.mean_modes(np.eye(len(fields)))
+    energy = energies(element, fields, unit_modes, (trace, deviator), field_errors)
+    return SideSolution(fields, energy)
+
+
+def _least_energy_fields(
+    element: Element,
+    trace: Fields,
+    deviator: Fields,
+    solver: ConjugateGradient,
+    potentials: PorePotentials | None,
+    start: Fields | None,
+) -> Fields:
+    """Return fields under unit loads whose energy is nearly the least.
+
+    Args:
+        element: Element of displacements or of stresses.
+        trace: Coefficient of the trace of each cell, positive.
+        deviator: Coefficient of the deviator of each cell, positive.
+        solver: Solver with its stopping rule.
+        potentials: Space of the potentials whose stress vanishes in pores; None without pores.
+        start: First guess, in the shape of the result; None for zero.
+
+    Returns:
+        Fields of shape (loads, unknowns, *grid).
+    """
+    xp = namespace(trace)
     loads = solved_loads(element.dimension)
     modes = element.mean_modes(loads)
     constant = Reference.of_grid(element, trace, deviator)
     preconditioner = FourierPreconditioner.of_material(element, constant, trace.shape, xp)
     operator = Operator(element, trace, deviator)
     scale = minimum_energy(element, trace, deviator, modes)
-    least = constant.lowest_energy_ratio(trace, deviator)
-    n_together = len(loads) if trace.size <= SMALL else 1  # to save memory
-    fields, iterations = xp.empty((len(loads), element.unknowns, *trace.shape)), []
-    for first in range(0, len(loads), n_together):
-        part = slice(first, first + n_together)
-        guess = None if start is None else xp.tensordot(xp.asarray(loads[part]), start, axes=1)
-        load = operator.load(modes[:, part])
-        system = System(operator.apply, preconditioner.apply, load, scale[part], least, guess)
+    fields = xp.empty((len(loads), element.unknowns, *trace.shape))
+    for k in range(len(loads)):  # one after another: solved together they take more memory
+        this = slice(k, k + 1)
+        system = System(
+            operator=operator.apply,
+            preconditioner=preconditioner.apply,
+            load=operator.load(modes[:, this]),
+            scale=float(scale[k]),
+            min_energy_ratio=constant.min_energy_ratio(trace, deviator),
+            start=None if start is None else xp.tensordot(xp.asarray(loads[this]), start, axes=1),
+        )
         if potentials is None:
-            fields[part], number = solver.solve(system)
+            fields[this] = solver.solve(system)
         else:
-            fields[part], number = _solve_beside_pores(solver, system, potentials, loads[part])
-        iterations.append(number)
+            fields[this] = _solve_beside_pores(solver, system, potentials, loads[this])
     to_unit_loads = xp.asarray(np.linalg.inv(loads))
     for slab in slabs(fields):  # in place
         fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
-    field_errors = None
-    if potentials is not None:
-        field_errors = potentials.impose(fields)
-        trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
-    weights = list(zip(element.parts, (trace, deviator), strict=True))
-    unit_modes = element.mean_modes(np.eye(len(loads)))
-    energy = energies(element, fields, unit_modes, weights, field_errors)
-    return SideSolution(fields, energy, max(iterations))
+    return fields
 
 
 def _solve_beside_pores(
-    solver: ConjugateGradient, system: System, potentials: PorePotentials, loads: Array
-) -> tuple[Fields, int]:
-    """Solve for fields whose stress under `loads` (rows, in Voigt order) vanishes in pores.
+    solver: ConjugateGradient, system: System, potentials: PorePotentials, load: Array
+) -> Fields:
+    """Return the field of a system whose stress under the mean stress `load` vanishes in pores.
 
-    With Q the projection on their differences, the system is Q A Q, and Q M Q its preconditioner,
-    M being that of A. The energy of the differences is that of A, so that the ratio `least` holds.
+    `load` has the shape (1, components). With Q the orthogonal projection on the differences of
+    such fields, the system for a difference is Q A Q, and Q M Q its preconditioner, M being that of
+    A. The energy of a difference is that of A, so that `min_energy_ratio` holds.
     """
-    particular = potentials.particular_fields(loads, system.load)
+    particular = potentials.particular_fields(load, system.load)
     start = None if system.start is None else potentials.project(system.start - particular)
     projected = replace(
         system,
@@ -318,12 +364,17 @@ def _solve_beside_pores(
         load=potentials.project(system.load - system.operator(particular)),
         start=start,
     )
-    differences, iterations = solver.solve(projected)
-    return particular + differences, iterations
+    return particular + solver.solve(projected)
 
 
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:
-    """Lower bound of the energy of any fields with given mean modes, shape (loads,)."""
-    trace_squares, deviator_squares = (np.sum(modes[rows] ** 2, axis=0) for rows in element.parts)
-    harmonic = [float(x.size / (1 / x).mean()) for x in (trace, deviator)]
-    return np.asarray(harmonic[0] * trace_squares + harmonic[1] * deviator_squares)
+    """Return a lower bound of the energy of any fields with given mean modes, shape (loads,).
+
+    By Cauchy and Schwarz the mean of c m² is at least the harmonic mean of c times the square of
+    the mean of m. `modes` has the shape (modes, loads).
+    """
+    total = np.zeros(modes.shape[1])
+    for rows, coefficient in zip(element.parts, (trace, deviator), strict=True):
+        harmonic_mean = float(coefficient.size / (1 / coefficient).mean())
+        total += harmonic_mean * np.sum(modes[rows] ** 2, axis=0)
+    return total

@@ -1,6 +1,6 @@
 """The stiffness operator of a periodic grid of pixels or voxels, in arrays of any library.
 
-Fields have the shape (loads, unknowns, *grid), coefficients that of the grid. The work is done in
+Fields have the shape (fields, unknowns, *grid), coefficients that of the grid. The work is done in
 slabs along the first axis of the grid, which bound the memory. Arrays may be NumPy's or, on a
 device, CuPy's.
 """
@@ -8,7 +8,7 @@ device, CuPy's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -20,15 +20,17 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.kernels import apply_by_rows
 
-SLAB_CELLS = 6144  # cells times loads worked on at once: what the second cache holds
-DEVICE_SLAB_CELLS = 1 << 20  # the same on a device, which has more to do at once: a few GB
+SLAB_CELLS = 6144
+"""Cells times fields that are worked on at once: what the second cache holds. More are slower."""
+DEVICE_SLAB_CELLS = 1 << 20
+"""The same on a device, which works on more at once; a larger number takes more than a few GB."""
 
 Fields = Any
 """Array of NumPy or of a device."""
 
 
 def namespace(array: Fields) -> ModuleType:
-    """The library of an array, with the functions of the array standard."""
+    """Return the library of an array, with the functions of the array standard."""
     if isinstance(array, np.ndarray):
         return np
     from array_api_compat import array_namespace
@@ -38,12 +40,12 @@ def namespace(array: Fields) -> ModuleType:
 
 
 def on_host(array: Fields) -> Array:
-    """The array as NumPy's, wherever it is."""
+    """Return an array of any library as NumPy's."""
     return np.asarray(array.get() if hasattr(array, "get") else array)
 
 
 def device_array(device: str) -> Callable[[Array], Fields]:
-    """Function that takes NumPy's arrays to a device, "cpu" or "cuda".
+    """Return the function that takes NumPy's arrays to a device, "cpu" or "cuda".
 
     Raises:
         RefusedError: CuPy or a device is missing, or the name is another.
@@ -66,7 +68,7 @@ def device_array(device: str) -> Callable[[Array], Fields]:
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """Stiffness of a grid: element matrices times coefficients of trace and deviator.
+    """Stiffness matrix of a grid: element matrices times coefficients of trace and deviator.
 
     Both coefficients are positive and have the shape of the grid.
     """
@@ -76,10 +78,10 @@ class Operator:
     deviator: Fields
 
     def apply(self, fields: Fields) -> Fields:
-        """Nodal forces of fields, both of shape (loads, unknowns, *grid)."""
+        """Return the nodal forces of fields, both of shape (fields, unknowns, *grid)."""
         if isinstance(fields, np.ndarray) and self.element.dimension == 3:
-            none = np.zeros((len(self.element.modes), len(fields)))
-            return apply_by_rows(self.element, self.trace, self.deviator, fields, none)
+            no_modes = np.zeros((len(self.element.modes), len(fields)))
+            return apply_by_rows(self.element, self.trace, self.deviator, fields, no_modes)
         return self.apply_by_matrices(fields)
 
     def apply_by_matrices(self, fields: Fields) -> Fields:
@@ -91,34 +93,38 @@ class Operator:
         matrix = xp.asarray(matrix)
         for slab in slabs(fields):
             local = gather(self.element, fields, slab)
-            # (trace Tᵀ T + deviator Dᵀ D) times the local unknowns of each cell
+            # (trace Tᵀ T + deviator Dᵀ D) times the local unknowns of each cell, with the rows T
+            # and D of the element's matrix to modes
             weighted = xp.stack([self.trace[slab] * local, self.deviator[slab] * local])
             forces = matrix @ xp.reshape(weighted, (matrix.shape[1], -1))
             scatter(self.element, xp.reshape(forces, local.shape), result, slab)
         return result
 
-    def load(self, mean_modes: Fields) -> Fields:
-        """Minus the nodal forces of mean modes (modes, loads), (loads, unknowns, *grid)."""
+    def load(self, mean_modes: Array) -> Fields:
+        """Return minus the nodal forces of uniform fields, shape (fields, unknowns, *grid).
+
+        `mean_modes` are their modes, shape (modes, fields).
+        """
         xp = namespace(self.trace)
-        shape = (mean_modes.shape[1], self.element.unknowns, *self.trace.shape)
-        result = xp.zeros(shape)
+        count = mean_modes.shape[1]
+        result = xp.zeros((count, self.element.unknowns, *self.trace.shape))
         if xp is np and self.element.dimension == 3:
             return apply_by_rows(self.element, self.trace, self.deviator, result, -mean_modes)
+        ones = (1,) * self.element.dimension
         trace_force, deviator_force = (
             xp.reshape(
-                xp.asarray(-(self.element.modes[part].T @ mean_modes[part])),
-                (-1, shape[0]) + (1,) * self.element.dimension,
+                xp.asarray(-(self.element.modes[rows].T @ mean_modes[rows])), (-1, count, *ones)
             )
-            for part in self.element.parts
+            for rows in self.element.parts
         )
         for slab in slabs(result):
-            local = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
-            scatter(self.element, local, result, slab)
+            forces = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
+            scatter(self.element, forces, result, slab)
         return result
 
 
 def slabs(fields: Fields) -> Iterator[slice]:
-    """Slices of the first axis of the grid, each of about `SLAB_CELLS` cells times loads."""
+    """Yield slices of the first axis of the grid, each of about `SLAB_CELLS` cells times fields."""
     first, *last_axes = fields.shape[2:]
     size = SLAB_CELLS if isinstance(fields, np.ndarray) else DEVICE_SLAB_CELLS
     count = max(1, size // (fields.shape[0] * math.prod(last_axes)))
@@ -127,18 +133,25 @@ def slabs(fields: Fields) -> Iterator[slice]:
 
 
 def gather(element: Element, fields: Fields, slab: slice) -> Fields:
-    """Local unknowns of the cells of a slab, shape (local unknowns, loads, *slab)."""
+    """Return the local unknowns of the cells of a slab, shape (local unknowns, fields, *slab)."""
     xp = namespace(fields)
     first, *last_axes = fields.shape[2:]
     local = xp.empty((len(element.local), fields.shape[0], slab.stop - slab.start, *last_axes))
     for k, (unknown, offset) in enumerate(element.local):
-        part = fields[:, unknown, _layers(slab, offset[0], first)]
-        local[k] = _roll(xp, part, [-shift for shift in offset[1:]])
+        layers = fields[:, unknown, _layers(slab, offset[0], first)]
+        local[k] = _roll(xp, layers, [-shift for shift in offset[1:]])
     return local
 
 
 def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> None:
-    """Adds element forces, (local unknowns, loads, *slab), to `result` (loads, unknowns, *grid)."""
+    """Add the forces on the cells of a slab to the nodal forces of the grid, in place.
+
+    Args:
+        element: Element of the cells.
+        forces: Forces on the local unknowns, shape (local unknowns, fields, *slab).
+        result: Nodal forces, shape (fields, unknowns, *grid); changed.
+        slab: Slice of the first axis of the grid.
+    """
     xp = namespace(result)
     for k, (unknown, offset) in enumerate(element.local):
         layers = _layers(slab, offset[0], result.shape[2])
@@ -146,13 +159,14 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
 
 
 def _layers(slab: slice, offset: int, size: int) -> slice | list[int]:
-    """The layers of a slab moved by an offset along a periodic axis: a slice if none wraps."""
-    start, stop = slab.start + offset, slab.stop + offset
+    """Return the layers of a slab moved along a periodic axis: a slice where none wraps."""
+    start = slab.start + offset
+    stop = slab.stop + offset
     return slice(start, stop) if stop <= size else [k % size for k in range(start, stop)]
 
 
-def _roll(xp: ModuleType, part: Fields, shifts: Any) -> Fields:
-    """The part rolled along the last axes, where a shift is not zero."""
+def _roll(xp: ModuleType, layers: Fields, shifts: Sequence[int]) -> Fields:
+    """Return an array rolled along its last axes, as it is where all shifts are zero."""
     if not any(shifts):
-        return part
-    return xp.roll(part, tuple(shifts), axis=tuple(range(-len(shifts), 0)))
+        return layers
+    return xp.roll(layers, tuple(shifts), axis=tuple(range(-len(shifts), 0)))

@@ -5,10 +5,9 @@ become Legendre modes along x, then z, in strips that are kept until the last ro
 then y; the transposed passes lead back. `grid.Operator` and `energy.modes_of` multiply the same out
 by matrices, for arrays of any library, and are what this is tested against.
 
-Names: `tables`, (axis, order, mode, function), lead to modes along z, y, x; a term of `terms` is a
-component, an unknown and the orders of its derivative along z, y, x; `groups` are the first and one
-past the last of terms of the same unknown and order along x; modes have the shape (component, mode
-along z, along y, modes along x of a row).
+The first arguments of the kernels are the members of `element.SplineProducts`. A term is a Voigt
+component, an unknown and the orders of its derivative along z, y, x. Modes have the shape
+(component, mode along z, mode along y, modes along x of a row).
 """
 
 from __future__ import annotations
@@ -23,8 +22,11 @@ from alphacut.base.kernels import kernel
 from alphacut.rve.image.fields.element import Element, isotropic_parts
 
 ROUNDINGS = 32
-"""Of a mode, relative to the sum of the magnitudes of its terms: 12 of the tables' entries (3 each,
-and 3 of the sides), 3 a pass and 3 of sums of terms, 4 of the parts; 28 with those of a part."""
+"""Rounding units by which a mode may be off, relative to the sum of the magnitudes of its terms.
+
+Derived: 12 of the entries of the tables (3 each, and 3 of the sides), 3 of each of the three passes
+and 3 of the sums of terms, 4 of the parts of the deviator make 28.
+"""
 
 fast = kernel(fastmath={"contract", "nsz"})  # fused products round less; the order of sums stays
 
@@ -32,23 +34,37 @@ fast = kernel(fastmath={"contract", "nsz"})  # fused products round less; the or
 def apply_by_rows(
     element: Element, trace: Array, deviator: Array, fields: Array, mean_modes: Array
 ) -> Array:
-    """Nodal forces of fields, both of shape (loads, unknowns, z, y, x), with mean modes added."""
+    """Return the nodal forces of fields of voxels plus uniform fields.
+
+    Args:
+        element: Element of voxels.
+        trace: Coefficient of the trace of each voxel, shape (z, y, x).
+        deviator: Coefficient of the deviator, of the same shape.
+        fields: Shape (fields, unknowns, z, y, x).
+        mean_modes: Modes of the uniform fields, shape (modes, fields).
+
+    Returns:
+        Forces in the shape of `fields`.
+    """
     result = np.zeros_like(fields)
     parts = isotropic_parts(3, stress=element.stress)
-    uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
-    for load, field in enumerate(fields):
-        _apply(*element.products, parts[3, 3] ** 2, uniform[:, load].copy(),
-               trace, deviator, field, result[load])  # fmt: skip
+    uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])  # by component
+    tables, terms, groups, factors = element.products
+    for number, field in enumerate(fields):
+        _apply(tables, terms, groups, factors, parts[3, 3] ** 2, uniform[:, number].copy(),
+               trace, deviator, field, result[number])  # fmt: skip
     return result
 
 
 def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int) -> Array:
-    """Modes in the rows from `first` to `last` of a layer of voxels, (modes, fields, voxels).
+    """Return the modes in some rows of a layer of voxels, shape (modes, fields, voxels).
 
-    Each is off by at most `ROUNDINGS` rounding units of the sum of its terms' magnitudes.
+    The rows are those from `first` up to but without `last` in layer `z`. Each mode is off by at
+    most `ROUNDINGS` rounding units of the sum of the magnitudes of its terms.
     """
     components = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
-    _fill_modes(*element.products, fields, z, first, last, components)
+    tables, terms, groups, factors = element.products
+    _fill_modes(tables, terms, groups, factors, fields, z, first, last, components)
     parts = isotropic_parts(3, stress=element.stress)
     return np.asarray(parts @ components.reshape(6, -1)).reshape(components.shape)
 
@@ -61,7 +77,6 @@ def call_kernels(elements: Iterable[Element]) -> None:
         mean_modes = np.zeros((len(element.modes), 1))
         apply_by_rows(element, coefficient, coefficient, fields, mean_modes)
         modes_by_rows(element, fields, z=0, first=0, last=1)
-    multiply_by_blocks(np.zeros((1, 1, 1), np.float32), np.zeros((1, 1, 1), np.complex64))
 
 
 @fast
@@ -69,9 +84,12 @@ def _apply(
     tables: Any, terms: Any, groups: Any, factors: Any, shear_factor: float, uniform: Any,
     trace: Any, deviator: Any, field: Any, result: Any,
 ) -> None:  # fmt: skip
-    """Add the forces of one field, (unknowns, z, y, x), to the result.
+    """Add the forces of one field, shape (unknowns, z, y, x), to `result` in place.
 
-    The law is trace·tr² + deviator·2 dev:dev; shear components count `shear_factor` times.
+    The energy of the modes of a voxel is trace·tr² + deviator·2 dev:dev. Its derivative by a normal
+    component is mean + 2 deviator · component, with mean = (trace − 2/3 deviator)·tr; its
+    derivative by a shear component is shear_factor · deviator · component. `uniform` has the Voigt
+    components of a uniform field that is added, shape (6,).
     """
     n = tables.shape[-1]
     nz, ny, nx = trace.shape
@@ -123,7 +141,10 @@ def _fill_modes(
     tables: Any, terms: Any, groups: Any, factors: Any, fields: Any,
     z: int, first: int, last: int, modes: Any,
 ) -> None:  # fmt: skip
-    """Set modes of the Voigt components, (component and its modes, fields, voxels)."""
+    """Set the modes of the Voigt components in the rows from `first` to `last` of layer `z`.
+
+    `modes` is changed in place; its shape is (component and its modes, fields, voxels).
+    """
     n, nx = tables.shape[-1], fields.shape[-1]
     strips = np.zeros((len(terms), n, n, n * nx))
     by_component = np.zeros((6, n, n, n * nx))
@@ -144,10 +165,14 @@ def _fill_strips(
     tables: Any, terms: Any, groups: Any, factors: Any, field: Any, z: int, y: int,
     shifted: Any, lines: Any, strips: Any,
 ) -> None:  # fmt: skip
-    """Pass the row y of the n planes from z on to modes along x, `lines`, and z."""
+    """Pass the row y of the n planes from z on to modes along x, and these to modes along z.
+
+    The result is written to `strips`, shape (terms, modes along z, y % n, modes along x).
+    `shifted` and `lines` are work arrays for a row moved by each function, and for modes along x.
+    """
     n = tables.shape[-1]
     nz, ny, nx = field.shape[1:]
-    for start, stop in groups:
+    for start, stop in groups:  # terms of one unknown and one derivative along x
         _, u, _, _, dx = terms[start]
         lines[:] = 0.0
         for a in range(n):
@@ -171,7 +196,10 @@ def _fill_strips(
 
 @fast
 def _modes_of_row(tables: Any, terms: Any, strips: Any, y: int, modes: Any) -> None:
-    """Pass strips of the rows from y on to modes, (components, n, n, modes along x)."""
+    """Pass the strips of the n rows from y on to modes along y, and add up the terms in `modes`.
+
+    `modes` is overwritten; its shape is (components, n, n, modes along x).
+    """
     n = tables.shape[-1]
     nx = modes.shape[-1] // n
     weights = np.empty(n)
@@ -190,7 +218,11 @@ def _add_forces(
     tables: Any, terms: Any, groups: Any, factors: Any, sums: Any, z: int, y: int,
     lines: Any, shifted: Any, result: Any,
 ) -> None:  # fmt: skip
-    """Pass the sums of the row y back along z and x to the result, and empty them."""
+    """Pass the sums of the row y back along z and x, add them to `result`, and empty them.
+
+    This is the transpose of `_fill_strips`. `sums` has the shape (terms, y % n, modes along z,
+    modes along x); `lines` and `shifted` are work arrays.
+    """
     n = tables.shape[-1]
     nz, ny, nx = result.shape[1:]
     for start, stop in groups:
@@ -216,7 +248,10 @@ def _add_forces(
 def _add_combination(
     out: Any, size: int, taps: int, factor: float, weights: Any, sources: Any
 ) -> None:
-    """Add factor · weights @ sources, of so many taps, to the first values of a row."""
+    """Add factor · Σ_k weights[k] sources[k] to the first `size` values of a row, in place.
+
+    `taps`, the number of terms of the sum, is at most 3.
+    """
     a = factor * weights[0]  # sources are indexed in the loops: a view of a row takes as long
     if taps == 3:
         b, c = factor * weights[1], factor * weights[2]
@@ -229,22 +264,3 @@ def _add_combination(
     else:
         for x in range(size):
             out[x] += a * sources[0, x]
-
-
-@fast
-def multiply_by_blocks(blocks: Any, spectra: Any) -> None:
-    """Multiply waves, (loads, unknowns, waves), by their blocks (unknowns, unknowns, waves)."""
-    loads, count, waves = spectra.shape
-    size = 256  # waves worked on at once: what the first cache holds
-    product = np.empty((count, size), spectra.dtype)
-    for load in range(loads):
-        for start in range(0, waves, size):
-            length = min(size, waves - start)
-            product[:] = 0
-            for a in range(count):
-                for b in range(count):
-                    block, wave = blocks[a, b, start:], spectra[load, b, start:]
-                    for w in range(length):
-                        product[a, w] += block[w] * wave[w]
-            for a in range(count):
-                spectra[load, a, start : start + length] = product[a, :length]

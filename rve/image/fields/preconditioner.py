@@ -9,6 +9,7 @@ longitudinal waves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
@@ -18,67 +19,75 @@ import scipy.fft
 from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
-from alphacut.rve.image.fields.kernels import multiply_by_blocks
 
-ROUNDING = 1e-3  # of the preconditioner
 GAUGE = 1e-6
-"""Part of a block's trace below which potentials count as without stress: at 16³ voxels stresses
-have 1e-5 of it or more, rounding 1e-16. A larger one costs iterations; no bound rests on it."""
+"""Fraction of the trace of a block below which potentials count as without stress: at 16³ voxels
+stresses have 1e-5 of it or more, rounding 1e-16. A larger one costs iterations; no bound rests on
+it."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """One constant material: coefficients of trace and deviator, the latter positive.
+    """A constant material.
 
-    `part` is the element's `trace_in_deviator`.
+    Args:
+        trace: Coefficient of the square of the trace.
+        deviator: Positive coefficient of the square of the deviator.
+        trace_in_deviator: The element's number c of this name.
     """
 
     trace: float
     deviator: float
-    part: float
+    trace_in_deviator: float
 
     @classmethod
     def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
-        """Constant material at the geometric mean of a grid's extremes, for a narrow spectrum."""
-        part = element.trace_in_deviator
-        (min_trace, max_trace), (min_deviator, max_deviator) = (
-            (float(x.min()), float(x.max())) for x in (trace, deviator)
-        )
-        min_sum = min_trace + part * min_deviator
-        mean_sum = float(np.sqrt(min_sum * (max_trace + part * max_deviator)))
+        """Return the material at the geometric means of a grid's extremes: a narrow spectrum."""
+        c = element.trace_in_deviator
+        min_deviator = float(deviator.min())
+        max_deviator = float(deviator.max())
+        min_sum = float(trace.min()) + c * min_deviator
+        max_sum = float(trace.max()) + c * max_deviator
+        mean_sum = float(np.sqrt(min_sum * max_sum))
         mean_deviator = float(np.sqrt(min_deviator * max_deviator))
-        if element.stress and element.dimension == 2:  # where nothing is left beside the trace
+        # for the stress of the plane the third square of the head of this file is zero
+        if element.stress and element.dimension == 2:
             mean_deviator = mean_sum * min_deviator / min_sum
-        return cls(mean_sum - part * mean_deviator, mean_deviator, part)
+        return cls(mean_sum - c * mean_deviator, mean_deviator, c)
 
-    def lowest_energy_ratio(self, trace: Fields, deviator: Fields) -> float:
-        """Lower bound of the energy of fluctuations in a grid over that in this material."""
-        bulk, shear = float(trace.min()), float(deviator.min())
-        sums = bulk + self.part * shear, self.trace + self.part * self.deviator
-        return min(shear / self.deviator, sums[0] / sums[1]) * (1 - ROUNDING)
+    def min_energy_ratio(self, trace: Fields, deviator: Fields) -> float:
+        """Return a lower bound of the energy of fluctuations in a grid over that in this material.
+
+        It is reduced by more than the preconditioner's rounding; see `FourierPreconditioner`.
+        """
+        rounding = 1e-3
+        shear = float(deviator.min())
+        grid_sum = float(trace.min()) + self.trace_in_deviator * shear
+        constant_sum = self.trace + self.trace_in_deviator * self.deviator
+        return min(shear / self.deviator, grid_sum / constant_sum) * (1 - rounding)
 
 
 @dataclass(frozen=True, eq=False)
 class FourierPreconditioner:
     """Inverse of the constant-coefficient operator on a periodic grid.
 
-    A cell is alike where space is mirrored at a point, so that blocks are real once each unknown is
-    taken at its place in the cell, and odd ones times i: half the memory of Hermitian blocks.
+    A cell is alike where space is mirrored at a point. So the blocks of the Fourier symbol are real
+    once each unknown is taken at its place in the cell, and odd unknowns times i: this takes half
+    the memory of Hermitian blocks.
 
     Voxels are transformed in single precision: each application is off by 1e-7 of the residual
-    then, and by less than `ROUNDING` of its energy, however small the residual has become.
+    then, and by less than 1e-3 of its energy, however small the residual has become.
 
     Args:
-        inverse: Real symmetric blocks, shape (unknowns, unknowns, *waves); along x the waves are
-            those of a real transform; times the scale.
-        phases: exp(i k·place), by i for odd unknowns, along each axis; they broadcast to
-            (unknowns, *waves).
+        inverse: Real symmetric blocks, times the scale, shape (unknowns, unknowns, *waves). Along x
+            the waves are those of a real transform.
+        phases: exp(i k·place), times i for odd unknowns, shape (unknowns, *waves).
         shape: Shape of the grid.
         scale: Magnitude of a material of voxels, a power of two; 1 for pixels.
     """
 
     inverse: Fields
-    phases: tuple[Fields, ...]
+    phases: Fields
     shape: tuple[int, ...]
     scale: float
 
@@ -86,77 +95,78 @@ class FourierPreconditioner:
     def of_material(
         cls, element: Element, constant: Reference, shape: tuple[int, ...], xp: ModuleType = np
     ) -> FourierPreconditioner:
-        """Inverse operator of a constant material; what has no energy has a pseudo-inverse."""
+        """Return the inverse for a constant material; what has no energy has a pseudo-inverse."""
         waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
         waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
-        n, phases = element.unknowns, []
-        is_odd = np.array([odd for _, odd in element.places])
-        for axis, k in enumerate(waves):
-            places = [place[axis] for place, _ in element.places]
-            phase = (
-                np.exp(1j * np.outer(places, k)) * np.where(is_odd & (axis == 0), 1j, 1)[:, None]
-            )
-            ones = (1,) * (len(shape) - 1 - axis)
-            phases.append(xp.asarray(phase.reshape(n, *(1,) * axis, k.size, *ones)))
-        # what does not vary from cell to cell: of splines alone it has no energy but rounding
-        uniform = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
-        greatest = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
-        first_block = np.zeros((n, n))
-        if np.linalg.norm(uniform, 2) > GAUGE * greatest:
-            first_block = np.linalg.pinv(uniform, rcond=1e-10, hermitian=True)
-        first_wave = (0,) * len(shape)
-        kind, scale = xp.float64, 1.0
+        real_type, complex_type, scale = xp.float64, xp.complex128, 1.0
         if element.dimension == 3:
-            kind, scale = xp.float32, float(2.0 ** np.round(np.log2(constant.deviator)))
-        inverse = xp.empty((n, n, *(k.size for k in waves)), dtype=kind)
+            real_type, complex_type = xp.float32, xp.complex64
+            scale = float(2.0 ** np.round(np.log2(constant.deviator)))
+        first_block = _block_of_uniform_fields(element, constant, waves)
+        n = element.unknowns
+        inverse = xp.empty((n, n, *(k.size for k in waves)), dtype=real_type)
+        phases = xp.empty((n, *(k.size for k in waves)), dtype=complex_type)
+        # pixels' blocks span many orders of energy at long waves, and have no gauge
+        has_gauge = element.stress and element.dimension == 3
         for slab in slabs(inverse):
-            phase = xp.moveaxis(_product(phases, slab), 0, -1)
-            symbol = fourier_blocks(element, constant, [waves[0][slab], *waves[1:]], xp)
-            real = (xp.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
+            slab_waves = [waves[0][slab], *waves[1:]]
+            phase = _phases(element, slab_waves, xp)
+            symbol = fourier_blocks(element, constant, slab_waves, xp)
+            blocks = (xp.conj(phase)[..., :, None] * symbol * phase[..., None, :]).real
             if slab.start == 0:
-                real[first_wave] = xp.eye(n)  # set below
-            # pixels' blocks span many orders of energy at long waves, and have no gauge
-            has_gauge = element.stress and element.dimension == 3
-            solved = _pseudo_inverse(xp, real) if has_gauge else xp.linalg.inv(real)
-            solved = xp.moveaxis((solved + xp.swapaxes(solved, -1, -2)) / 2, (-2, -1), (0, 1))
+                blocks[(0,) * len(shape)] = xp.eye(n)  # replaced by `first_block` below
+            solved = _pseudo_inverse(xp, blocks) if has_gauge else xp.linalg.inv(blocks)
+            solved = (solved + xp.swapaxes(solved, -1, -2)) / 2
             if slab.start == 0:
-                solved[(slice(None), slice(None), *first_wave)] = xp.asarray(first_block)
-            inverse[:, :, slab] = scale * solved
-        return cls(inverse, tuple(phases), shape, scale)
+                solved[(0,) * len(shape)] = xp.asarray(first_block)
+            inverse[:, :, slab] = scale * xp.moveaxis(solved, (-2, -1), (0, 1))
+            phases[:, slab] = xp.moveaxis(phase, -1, 0)
+        return cls(inverse, phases, shape, scale)
 
     def apply(self, fields: Fields) -> Fields:
-        """The inverse on fields of shape (loads, unknowns, *grid)."""
+        """Return the inverse applied to fields of shape (fields, unknowns, *grid)."""
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
+        # SciPy transforms several axes faster than NumPy, and takes no arrays of a device.
         fft = scipy.fft if isinstance(fields, np.ndarray) else xp.fft
-        if self.scale != 1:
-            fields = (fields / self.scale).astype(self.inverse.dtype)
-        spectrum = fft.rfftn(fields, axes=axes)
-        if isinstance(fields, np.ndarray) and len(self.shape) == 3:
-            blocks, waves = (x.reshape(*x.shape[:2], -1) for x in (self.inverse, spectrum))
-            multiply_by_blocks(blocks, waves)  # places are alike: no phases
-            return fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
-        for slab in slabs(spectrum):
-            phase = _product(self.phases, slab)
-            part = xp.conj(phase) * spectrum[:, :, slab]
-            spectrum[:, :, slab] = phase * xp.einsum(
-                "ab...,nb...->na...", self.inverse[:, :, slab], part
-            )
+        scaled = (fields / self.scale).astype(self.inverse.dtype)
+        spectrum = xp.conj(self.phases) * fft.rfftn(scaled, axes=axes)
+        spectrum = self.phases * xp.einsum("ab...,nb...->na...", self.inverse, spectrum)
         return fft.irfftn(spectrum, s=self.shape, axes=axes).astype(float, copy=False)
 
 
-def _product(phases: tuple[Fields, ...] | list[Fields], slab: slice) -> Fields:
-    """Product of the phases along the axes, in a slab of the first."""
-    result = phases[0][:, slab]
-    for phase in phases[1:]:
-        result = result * phase
-    return result
+def _phases(element: Element, waves: Sequence[Array], xp: ModuleType) -> Fields:
+    """Return exp(i k·place), times i for odd unknowns, shape (*waves, unknowns).
+
+    `waves` are the wave numbers along each axis, per cell.
+    """
+    phases = xp.asarray(np.where(element.is_odd, 1j, 1.0))
+    for axis, k in enumerate(waves):
+        along_axis = np.exp(1j * np.outer(k, element.places[:, axis]))  # (waves, unknowns)
+        phases = phases[..., None, :] * xp.asarray(along_axis)
+    return phases
+
+
+def _block_of_uniform_fields(
+    element: Element, constant: Reference, waves: Sequence[Array]
+) -> Array:
+    """Return the pseudo-inverse of the block of fields that do not vary from cell to cell.
+
+    Of splines alone such a field has no energy but rounding; the block is then zero.
+    """
+    n = element.unknowns
+    block = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
+    max_energy = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
+    if np.linalg.norm(block, 2) <= GAUGE * max_energy:
+        return np.zeros((n, n))
+    return np.asarray(np.linalg.pinv(block, rcond=1e-10, hermitian=True))
 
 
 def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
-    """Inverse of symmetric positive blocks, (…, n, n), and nearly none of what has no energy.
+    """Return the inverse of symmetric positive blocks, (…, n, n), that neglects what has no energy.
 
-    Potentials without stress have none. With X = (B + ε)⁻¹ they are large in X and gone in X B X.
+    Potentials without stress have no energy. With X = (B + ε)⁻¹ they are large in X and vanish in
+    X B X, which for the others is near B⁻¹.
     """
     size = blocks.shape[-1]
     trace = xp.einsum("...ii->...", blocks)[..., None, None]
@@ -165,19 +175,22 @@ def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
 
 
 def fourier_blocks(
-    element: Element, constant: Reference, waves: list[Array], xp: ModuleType = np
+    element: Element, constant: Reference, waves: Sequence[Array], xp: ModuleType = np
 ) -> Fields:
-    """Fourier symbol of a constant material at waves per cell, (*waves, unknowns, unknowns)."""
-    # forms of the strain's trace and of its deviator on a cell
-    trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
+    """Return the Fourier symbol of a constant material, shape (*waves, unknowns, unknowns).
+
+    `waves` are the wave numbers along each axis of the grid, per cell.
+    """
+    # energy of the local unknowns of a cell: by the trace and by the deviator
+    trace, deviator = (element.modes[rows].T @ element.modes[rows] for rows in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator
-    unknown = np.array([u for u, _ in element.local])
-    offsets = np.array([offset for _, offset in element.local])
+    unknown = np.array([local.unknown for local in element.local])
+    offsets = np.array([local.offset for local in element.local])
     reach = element.reach
     # coupling of unknowns a and b of cells at a distance from −reach to reach along each axis
     coupling = np.zeros((2 * reach + 1,) * len(waves) + (element.unknowns,) * 2)
-    steps = np.moveaxis(offsets - offsets[:, None] + reach, -1, 0)
-    np.add.at(coupling, (*steps, unknown[:, None], unknown), matrix)
+    distances = np.moveaxis(offsets - offsets[:, None] + reach, -1, 0)
+    np.add.at(coupling, (*distances, unknown[:, None], unknown), matrix)
     symbol = xp.asarray(coupling)
     for k in waves:  # each turns the first axis, a distance, into the last but two, a wave
         factors = xp.asarray(np.exp(1j * np.outer(k, np.arange(-reach, reach + 1))))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from alphacut.base.errors import FailedError, RefusedError
+from alphacut.rve.image.bounds import Enclosure
 from alphacut.rve.image.files import needed_memory, read_grid
 from alphacut.rve.image.model import ImageModel, solve_image, usual_division
 from alphacut.rve.image.phases import (
@@ -102,7 +103,7 @@ def test_cuts_that_leave_out_an_image_inside_them_are_refused():
     model.require_consistent(pairs, cuts)
     for level in (0, 2):
         high = cuts[level].modulus[1]
-        moved = (high + 1e-3 * high, 1.1 * high)
+        moved = Enclosure(high + 1e-3 * high, 1.1 * high)
         wrong = [replace(cut, modulus=moved) if k == level else cut for k, cut in enumerate(cuts)]
         with pytest.raises(FailedError, match="the proof is wrong: E of an image inside a cut"):
             model.require_consistent(pairs, wrong)

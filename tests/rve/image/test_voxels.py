@@ -16,7 +16,7 @@ from alphacut.rve.image.fields.element import element_of, isotropic_parts
 from alphacut.rve.image.fields.energy import energies, modes_by_matrices, modes_of
 from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
-from alphacut.rve.image.losses import energy_shares, mean_loss
+from alphacut.rve.image.losses import energy_fractions, mean_loss
 from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.spheres.model import cubic_stiffness
@@ -232,7 +232,7 @@ def test_kernels_do_what_the_elements_matrices_do(stress, rng):
         largest = np.abs(by_matrices).max()
         assert operator.apply(fields) == pytest.approx(by_matrices, abs=1e-14 * largest)
         means = element.mean_modes(rng.normal(size=(2, 6)))
-        weights = list(zip(element.parts, (trace, deviator), strict=True))
+        weights = trace, deviator
         found = energies(element, fields, means, weights)
         ((_, expected, *bound),) = modes_by_matrices(element, fields, means)
         for (z, rows), modes, *error in modes_of(element, fields, means):
@@ -307,8 +307,7 @@ def test_energies_are_those_of_three_gauss_points_an_axis(rng):
     weight = np.einsum("i,j,k->ijk", weights, weights, weights).ravel() / 8
     exact = np.mean(weight @ density.reshape(27, -1))
     uniform = element.mean_modes(np.zeros((1, 6)))
-    parts = list(zip(element.parts, (trace, deviator), strict=True))
-    found = energies(element, potentials, uniform, parts)
+    found = energies(element, potentials, uniform, (trace, deviator))
     assert found.value.sum() == pytest.approx(exact, rel=1e-13)
     assert exact <= found.upper[0, 0] < exact * (1 + 1e-11)
 
@@ -358,7 +357,7 @@ def test_losses_of_laminates_and_equal_losses_are_exact(rng):
     moduli = np.array([[1.0, 9.0], [0.6, 4.0]])
     images = ModuliImages((moduli[0][phase],) * 2, (moduli[1][phase],) * 2)
     model = ImageModel((1.0, 1.0, 1.0), solver=TIGHT)
-    shares = energy_shares(model, model.solve(images), images, phase, 2)
+    shares = energy_fractions(model, model.solve(images), images, phase, 2)
     step = 1e-6
     for name, index in (("E_x", 0), ("E_y", 1), ("E_z", 2)):
 
@@ -387,7 +386,7 @@ def test_shares_of_energy_hold_where_bounds_are_wide():
     sharp = solution.bounds
     for lower, upper in ((0.5, 1.0), (1.0, 2.0), (0.7, 1.4)):
         wide = StiffnessBounds(lower * sharp.lower, upper * sharp.upper)
-        shares = energy_shares(model, replace(solution, bounds=wide), images, phase, 2)
+        shares = energy_fractions(model, replace(solution, bounds=wide), images, phase, 2)
         for (low, high), share in zip(shares["E_x"], (1 / 9, 8 / 9), strict=True):
             assert low <= share + 1e-12
             assert share - 1e-12 <= high
@@ -397,7 +396,7 @@ def test_first_order_losses_of_an_independent_solver_are_inside(rng):
     phase, moduli = voxels(rng, (3, 4, 4), contrast=8.0)
     images = ModuliImages((moduli[0][phase],) * 2, (moduli[1][phase],) * 2)
     model = ImageModel((1.0, 1.0, 1.0))
-    shares = energy_shares(model, model.solve(images), images, phase, 2)
+    shares = energy_fractions(model, model.solve(images), images, phase, 2)
     step, sides = 1e-4, (1.0, 1.0, 1.0)
 
     def moduli_at(change):
