@@ -29,7 +29,7 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     """
     content = read_bytes(path)
     try:
-        sets = [_parse_shape(*rows) for rows in data_sets(content, 55)]
+        sets = [_parse_shape(found.head, found.lines) for found in data_sets(content, 55)]
     except (ValueError, IndexError) as error:
         allowed = "data sets 55 of a universal file"
         raise RefusedError(path.name, str(error)[:80], allowed) from None
@@ -63,7 +63,7 @@ class UffShape(NamedTuple):
     amplitudes: dict[str, complex]
 
 
-def _parse_shape(head: list[str], values: bytes | list[str]) -> UffShape | None:
+def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     """Return the mode shape of a data set 55, or None for a data set of another analysis.
 
     Args:
@@ -88,7 +88,7 @@ def _parse_shape(head: list[str], values: bytes | list[str]) -> UffShape | None:
     numbers_of_value = 2 if kind in COMPLEX else 1
     numbers_of_node = numbers_of_value * size
     step = 1 + ceil(numbers_of_node / 6)
-    lines = [str(line) for line in values if str(line).strip()]
+    lines = [line for line in values if line.strip()]
     amplitudes: dict[str, complex] = {}
     for start in range(0, len(lines), step):
         numbers = floats(" ".join(lines[start + 1 : start + step]))

@@ -55,14 +55,14 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
     content = read_bytes(path)
     require(bool(content.strip()), path.name, "empty", "a file with a record", "load it anew")
     if is_universal(content):
-        return read_uff_record(path.name, content, channel)
+        return read_uff_record(path.name, content, channel, unit)
     if _waveform_format(content):
         return _read_waveform(path, content, channel, unit)
     file = TextFile.from_bytes(path.name, content)
     if is_geonet(file):
         return read_geonet(file, channel)
     if is_cosmos(file):
-        return read_cosmos(file, channel)
+        return read_cosmos(file, channel, unit)
     for mark, n_lines, read in FORMATS:
         if any(map(mark.match, file.lines[:n_lines])):
             return read(file, unit)
