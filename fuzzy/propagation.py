@@ -1,4 +1,4 @@
-"""Propagation of fuzzy inputs through a function, and shares of the inputs in a width."""
+"""Propagation of fuzzy inputs through a function, and what each input adds to a width."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
@@ -39,7 +39,8 @@ class CampaignOptions(TypedDict, total=False):
     progress: Progress | bool | None
 
 
-BUDGET = 10_000  # evaluations of the model that a call may take unless it says more
+BUDGET = 10_000
+"""Evaluations of the model that a call may take unless it says more."""
 
 
 def propagate(
@@ -104,7 +105,8 @@ def propagate(
         Ends(lower=array([3., 6.]), upper=array([20., 10.]))
     """
     start = perf_counter()
-    domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha)
+    alpha_levels = levels(4) if alpha is None else alpha
+    domain = Domain(joined_inputs(inputs), alpha_levels)
     method = method or Automatic()
     _require_method(method)
     require_choice("on_failure", on_failure, ("raise", "skip"))
@@ -112,6 +114,7 @@ def propagate(
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(is_allowed, "executor", value=executor, allowed=allowed)
     model = b"" if store is None else model_key(identity or {})
+    # A store or an executor that the caller made is not closed here.
     with (
         progress_reporter(progress) as report,
         nullcontext(executor) if executor else pool(workers) as sample_executor,
@@ -142,6 +145,7 @@ def propagate(
 
 
 def _require_method(method: Plan) -> None:
+    """Refuse an object that is no plan, such as the class itself or a plan of other samples."""
     is_plan = hasattr(method, "run") and not isinstance(method, type)
     is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
     allowed = "an object such as General() or Signed()"
@@ -150,7 +154,7 @@ def _require_method(method: Plan) -> None:
 
 
 def _note_failures(bounds: Bounds, failed: int) -> Bounds:
-    """The bounds, if samples failed as attained ones with a note on their number."""
+    """Return the bounds; if samples failed, as attained ones with a note on their number."""
     if not failed:
         return bounds
     note = f"{failed} samples failed and were left out: the true range may reach further there"
@@ -158,7 +162,7 @@ def _note_failures(bounds: Bounds, failed: int) -> Bounds:
         bounds,
         nature=Nature.ATTAINED,
         natures=(),
-        error=0 * bounds.lower,
+        error=np.zeros_like(bounds.lower),
         basis=(),
         inner=None,
         notes=(*bounds.notes, note),
@@ -166,22 +170,31 @@ def _note_failures(bounds: Bounds, failed: int) -> Bounds:
 
 
 def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Unit of each output, "" if none is given; "s11" gives that of "s11[0]" too."""
-    arrays = [name.partition("[")[0] for name in outputs]
-    for name in units:
-        require_choice("unit of", name, sorted({*arrays, *outputs}))
+    """Return the unit of each output, "" if none is given, or nothing if there are no units.
+
+    Args:
+        units: Unit by the name of an output. The unit of "s11" is that of "s11[0]", too.
+        outputs: Names of the outputs.
+
+    Raises:
+        RefusedError: A name is no output.
+    """
     if not units:
         return ()
-    pairs = zip(outputs, arrays, strict=True)
-    return tuple(units.get(name, units.get(array, "")) for name, array in pairs)
+    array_of = {name: name.partition("[")[0] for name in outputs}
+    for name in units:
+        require_choice("unit of", name, sorted(set(array_of) | set(array_of.values())))
+    return tuple(units.get(name, units.get(array, "")) for name, array in array_of.items())
 
 
 class Shares(NamedTuple):
     """Contribution of each input, or group of inputs, to the width of a result (Figs. 34, 35).
 
-    `share` is the reduction of the width when an input of `names` is fixed at its nominal value,
-    over the width with all inputs fuzzy, shape (names, …, outputs); 0 where the width is 0. Shares
-    need not add up to 1: effects overlap. A negative one is an error of the bounds.
+    Args:
+        names: Names of the inputs, or of the groups.
+        share: Fraction of the width, shape (names, …, outputs): the reduction of the width when the
+            input is fixed at its nominal value, over the width with all inputs fuzzy; 0 where the
+            width is 0. The fractions need not add up to 1: effects overlap.
     """
 
     names: tuple[str, ...]
@@ -203,6 +216,9 @@ def width_shares(
         groups: Names of inputs that are fixed together, by the name of their group; each input by
             itself if not given.
 
+    Raises:
+        RefusedError: A group names what is no input.
+
     Example:
         >>> from alphacut.fuzzy import Interval, Reduced
         >>> inputs = {"a": Interval(0, 1), "b": Interval(0, 3)}
@@ -216,17 +232,21 @@ def width_shares(
         for name in group:
             require_choice("input of a group", name, numbers)
 
-    def ends_with(crisp: Mapping[str, FuzzyNumber]) -> Array:
+    def ends_with(fixed: Sequence[str]) -> Ends:
+        """Return the ends of the result with some inputs at their nominal values."""
+        crisp = {name: Crisp(numbers[name].nominal) for name in fixed}
         result = propagation({**numbers, **crisp})
-        return np.array([result.lower, result.upper] if isinstance(result, Bounds) else result)
+        if isinstance(result, Bounds):
+            return Ends(result.lower, result.upper)
+        return Ends(np.asarray(result[0]), np.asarray(result[1]))
 
-    box_ends = ends_with({})
-    fixed = [{x: Crisp(numbers[x].nominal) for x in group} for group in members.values()]
-    ends = np.array([ends_with(crisp) for crisp in fixed])
-    # what is reached with an input fixed is reached in the box_ends box: no share is negative
-    lower = np.minimum(box_ends[0], ends[:, 0].min(axis=0))
-    upper = np.maximum(box_ends[1], ends[:, 1].max(axis=0))
-    width = upper - lower
-    reduction = width - (ends[:, 1] - ends[:, 0])
+    ends = ends_with([])
+    ends_by_group = [ends_with(group) for group in members.values()]
+    lowers = np.array([x.lower for x in ends_by_group])
+    uppers = np.array([x.upper for x in ends_by_group])
+    # What is reached with an input fixed is reached in the whole box, too, although a search of the
+    # whole box may have missed it: so no fraction is negative.
+    width = np.maximum(ends.upper, uppers.max(axis=0)) - np.minimum(ends.lower, lowers.min(axis=0))
+    reduction = width - (uppers - lowers)
     share = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
     return Shares(tuple(members), share)

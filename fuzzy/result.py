@@ -1,4 +1,4 @@
-"""Bounds: the result of all methods of fuzzy analysis, for numbers and for motions over time."""
+"""Bounds: the result of all methods of fuzzy analysis, for numbers and for responses over time."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
-"""Share of an output's size by which bounds may miss each other for reasons of rounding."""
-_MAX_LINES = 25  # lines of a text, one for each level of an output
+"""Fraction of an output's magnitude by which bounds may miss each other for reasons of rounding."""
 
 
 class Ends(NamedTuple):
@@ -44,7 +43,7 @@ class Ends(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Bounds:
-    """Ranges of the outputs of a function of fuzzy inputs, an α-cut a level, over time if there is.
+    """Ranges of the outputs of a function of fuzzy inputs: an α-cut on each level, or at each time.
 
     The nature of an output says what its ends are worth:
 
@@ -72,9 +71,9 @@ class Bounds:
         seconds: Wall time, in s.
         natures: Nature of each output; empty where all are `nature`.
         basis: Knowledge that a guarantee or an estimate rests on.
-        time: Nodes, shape (T,), in s; None where there is no time.
+        time: Time nodes, shape (T,), in s; None where there is no time.
         inner: Attained ends inside guaranteed ones, less the scheme's error, if known.
-        outer: Proved ends outside attained or estimated ones, if known.
+        outer: Guaranteed ends outside attained or estimated ones, if known.
         notes: Remarks of the method, one sentence each.
         budget: Evaluations that were allowed; 0 for no limit.
         samples: Points and values from which the bounds were taken, if stored.
@@ -82,7 +81,8 @@ class Bounds:
     Raises:
         RefusedError: Levels do not rise within [0, 1], shapes differ, an end is not finite or an
             error negative.
-        FailedError: Attained bounds leave proved ones, or cuts are not nested: the method is wrong.
+        FailedError: Attained bounds leave guaranteed ones, or cuts are not nested: the method is
+            wrong.
 
     Example:
         >>> from alphacut.fuzzy import Interval, Reduced, propagate
@@ -115,42 +115,51 @@ class Bounds:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", np.array(checked_levels(self.alpha)))
-        middle = () if self.time is None else (len(self.time),)
-        shape = (len(self.alpha), *middle, len(self.outputs))
+        times = () if self.time is None else (len(self.time),)
+        shape = (len(self.alpha), *times, len(self.outputs))
         for name in ("lower", "upper", "error"):
             _require_shape(name, getattr(self, name).shape, shape)
         for name in ("lower_at", "upper_at"):
             _require_shape(name, getattr(self, name).shape, (*shape, len(self.inputs)))
-        for end in (*(self.inner or ()), *(self.outer or ())):
-            _require_shape("inner and outer", end.shape, shape)
-        for texts in filter(None, (self.natures, self.units)):
-            _require_shape("natures, units", (len(texts),), shape[-1:])
-        finite = np.isfinite(self.lower) & np.isfinite(self.upper)
-        plain = finite & ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed))
-        key, value = "lower, upper and error", "not finite, or negative"
-        allowed = "finite ends, errors of 0 or more, or NaN where guaranteed"
-        require(plain.all(), key, value=value, allowed=allowed)
+        for ends in (self.inner, self.outer):
+            if ends is not None:
+                _require_shape("inner and outer", ends.lower.shape, shape)
+                _require_shape("inner and outer", ends.upper.shape, shape)
+        for texts in (self.natures, self.units):
+            if texts:
+                _require_shape("natures, units", (len(texts),), shape[-1:])
+        is_finite = np.isfinite(self.lower) & np.isfinite(self.upper)
+        has_error = (self.error >= 0) | (np.isnan(self.error) & self._guaranteed)
+        require(
+            (is_finite & has_error).all(),
+            "lower, upper and error",
+            value="not finite, or negative",
+            allowed="finite ends, errors of 0 or more, or NaN where guaranteed",
+        )
         self._check_proof()
 
     def _check_proof(self) -> None:
-        """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones."""
-        # differences within the stated errors and round-off are allowed
-        size = np.maximum(np.abs(self.lower), np.abs(self.upper))
-        round_off = ROUND_OFF * size.max(axis=tuple(range(size.ndim - 1)))  # of each output
+        """Raise `FailedError` if cuts are not nested or attained ends lie outside guaranteed ones.
+
+        Differences within the stated errors, and within the rounding of the output, are allowed.
+        """
+        magnitudes = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        over_levels_and_time = tuple(range(magnitudes.ndim - 1))
+        rounding = ROUND_OFF * magnitudes.max(axis=over_levels_and_time)  # (outputs,)
         error = np.nan_to_num(self.error)
-        estimated = np.where(self._guaranteed, 0.0, error)
-        slack = 2 * round_off + error[1:] + error[:-1]  # between two levels
-        inner, outer = self.attained, self.proved
-        for what, excess in (
-            ("lower bounds lie above upper ones", self.lower - self.upper - round_off - estimated),
-            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - slack),
-            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - slack),
-            ("attained bounds lie outside the proved ones", outer.lower - inner.lower - round_off),
-            ("attained bounds lie outside the proved ones", inner.upper - outer.upper - round_off),
-        ):
-            if (excess > 0).any():
-                output = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
-                raise FailedError(f"{what}: of {output}, by up to {np.nanmax(excess):.3g}")
+        estimate_error = np.where(self._guaranteed, 0.0, error)
+        between_levels = 2 * rounding + error[1:] + error[:-1]
+        attained = self.attained
+        proved = self.proved
+        crossing = self.lower - self.upper - rounding - estimate_error
+        _require_none("lower bounds lie above upper ones", crossing, self.outputs)
+        lower_falls = -np.diff(self.lower, axis=0) - between_levels
+        _require_none("lower ends of the α-cuts are not nested", lower_falls, self.outputs)
+        upper_rises = np.diff(self.upper, axis=0) - between_levels
+        _require_none("upper ends of the α-cuts are not nested", upper_rises, self.outputs)
+        for excess in (proved.lower - attained.lower, attained.upper - proved.upper):
+            what = "attained bounds lie outside the proved ones"
+            _require_none(what, excess - rounding, self.outputs)
 
     @cached_property
     def _guaranteed(self) -> Mask:
@@ -159,21 +168,27 @@ class Bounds:
 
     @cached_property
     def attained(self) -> Ends:
-        """Ends that some inputs are known to reach, less their stated error; NaN where unknown."""
-        blank = np.full(self.lower.shape, np.nan)
-        inner = self.inner or Ends(blank, blank)
+        """Ends that some inputs are known to reach, less their stated error; NaN where unknown.
+
+        The ends of attained and estimated outputs are reached to their error. Of guaranteed outputs
+        `inner` is reached, if it is known.
+        """
+        unknown = np.full(self.lower.shape, np.nan)
+        inner = self.inner or Ends(unknown, unknown)
         if self.encloses and self.inner is None:
             return inner
         lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
-        return Ends(lower, np.where(self._guaranteed, inner.upper, self.upper - self.error))
+        upper = np.where(self._guaranteed, inner.upper, self.upper - self.error)
+        return Ends(lower, upper)
 
     @cached_property
     def proved(self) -> Ends:
         """Ends that no value of the output exceeds, by proof; infinite where nothing is proved."""
-        wide = np.full(self.lower.shape, np.inf)
-        outer = self.outer or Ends(-wide, wide)
+        infinite = np.full(self.lower.shape, np.inf)
+        outer = self.outer or Ends(-infinite, infinite)
         lower = np.where(self._guaranteed, self.lower, outer.lower)
-        return Ends(lower, np.where(self._guaranteed, self.upper, outer.upper))
+        upper = np.where(self._guaranteed, self.upper, outer.upper)
+        return Ends(lower, upper)
 
     @property
     def encloses(self) -> str:
@@ -201,16 +216,15 @@ class Bounds:
             RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim of
                 coverage, which the number would have.
         """
-        steps, claim = self._steps(output), self.claim.claim
+        ends = self.bounds(output)
+        steps = outer_steps(self.alpha, ends.lower, ends.upper, encloses=self.encloses)
+        claim = self.claim.claim
         if claim is not None:
             return ClaimedNumber(steps, claim, float(self.alpha[0]))
-        is_complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
+        is_complete = self.alpha[0] == 0 and self.alpha[-1] == 1
         allowed = "levels from 0 to 1: alpha=levels(4)"
         require(is_complete, "alpha", value=self.alpha.tolist(), allowed=allowed)
         return steps
-
-    def _steps(self, output: str) -> Stepwise:
-        return outer_steps(self.alpha, *self.bounds(output), encloses=self.encloses)
 
     def column(self, output: str = "y") -> int:
         """Return the index of an output on the last axis of `lower` and `upper`."""
@@ -218,63 +232,69 @@ class Bounds:
         return self.outputs.index(output)
 
     def bounds(self, output: str = "y") -> Ends:
-        """Lower and upper ends of one output, two arrays of shape (A,), or (A, T) over time."""
+        """Return the ends of one output, two arrays of shape (A,), or (A, T) over time."""
         column = self.column(output)
         return Ends(self.lower[..., column], self.upper[..., column])
 
     def nature_of(self, output: str = "y") -> Nature:
-        """Nature of one output's bounds."""
+        """Return the nature of one output's bounds."""
         column = self.column(output)
         return self.natures[column] if self.natures else self.nature
 
     def __str__(self) -> str:
         """Return nature, basis and cost, a line for each level of the first outputs, the notes."""
-        count = max(1, _MAX_LINES // len(self.alpha))  # outputs that are shown
+        max_lines = 25  # of levels of outputs; the text shall fit on a screen
+        n_shown = max(1, max_lines // len(self.alpha))
         basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
         time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
         budget = f" of at most {self.budget:,}" if self.budget else ""
         cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
         box = f" {of_enclosing_box(self.encloses)}" if self.encloses else ""
         lines = [f"bounds {self.nature}{box}{basis}{time} by the method {self.method}: {cost}"]
-        for column in range(len(self.outputs))[:count]:
-            lines += self._lines(column)
-        hidden = len(self.outputs) - count
-        if hidden > 0:
-            lines.append(f"… and {hidden} outputs more: bounds(NAME) has them")
-        return "\n".join([*lines, *self.notes, *([str(self.claim)] if self.claim.rule else [])])
+        for output in self.outputs[:n_shown]:
+            lines += self._lines(output)
+        n_hidden = len(self.outputs) - n_shown
+        if n_hidden > 0:
+            lines.append(f"… and {n_hidden} outputs more: bounds(NAME) has them")
+        lines += self.notes
+        if self.claim.rule:
+            lines.append(str(self.claim))
+        return "\n".join(lines)
 
     __repr__ = __str__
 
     @property
     def named(self) -> tuple[str, ...]:
         """Name of each output with its unit, as "q1 [m]"."""
-        pairs = zip(self.outputs, self.units or ("",) * len(self.outputs), strict=True)
+        if not self.units:
+            return self.outputs
+        pairs = zip(self.outputs, self.units, strict=True)
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
-    def _lines(self, column: int) -> Iterator[str]:
-        lowers, uppers, errors = self._extremes(column)
-        nature = self.nature_of(self.outputs[column])
-        suffix = f", {nature}" if nature != self.nature else ""
-        error_name = "gap to attained" if nature is Nature.GUARANTEED else "error"
+    def _lines(self, output: str) -> Iterator[str]:
+        """Yield a line of text for each level of an output, with its extremes over time."""
+        column = self.column(output)
+        nature = self.nature_of(output)
+        over_time = tuple(range(1, self.lower.ndim - 1))
+        lowers = self.lower[..., column].min(axis=over_time)
+        uppers = self.upper[..., column].max(axis=over_time)
+        errors = self.error[..., column].max(axis=over_time)
         for alpha, lower, upper, error in zip(self.alpha, lowers, uppers, errors, strict=True):
-            ends = rounded(lower, "lower", nature, 6), rounded(upper, "upper", nature, 6)
-            if ends[0] > ends[1]:  # attained ends of nearly one value, rounded inwards
-                ends = lower, upper
-            line = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
+            low = rounded(lower, "lower", nature, 6)
+            high = rounded(upper, "upper", nature, 6)
+            if low > high:  # attained ends of nearly one value were rounded inwards
+                low = lower
+                high = upper
+            line = f"{self.named[column]}, α = {_digits(alpha)}: {_digits(low)} … {_digits(high)}"
             if nature is Nature.ATTAINED:
                 line += " or wider"
-            is_known = not (nature is Nature.GUARANTEED and self.encloses)  # the gap to attained
-            if nature is Nature.ATTAINED:
-                is_known = bool(error > 0)  # that of values, as of a time step
-            if is_known:
-                line += f", {error_name} {_digits(error)}"
-            yield line + suffix
-
-    def _extremes(self, column: int) -> tuple[Array, Array, Array]:
-        """Return lower and upper bounds of an output, and their error, (A,) each."""
-        lower, upper, error = (x[..., column] for x in (self.lower, self.upper, self.error))
-        over_time = tuple(range(1, lower.ndim))
-        return lower.min(axis=over_time), upper.max(axis=over_time), error.max(axis=over_time)
+                if error > 0:  # of the values, as of a time step
+                    line += f", error {_digits(error)}"
+            elif nature is Nature.ESTIMATED:
+                line += f", error {_digits(error)}"
+            elif not self.encloses:
+                line += f", gap to attained {_digits(error)}"
+            yield line if nature == self.nature else f"{line}, {nature}"
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.
@@ -290,8 +310,9 @@ class Bounds:
         axes = new_axes() if axes is None else axes
         opacity = 0.8 / len(self.alpha)  # bands of all levels lie on one another
         style: dict[str, Any] = {"color": "tab:blue", "alpha": opacity, "lw": 0} | line
-        for lower, upper in zip(*self.bounds(output), strict=True):
-            axes.fill_between(self.time, lower, upper, **style)
+        ends = self.bounds(output)
+        for level in range(len(self.alpha)):
+            axes.fill_between(self.time, ends.lower[level], ends.upper[level], **style)
         return axes
 
     def to_dataset(self) -> xarray.Dataset:
@@ -306,16 +327,25 @@ class Bounds:
         time = {} if self.time is None else {"time": self.time}
         axes = {"alpha": self.alpha, **time, "output": list(self.outputs)}
         coordinates = {**axes, "parameter": list(self.inputs)}
-        variables = {x: (tuple(axes), getattr(self, x)) for x in ("lower", "upper", "error")}
-        variables |= {x: (tuple(coordinates), getattr(self, x)) for x in ("lower_at", "upper_at")}
         natures = [str(self.nature_of(output)) for output in self.outputs]
-        variables["nature"] = (("output",), np.array(natures))
-        variables["label"] = (("output",), np.array(self.named))
-        facts: dict[str, str | float] = {"method": self.method, "evaluations": self.evaluations}
-        facts["seconds"] = self.seconds
+        variables = {
+            "lower": (tuple(axes), self.lower),
+            "upper": (tuple(axes), self.upper),
+            "error": (tuple(axes), self.error),
+            "lower_at": (tuple(coordinates), self.lower_at),
+            "upper_at": (tuple(coordinates), self.upper_at),
+            "nature": (("output",), np.array(natures)),
+            "label": (("output",), np.array(self.named)),
+        }
+        facts: dict[str, str | float] = {
+            "method": self.method,
+            "evaluations": self.evaluations,
+            "seconds": self.seconds,
+            "basis": "; ".join(self.basis),
+        }
         if self.encloses:
             facts["encloses"] = self.encloses
-        return xarray.Dataset(variables, coordinates, {**facts, "basis": "; ".join(self.basis)})
+        return xarray.Dataset(variables, coordinates, facts)
 
 
 def of_enclosing_box(encloses: str) -> str:
@@ -324,9 +354,17 @@ def of_enclosing_box(encloses: str) -> str:
 
 
 def _digits(value: float) -> str:
-    """A number with six digits; empty where it is not known."""
+    """Return a number with six digits; empty where it is NaN."""
     return "" if np.isnan(value) else f"{value + 0.0:.6g}"
 
 
+def _require_none(what: str, excess: Array, outputs: tuple[str, ...]) -> None:
+    """Raise a `FailedError` that says `what` is wrong if an excess (…, outputs) is positive."""
+    if (excess > 0).any():
+        output = outputs[int(np.nanargmax(excess) % len(outputs))]
+        raise FailedError(f"{what}: of {output}, by up to {np.nanmax(excess):.3g}")
+
+
 def _require_shape(name: str, found: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    """Refuse an array of another shape."""
     require(found == shape, f"shape of {name}", value=found, allowed=str(shape))

@@ -16,7 +16,7 @@ from alphacut.base.errors import FailedError, RefusedError, require, require_cho
 
 Function = Callable[..., object]
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
-_BATCH = 1024  # points per call of a vectorised function
+"""Name and shape of each output, in column order; a number has the shape ()."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Values:
     """Outputs at many points.
 
     Args:
-        layout: Name and shape of each output, in column order; a number has the shape ().
+        layout: Name and shape of each output, in column order.
         array: One row a point, one column an entry of every output, shape (n, columns).
     """
 
@@ -34,22 +34,25 @@ class Values:
     @cached_property
     def columns(self) -> tuple[str, ...]:
         """Name of each column: `E`, or `s11[0]`, `s11[1]`, … of an output that is an array."""
-        return tuple(
-            name + "".join(f"[{i}]" for i in index)
-            for name, shape in self.layout
-            for index in np.ndindex(shape)
-        )
+        names = []
+        for name, shape in self.layout:
+            for index in np.ndindex(shape):
+                suffix = "".join(f"[{i}]" for i in index)
+                names.append(name + suffix)
+        return tuple(names)
 
     def output(self, name: str) -> Array:
         """Return the values of an output at all points, shape (n, *shape of the output)."""
-        names, shapes = zip(*self.layout, strict=True)
-        require_choice("output", name, names)
-        ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
-        index = names.index(name)
-        return np.split(self.array, ends, axis=1)[index].reshape(-1, *shapes[index])
+        require_choice("output", name, dict(self.layout))
+        first = 0
+        for found, shape in self.layout:
+            if found == name:
+                break
+            first += prod(shape)
+        return self.array[:, first : first + prod(shape)].reshape(-1, *shape)
 
     def column(self, name: str) -> int:
-        """Index of a column."""
+        """Return the index of a column."""
         require_choice("output", name, self.columns)
         return self.columns.index(name)
 
@@ -135,11 +138,11 @@ class Call:
     vectorised: bool = False
 
     def __post_init__(self) -> None:
-        shown, is_callable = repr(self.function), callable(self.function)
-        require(is_callable, "function", value=shown, allowed="what can be called")
-        are_compatible = not (self.shared and self.vectorised)
+        is_callable = callable(self.function)
+        require(is_callable, "function", value=repr(self.function), allowed="what can be called")
+        is_allowed = not (self.shared and self.vectorised)
         allowed = "none where the function is vectorised"
-        require(are_compatible, "shared", value=self.shared, allowed=allowed)
+        require(is_allowed, "shared", value=self.shared, allowed=allowed)
         for name in self.shared:
             require_choice("shared input", name, self.names)
 
@@ -156,7 +159,8 @@ class Call:
                 groups.setdefault(points[row, columns].tobytes(), []).append(row)
             yield from groups.values()
             return
-        size = _BATCH if self.vectorised else 1
+        # With 1,024 points the call itself costs little, and arrays still fit into the cache.
+        size = 1024 if self.vectorised else 1
         for start in range(0, len(points), size):
             yield list(range(start, min(start + size, len(points))))
 
@@ -167,8 +171,9 @@ class Call:
         """
         try:
             outputs = self._outputs(points)
-            found, expected = len(outputs), len(points)
-            require(found == expected, "outputs", value=found, allowed=f"{expected}")
+            expected = len(points)
+            is_complete = len(outputs) == expected
+            require(is_complete, "outputs", value=len(outputs), allowed=f"{expected}")
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
@@ -176,11 +181,10 @@ class Call:
         return [_outcome(output) for output in outputs]
 
     def _outputs(self, points: Array) -> Sequence[Any]:
-        """Call the function; its unchecked outputs at each of the points (n, inputs)."""
+        """Call the function, and return its unchecked outputs at each of the points (n, inputs)."""
         if self.vectorised:
-            outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
-            named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
-            arrays = {x: np.atleast_1d(np.asarray(value, float)) for x, value in named.items()}
+            outputs = _named(self.function(**dict(zip(self.names, points.T, strict=True))))
+            arrays = {x: np.atleast_1d(np.asarray(value, float)) for x, value in outputs.items()}
             rows = zip(*arrays.values(), strict=True)
             return [dict(zip(arrays, row, strict=True)) for row in rows]
         points_by_name = [named_point(self.names, point) for point in points]
@@ -190,17 +194,27 @@ class Call:
 
 
 def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
-    """The inputs of one point by name, as Python numbers."""
+    """Return the inputs of one point, shape (inputs,), by name, as Python numbers."""
     return {name: float(value) for name, value in zip(names, point, strict=True)}
 
 
+def _named(outputs: Any) -> Mapping[Any, Any]:
+    """Return outputs by name; a number or an array has the name "y"."""
+    return outputs if isinstance(outputs, Mapping) else {"y": outputs}
+
+
 def _outcome(output: Any) -> Outcome:
-    """Sample of a number (`y`), array (`y[0]`, …) or mapping of names to them; else a failure."""
+    """Return the sample of an output of the function, or a failure if it is not allowed.
+
+    Args:
+        output: A number (`y`), an array (`y[0]`, …), a mapping of names to numbers and arrays, or
+            the exception that ended the call.
+    """
     try:
         if isinstance(output, Exception):
             raise output
-        named = output if isinstance(output, Mapping) else {"y": output}
-        arrays = {str(name): _finite_array(str(name), value) for name, value in named.items()}
+        named = _named(output).items()
+        arrays = {str(name): _finite_array(str(name), value) for name, value in named}
         layout = tuple((name, array.shape) for name, array in arrays.items())
         columns = Values(layout, np.zeros((0, 0))).columns
         are_distinct = bool(columns) and len(set(columns)) == len(columns)
@@ -212,10 +226,11 @@ def _outcome(output: Any) -> Outcome:
 
 
 def _finite_array(name: str, value: ArrayLike | None) -> Array:
+    """Return an output as an array; refuse what is no plain array of finite real numbers."""
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()
-    if not is_allowed:  # of an array repr takes longer than all else here
+    if not is_allowed:  # not by `require`: the text of an array takes longer than all else here
         shown = " ".join(repr(value).split())[:80]
         allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
         raise RefusedError(f"output {name}", shown, allowed)

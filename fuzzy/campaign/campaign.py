@@ -31,10 +31,6 @@ from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
 
 LOG = logging.getLogger(__name__)
 
-_MIN_PAUSE = 0.05  # seconds between two transactions at least
-_MIN_PAUSE_RATIO = 10  # a transaction that took t is not followed by another within 10 t
-_FIRST_POINTS = 16  # points that are tried, where samples may fail, to learn the outputs' names
-
 
 @dataclass
 class Campaign:
@@ -102,11 +98,13 @@ class Campaign:
         Raises:
             CampaignError: No sample succeeds.
         """
-        unit = quasi_random_points(len(domain.names), _FIRST_POINTS)
-        lower, upper = (ends[0] for ends in domain.boxes)
+        # 16 points of the widest box are tried where samples may fail.
+        unit = quasi_random_points(len(domain.names), 16)
+        lower, upper = domain.boxes
+        others = lower[0] + unit * (upper[0] - lower[0])
         failures: list[tuple[dict[str, float], str]] = []
         failed_points = []
-        for point in (domain.nominal, *(lower + unit * (upper - lower))):
+        for point in np.vstack([domain.nominal, others]):
             try:
                 columns = self(point[None]).columns
             except CampaignError as error:
@@ -115,6 +113,7 @@ class Campaign:
                 failures += error.failures
                 failed_points.append(point + 0.0)
                 continue
+            # Only now it is known how many columns the failed points have.
             without_value = np.full(len(columns), np.nan)
             self._rows |= {failed.tobytes(): without_value for failed in failed_points}
             self._samples = None
@@ -131,7 +130,7 @@ class Campaign:
             SpentError: New points exceed the budget; none of them is evaluated.
             CampaignError: Samples failed; raised after all others have been evaluated.
         """
-        keys = [point.tobytes() for point in points + 0.0]  # no -0.0
+        keys = [point.tobytes() for point in points + 0.0]  # -0.0 + 0.0 is 0.0
         new_keys = [key for key in dict.fromkeys(keys) if key not in self._rows]
         if len(new_keys) > self.remaining:
             what = f"{len(self):,} evaluations are done, the next {len(new_keys):,} would pass"
@@ -177,31 +176,48 @@ class Campaign:
 
 
 def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
-    """Sample or failure by row of new points (n, inputs), from the store, or evaluated for it."""
-    store, outcomes, unwritten = campaign.store, dict[int, Outcome](), dict[str, Sample]()
-    keys = [point_key(campaign.call.names, point) for point in points] if store else []
-    for row, key in enumerate(keys):
-        if store and (sample := store.get(campaign.model, key)):
-            outcomes[row] = campaign.checked(sample)
-    groups = ([x for x in rows if x not in outcomes] for rows in campaign.call.tasks(points))
-    tasks = ((rows, points[rows]) for rows in groups if rows)
-    written, write_seconds = perf_counter(), 0.0
+    """Return the sample or failure of each new point, from the store, or evaluated for it.
+
+    Args:
+        campaign: Its call is evaluated by its executor; its layout is set by the first sample.
+        points: Points that are not among the samples of the campaign, shape (n, inputs).
+
+    Returns:
+        Outcome by row of the points.
+    """
+    outcomes: dict[int, Outcome] = {}
+    keys: list[str] = []
+    if campaign.store:
+        keys = [point_key(campaign.call.names, point) for point in points]
+        for row, key in enumerate(keys):
+            sample = campaign.store.get(campaign.model, key)
+            if sample:
+                outcomes[row] = campaign.checked(sample)
+    rows_by_call = ([x for x in rows if x not in outcomes] for rows in campaign.call.tasks(points))
+    tasks = ((rows, points[rows]) for rows in rows_by_call if rows)
+    unwritten: dict[str, Sample] = {}
+    last_write = perf_counter()
+    write_seconds = 0.0
     try:
         for rows, results in completed(campaign.call, tasks, campaign.executor):
-            for row, outcome in zip(rows, map(campaign.checked, results), strict=True):
+            for row, result in zip(rows, results, strict=True):
+                outcome = campaign.checked(result)
                 outcomes[row] = outcome
-                if store and isinstance(outcome, Sample):
+                if campaign.store and isinstance(outcome, Sample):
                     unwritten[keys[row]] = outcome
+            # A transaction that took t seconds is not followed by another one within 10 t, nor
+            # within 0.05 s, so that writing takes a tenth of the time at most.
             start = perf_counter()
-            is_due = start - written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * write_seconds)
-            if store and unwritten and is_due:
-                store.put(campaign.model, unwritten)
-                unwritten, written = {}, perf_counter()
-                write_seconds = written - start
-            # the first batch of a design is most of the work; later ones are not foreseen
+            is_due = start - last_write > max(0.05, 10 * write_seconds)
+            if campaign.store and unwritten and is_due:
+                campaign.store.put(campaign.model, unwritten)
+                unwritten = {}
+                last_write = perf_counter()
+                write_seconds = last_write - start
+            # The first batch of a design is most of the work; later ones are not foreseen.
             if not len(campaign) and len(points) > 1:
                 campaign.report(0.99 * len(outcomes) / len(points))
     finally:
-        if store and unwritten:
-            store.put(campaign.model, unwritten)
+        if campaign.store and unwritten:
+            campaign.store.put(campaign.model, unwritten)
     return outcomes

@@ -22,10 +22,8 @@ from alphacut.fuzzy.campaign.call import Call, Outcome, named_point
 
 P = ParamSpec("P")
 T = TypeVar("T")
-Task = tuple[list[int], Array]  # rows of the design and their points, evaluated by one call
-_PARENT_PERIOD = 0.2  # seconds between two checks that the parent process runs
-_BATCH_SECONDS = 0.1  # of work in a batch of quick calls: with less, sending it costs more
-_MAX_BATCH = 1024  # calls in a batch
+Task = tuple[list[int], Array]
+"""Rows of a design, and their points, which one call evaluates."""
 _GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
 
 
@@ -54,16 +52,16 @@ def pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _processes(workers: int) -> Executor:
-    """Executor of processes, forked where that is safe, so that they import nothing anew."""
+    """Return an executor of processes, forked where that is safe, to import nothing anew."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     threads = Path("/proc/self/task")
-    # a lock that another thread holds while it is forked is never released in the child
+    # A lock that another thread holds while it is forked is never released in the child.
     is_safe = threads.exists() and len(list(threads.iterdir())) == 1
     context = get_context("fork") if is_safe else None
 
     # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
-    # that a hang-up of the process group does not end it before it has freed the semaphores
+    # that a hang-up of the process group does not end it before it has freed the semaphores.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP_SIGNALS) if _GROUP_SIGNALS else None
     try:
         executor: Executor = ProcessPoolExecutor(
@@ -85,7 +83,7 @@ def _end_with_parent(parent: int) -> None:
 
     def watch() -> None:
         while os.getppid() == parent:
-            sleep(_PARENT_PERIOD)
+            sleep(0.2)
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
@@ -116,33 +114,43 @@ def completed(
     if executor is None:
         yield from ((rows, call(points)) for rows, points in tasks)
         return
-    queue, batch_size, max_pending = iter(tasks), 1, 2 * n_workers(executor)
+    queue = iter(tasks)
+    batch_size = 1
     pending: dict[Future[tuple[list[list[Outcome]], float]], list[Task]] = {}
     try:
         while True:
-            while len(pending) < max_pending and (batch := list(islice(queue, batch_size))):
+            while len(pending) < 2 * n_workers(executor):
+                batch = list(islice(queue, batch_size))
+                if not batch:
+                    break
                 pending[executor.submit(_run, call, [points for _, points in batch])] = batch
             if not pending:
                 return
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 batch = pending.pop(future)
                 outcomes, seconds = _result(future, call, batch)
-                ideal_size = _BATCH_SECONDS * len(batch) / max(seconds, 1e-9)
-                batch_size = int(min(max(ideal_size, 1), _MAX_BATCH))
-                pairs = zip(batch, outcomes, strict=True)
-                yield from ((rows, results) for (rows, _), results in pairs)
+                # Quick calls come in batches of 0.1 s; sending a shorter one would cost more.
+                ideal_size = 0.1 * len(batch) / max(seconds, 1e-9)
+                batch_size = int(min(max(ideal_size, 1), 1024))
+                for (rows, _), results in zip(batch, outcomes, strict=True):
+                    yield rows, results
     finally:
         for future in pending:
             future.cancel()
 
 
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
+    """Return the outcomes of each call of a batch, and the seconds that they took."""
     start = perf_counter()
     return [call(points) for points in batch], perf_counter() - start
 
 
 def _result(future: Future[T], call: Call, batch: list[Task]) -> T:
-    """Wait for the result of a batch, whose calls catch their own exceptions."""
+    """Wait for the result of a batch, whose calls catch their own exceptions.
+
+    Raises:
+        FailedError: The worker process died, or the batch cannot be sent to one.
+    """
     try:
         return future.result()
     except BrokenExecutor as error:

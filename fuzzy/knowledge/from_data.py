@@ -1,7 +1,8 @@
 """Fuzzy numbers from measured values, with a claim how often their cuts contain a quantity.
 
 The next value, the median and quantiles by ranks (`order_statistics`), the mean by a band, or where
-the law is known to be normal by Student's t (Hahn and Meeker, Statistical Intervals, 1991, ch. 4).
+the distribution is known to be normal by Student's t (Hahn and Meeker, Statistical Intervals, 1991,
+chapter 4).
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ LEVELS = np.unique(
 """Levels at which the cuts are exact: hundredths and quarters of them among others. Between two of
 them the wider cut holds.
 """
-CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
 
 
 def from_data(
@@ -35,18 +35,20 @@ def from_data(
 
     The probability is over repeated samples.
 
-    For the next value, the median and a quantile this holds for any law and any number of values,
-    drawn independently, or at least exchangeably, from one law. Without bounds n values decide the
-    cuts of the next value from α = 2/(n + 1) on, of the median from 2^(1 − n), of the quantile q
-    from qⁿ + (1 − q)ⁿ.
+    For the next value, the median and a quantile this holds for any distribution and any number of
+    values, drawn independently, or at least exchangeably, from one distribution. Without bounds n
+    values decide the cuts of the next value from α = 2/(n + 1) on, of the median from 2^(1 − n), of
+    the quantile q from qⁿ + (1 − q)ⁿ.
 
     Args:
         values: The measured numbers, one or more.
-        claim: "next value", "mean", "median" or "quantile 0.95". A mean needs a law or both bounds.
+        claim: "next value", "mean", "median" or "quantile 0.95". A mean needs `law` or both
+            bounds.
         bounds: Physically possible values (lower, upper), None where there is no bound. They are
             the ends of cuts that the values do not decide: without them the number has no cut at
             low α.
-        law: "normal" where the law is known, for narrower cuts of the mean, which rest on it.
+        law: "normal" where the values are known to have a normal distribution, for narrower cuts of
+            the mean, which rest on it.
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
@@ -67,27 +69,31 @@ def from_data(
     else:
         number, decided = student_cuts(data)
     drawn = f"{len(data.values)} values drawn alike and independently"
-    conditions = [f"{drawn} from a {law} law" if law else drawn]
+    if law:
+        drawn += f" from a {law} law"
+    conditions = [drawn]
     if bounds is not None:
-        conditions.append("bounds [{:g}, {:g}]".format(*data.bounds))
+        low, high = data.bounds
+        conditions.append(f"bounds [{low:g}, {high:g}]")
     return ClaimedNumber(number, CoverageClaim(claim, tuple(conditions)), decided)
 
 
 def _quantile(claim: str) -> float | None:
-    """Probability of the claimed quantile; None for the next value and the mean."""
+    """Return the probability of the claimed quantile; None for the next value and the mean."""
     number = re.fullmatch(r"quantile +(\d*\.\d+(?:e-\d+)?)", str(claim))
     if number and 0 < float(number[1]) < 1:
         return float(number[1])
-    require(claim in ("next value", "mean", "median"), "claim", value=repr(claim), allowed=CLAIMS)
+    allowed = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
+    require(claim in ("next value", "mean", "median"), "claim", value=repr(claim), allowed=allowed)
     return 0.5 if claim == "median" else None
 
 
 def mean_cuts(data: Observations) -> Stepwise:
-    """Return the α-cuts of the mean of any law within physical bounds, at the `LEVELS`.
+    """Return the α-cuts of the mean of any distribution within physical bounds, at the `LEVELS`.
 
-    Without bounds no cuts hold for all laws: a rare, far value moves the mean and is not seen
-    (Bahadur and Savage, Annals of Mathematical Statistics 27, 1956, 1115-1122). With bounds, the
-    distribution function lies within a band around that of the values (Smirnov, exact for n
+    Without bounds no cuts hold for all distributions: a rare, far value moves the mean and is not
+    seen (Bahadur and Savage, Annals of Mathematical Statistics 27, 1956, 1115-1122). With bounds,
+    the distribution function lies within a band around that of the values (Smirnov, exact for n
     values), and the mean between the means of the band's edges (Anderson, Bulletin of the
     International Statistical Institute 43, 1969, 249-251).
 
@@ -95,77 +101,107 @@ def mean_cuts(data: Observations) -> Stepwise:
         RefusedError: A bound is missing.
     """
     low, high = data.bounds
-    are_finite, allowed = np.isfinite(data.bounds).all(), "finite ends for a mean of any law"
-    cure = "give both, or law='normal'"
-    require(are_finite, "bounds", value=data.bounds, allowed=allowed, cure=cure)
+    require(
+        np.isfinite(data.bounds).all(),
+        "bounds",
+        value=data.bounds,
+        allowed="finite ends for a mean of any law",
+        cure="give both, or law='normal'",
+    )
     n = len(data.values)
-    band, fraction = _band_half_width(n), np.arange(n + 1) / n
-    sums = np.append(0.0, np.cumsum(data.values)) / n
-    # the largest fraction `band` of the values moved to the lower bound, or the least to the upper
-    lower = low * band + np.interp(1 - band, fraction, sums)
-    upper = high * band + sums[-1] - np.interp(band, fraction, sums)
-    # within the bounds and nested, despite round-off
+    band = _band_half_width(n)
+    fractions = np.arange(n + 1) / n
+    partial_means = np.append(0.0, np.cumsum(data.values)) / n
+    # An edge of the band moves the fraction `band` of the values, those farthest away, to a bound:
+    # the largest values to the lower bound, or the smallest values to the upper one.
+    lower = low * band + np.interp(1 - band, fractions, partial_means)
+    upper = high * band + partial_means[-1] - np.interp(band, fractions, partial_means)
+    # Rounding must not lead out of the bounds, nor out of the cut at the next lower level.
     lower = np.maximum.accumulate(np.maximum(lower, low))
     upper = np.minimum.accumulate(np.minimum(upper, high))
-    return Stepwise((0.0, *LEVELS), (low, *lower), (high, *upper))
+    return _stepwise_at_levels(low, high, lower=lower, upper=upper)
+
+
+def _stepwise_at_levels(low: float, high: float, *, lower: Array, upper: Array) -> Stepwise:
+    """Return the cut [low, high] at α = 0 and the cuts from `lower` to `upper` at the `LEVELS`."""
+    levels = tuple(np.append(0.0, LEVELS))
+    return Stepwise(levels, tuple(np.append(low, lower)), tuple(np.append(high, upper)))
 
 
 @lru_cache(maxsize=64)
 def _band_half_width(n: int) -> Array:
-    """Half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1]."""
+    """Return the half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1]."""
     from scipy.stats import ksone
 
-    # the distribution function leaves either side with half the level's probability
+    # The distribution function leaves the band at either side with half the level's probability.
     band: Array = ksone.isf(LEVELS / 2, n)
     return np.clip(band, 0.0, 1.0)
 
 
 def student_cuts(data: Observations) -> tuple[Stepwise, float]:
-    """Return the α-cuts of a normal law's mean, and the least level with finite ends.
+    """Return the α-cuts of the mean of a normal distribution, and the lowest level that they reach.
 
-    The cuts, at the `LEVELS`, are clipped to the physical bounds; with two of them the level is 0.
+    From this level on the cuts are finite; with two physical bounds it is 0. The cuts, at the
+    `LEVELS`, are clipped to the bounds.
 
     Raises:
         RefusedError: There are fewer than two values, or all are equal.
     """
-    values, (least, greatest) = data.values, data.values[[0, -1]]
-    shown, allowed = f"{len(values)} from {least:g} to {greatest:g}", "two or more, unlike"
-    cure = "give bounds=(lower, upper) in place of a law, or measure more"
-    require(least < greatest, "values of a normal law", value=shown, allowed=allowed, cure=cure)
+    values = data.values
+    require(
+        values[0] < values[-1],
+        "values of a normal law",
+        value=f"{len(values)} from {values[0]:g} to {values[-1]:g}",
+        allowed="two or more, unlike",
+        cure="give bounds=(lower, upper) in place of a law, or measure more",
+    )
     half_width = _student_factors(len(values)) * values.std(ddof=1)
     return _clip_cuts(values.mean() - half_width, values.mean() + half_width, data.bounds)
 
 
 @lru_cache(maxsize=64)
 def _student_factors(n: int) -> Array:
-    """Factors k of mean ± k · deviation that hold the mean of n values, at each of the `LEVELS`."""
+    """Return k with which mean ± k · deviation of n values holds the mean, at the `LEVELS`."""
     from scipy.stats import t
 
     return np.asarray(np.maximum(t.isf(LEVELS / 2, n - 1), 0.0) / np.sqrt(n))
 
 
 def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
-    """Cuts at the `LEVELS` clipped to physical bounds, and the level from which they are finite."""
+    """Clip cuts to physical bounds, and return them with the level from which they are finite.
+
+    Args:
+        lower: Lower ends at the `LEVELS`.
+        upper: Upper ends.
+        bounds: Physical bounds, infinite for none.
+    """
     low, high = bounds
     upper = np.minimum.accumulate(np.clip(upper, low, high))
-    # at α = 1 both are one point, to round-off
-    lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
+    lower = np.maximum.accumulate(np.clip(lower, low, high))
+    lower = np.minimum(lower, upper[-1])  # at α = 1 both are one point, to rounding
+    if np.isfinite(bounds).all():
+        return _stepwise_at_levels(low, high, lower=lower, upper=upper), 0.0
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
-    is_bounded = bool(np.isfinite(bounds).all())
-    least, greatest = (low, high) if is_bounded else (lower[first], upper[first])
-    lower[:first], upper[:first] = lower[first], upper[first]
-    cuts = Stepwise((0.0, *LEVELS), (least, *lower), (greatest, *upper))
-    return cuts, 0.0 if is_bounded else float(LEVELS[first])
+    lower[:first] = lower[first]
+    upper[:first] = upper[first]
+    cuts = _stepwise_at_levels(lower[first], upper[first], lower=lower, upper=upper)
+    return cuts, float(LEVELS[first])
 
 
 def from_scatter(mean: float, deviation: float, count: int) -> ClaimedNumber:
-    """Return the number of a normal law's mean from `count` values of known standard deviation."""
+    """Return the fuzzy number of a mean, from values of a normal distribution of known deviation.
+
+    Args:
+        mean: Mean of the values.
+        deviation: Standard deviation of a single value.
+        count: Number of values.
+    """
     from scipy.stats import norm
 
     checked_number("mean", mean)
     checked_number("deviation", deviation, positive=True)
     checked_number("count", count, positive=True, whole=True)
     half_width = deviation / np.sqrt(count) * np.maximum(norm.isf(LEVELS / 2), 0.0)
-    law = f"{count} values drawn alike and independently from a normal law of known deviation"
+    condition = f"{count} values drawn alike and independently from a normal law of known deviation"
     cuts, decided = _clip_cuts(mean - half_width, mean + half_width, (-np.inf, np.inf))
-    return ClaimedNumber(cuts, CoverageClaim("mean", (law,)), decided)
+    return ClaimedNumber(cuts, CoverageClaim("mean", (condition,)), decided)

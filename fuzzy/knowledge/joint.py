@@ -44,9 +44,13 @@ def jointly(
     if not claimed:
         return dict(inputs)
     kinds = sorted({number.claim.about for number in claimed.values()})
-    cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-    is_told, allowed = bool(means) or len(kinds) == 1, "of one kind"
-    require(is_told, "claims of the inputs", value=kinds, allowed=allowed, cure=cure)
+    require(
+        bool(means) or len(kinds) == 1,
+        "claims of the inputs",
+        value=kinds,
+        allowed="of one kind",
+        cure="say what the joint one means: jointly(inputs, means='drift of the next frame')",
+    )
     rule = JointRule(tuple(claimed), independent, means or kinds[0], named=bool(means))
     for (first, number), (second, second_number) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
@@ -64,12 +68,21 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
-    """Copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut."""
+    """Return a copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut.
+
+    Of several cuts whose joint levels are equal the last one, the narrowest, stays. Cuts above the
+    joint level 1 are left out.
+    """
     cuts = number.number
     levels = rule.joint_level(np.asarray(cuts.alpha))
-    is_last = np.append(np.diff(levels) > 0, True) & (levels <= 1)  # of equal levels the last cut
-    lower, upper = (tuple(np.asarray(ends)[is_last]) for ends in (cuts.lower, cuts.upper))
-    joint_cuts = Stepwise(tuple(levels[is_last]), lower, upper, cuts.encloses)
+    is_last = np.append(np.diff(levels) > 0, True)
+    kept = np.flatnonzero(is_last & (levels <= 1))
+    joint_cuts = Stepwise(
+        tuple(levels[kept]),
+        tuple(np.asarray(cuts.lower)[kept]),
+        tuple(np.asarray(cuts.upper)[kept]),
+        cuts.encloses,
+    )
     decided = float(rule.joint_level(np.asarray(number.decided)))
     return replace(number, number=joint_cuts, decided=decided, joint=rule)
 
@@ -94,24 +107,20 @@ class JointClaim:
     ) -> JointClaim:
         """Return what may be claimed of a result that is computed from some inputs.
 
-        Unless the `nature` of its bounds is "guaranteed", that the true range stays inside them is
-        a condition. Inputs with a width but no claim are opinions.
+        Args:
+            inputs: Fuzzy numbers by name. Inputs with a width but no claim are opinions.
+            nature: Nature of the bounds of the result. Unless it is "guaranteed", that the true
+                range stays inside the bounds is a condition.
         """
         claimed = {name: x for name, x in inputs.items() if isinstance(x, ClaimedNumber)}
-        unclaimed = {name: x for name, x in inputs.items() if name not in claimed}
-        opinions = tuple(name for name, x in unclaimed.items() if x.support.width > 0)
-        names_by_condition: dict[str, list[str]] = {}
-        for name, number in claimed.items():
-            if number.claim.conditions:
-                words = ", ".join(number.claim.conditions)
-                names_by_condition.setdefault(words, []).append(name)
-        conditions = [f"{', '.join(names)}: {x}" for x, names in names_by_condition.items()]
+        opinions = [name for name in inputs if name not in claimed]
+        opinions = [name for name in opinions if inputs[name].support.width > 0]
+        conditions = _conditions_by_input(claimed)
         rule = None
         if claimed:
-            name, first = next(iter(claimed.items()))
-            alone = JointRule(names=(name,), independent=False, means=first.claim.about)
-            rule = first.joint or alone  # joined inputs share one rule
-            conditions += [rule.words] if rule.words else []
+            rule = _rule_of(claimed)
+            if rule.words:
+                conditions.append(rule.words)
         if opinions:
             cuts = "their cuts" if len(opinions) > 1 else "its cut"
             conditions.append(f"{', '.join(opinions)} in {cuts} at α (opinions)")
@@ -119,7 +128,7 @@ class JointClaim:
             conditions.append(
                 f"if the true range stays inside the {nature} bounds, which is not proved"
             )
-        return cls(rule, tuple(conditions), opinions)
+        return cls(rule, tuple(conditions), tuple(opinions))
 
     @property
     def claim(self) -> CoverageClaim | None:
@@ -131,8 +140,23 @@ class JointClaim:
         if self.rule is None:
             names = ", ".join(self.opinions)
             return names and f"{names}: opinions, so that no level has a probability"
-        names = ", ".join(self.rule.names)
-        subject = (
-            self.rule.means if self.rule.named else f"result of the {self.rule.means} of {names}"
-        )
+        subject = self.rule.means
+        if not self.rule.named:
+            subject = f"result of the {subject} of {', '.join(self.rule.names)}"
         return str(CoverageClaim(subject, self.conditions))
+
+
+def _rule_of(claimed: Mapping[str, ClaimedNumber]) -> JointRule:
+    """Return the rule that all joined inputs share, or the rule of a single input by itself."""
+    name, first = next(iter(claimed.items()))
+    return first.joint or JointRule(names=(name,), independent=False, means=first.claim.about)
+
+
+def _conditions_by_input(claimed: Mapping[str, ClaimedNumber]) -> list[str]:
+    """Return the conditions of the claims, each once with the names of its inputs before it."""
+    names_by_condition: dict[str, list[str]] = {}
+    for name, number in claimed.items():
+        if number.claim.conditions:
+            condition = ", ".join(number.claim.conditions)
+            names_by_condition.setdefault(condition, []).append(name)
+    return [f"{', '.join(names)}: {x}" for x, names in names_by_condition.items()]

@@ -12,9 +12,6 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
 
 Signs = NDArray[np.int8]
-ROUND_OFF = 1e-11
-"""Share of the range and of the largest value: smaller differences contradict nothing."""
-_MAX_COMPARED = 400  # samples of an output whose pairs are compared: 160,000 pairs
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,8 @@ class Knowledge:
     def __post_init__(self) -> None:
         checked_number("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
-            for value in sign.values() if isinstance(sign, Mapping) else (sign,):
+            values = list(sign.values()) if isinstance(sign, Mapping) else [sign]
+            for value in values:
                 allowed = "1 (rises), -1 (falls)"
                 require(value in (-1, 1), f"sign of {name}", value=value, allowed=allowed)
 
@@ -59,23 +57,34 @@ class Knowledge:
     def check_outputs(self, outputs: Iterable[str]) -> None:
         """Refuse names that are no output."""
         for sign in self.signs.values():
-            for name in sign if isinstance(sign, Mapping) else ():
-                require_choice("output of knowledge", name, outputs)
+            if isinstance(sign, Mapping):
+                for name in sign:
+                    require_choice("output of knowledge", name, outputs)
 
     def stated_signs(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
         """Return the stated signs, shape (outputs, inputs), 0 where none is stated."""
         table = np.zeros((len(outputs), len(inputs)), np.int8)
         for name, sign in self.signs.items():
             column = inputs.index(name)
-            for row, output in enumerate(outputs):
-                table[row, column] = sign.get(output, 0) if isinstance(sign, Mapping) else sign
+            if isinstance(sign, Mapping):
+                table[:, column] = [sign.get(output, 0) for output in outputs]
+            else:
+                table[:, column] = sign
         return table
 
 
 def negligible(values: Array) -> Array:
-    """Return the largest difference due to rounding of each output, from values (n, outputs)."""
-    size = np.nanmax(np.abs(values), axis=0)
-    return np.asarray(ROUND_OFF * (np.nanmax(values, axis=0) - np.nanmin(values, axis=0) + size))
+    """Return the largest difference of each output that rounding explains, shape (outputs,).
+
+    It is 1e-11 of the range of the output and of its largest magnitude: models add up thousands of
+    rounding errors of 1e-16.
+
+    Args:
+        values: Values of samples, shape (n, outputs); NaN for none.
+    """
+    magnitude = np.nanmax(np.abs(values), axis=0)
+    output_range = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
+    return np.asarray(1e-11 * (output_range + magnitude))
 
 
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
@@ -85,17 +94,24 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
 
     Args:
         points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
-        values: Output at the samples, shape (n,).
+        values: Output at the samples, shape (n,); NaN for none.
         signs: +1, −1, or 0 where nothing is stated, shape (inputs,); inputs without a sign must be
             equal in both samples.
     """
+    # All pairs of 400 samples are 160,000 rows of inputs; more samples would take much memory.
+    max_samples = 400
     rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]  # NaN are sorted last
-    evenly = np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int)
+    evenly = np.linspace(0, len(rows) - 1, min(len(rows), max_samples)).astype(int)
     rows = rows[np.unique(evenly)]
-    step = (points[rows][None] - points[rows][:, None]) * np.where(signs, signs, 1)
-    may_not_fall = ((step >= 0) & ((signs != 0) | (step == 0))).all(axis=2)
-    fall = np.where(may_not_fall, values[rows][:, None] - values[rows][None], 0.0)
-    first, second = np.unravel_index(fall.argmax(), fall.shape)
-    if fall[first, second] <= negligible(values[:, None])[0]:
+
+    # Of a pair (i, j) the output may not fall from i to j if no input steps against its sign.
+    point_steps = points[rows][None] - points[rows][:, None]
+    signed_steps = point_steps * np.where(signs, signs, 1)
+    is_allowed_step = (signed_steps >= 0) & ((signs != 0) | (signed_steps == 0))
+    may_not_fall = is_allowed_step.all(axis=2)
+    falls = values[rows][:, None] - values[rows][None]
+    forbidden_falls = np.where(may_not_fall, falls, 0.0)
+    first, second = np.unravel_index(forbidden_falls.argmax(), forbidden_falls.shape)
+    if forbidden_falls[first, second] <= negligible(values[:, None])[0]:
         return None
     return points[rows[first]], points[rows[second]]

@@ -1,10 +1,10 @@
-"""Measured values, and exact cuts of any law from their ranks.
+"""Measured values, and exact cuts of any distribution from their ranks.
 
 Between n values in rising order, with the physical bounds at both ends, there are n + 1 gaps. The
-probability that the quantity lies in gap k does not depend on the law: 1/(n + 1) for the next value
-(conformal prediction), binomial for a quantile. Gaps are removed from the ends; the cut consists of
-the remaining gaps, and its level is the probability of the removed ones. Ties and discrete laws add
-coverage.
+probability that the quantity lies in gap k does not depend on the distribution of the values:
+1/(n + 1) for the next value (conformal prediction), binomial for a quantile. Gaps are removed from
+the ends; the cut consists of the remaining gaps, and its level is the probability of the removed
+gaps. Ties and discrete distributions add coverage.
 
 Sources: Wilks, Annals of Mathematical Statistics 12 (1941), 91-96; David and Nagaraja, Order
 Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, chapter
@@ -40,12 +40,20 @@ class Observations:
     def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
         """Return the observations of values as measured, within physical bounds.
 
+        Args:
+            values: The values in any order.
+            bounds: Lower and upper bound, None for one that does not exist.
+
         Raises:
             RefusedError: There is no value, one is not a number, or one lies outside the bounds.
         """
-        low, high = (None, None) if bounds is None else bounds
-        low = -np.inf if low is None else checked_number("lower bound", low)
-        high = np.inf if high is None else checked_number("upper bound", high)
+        low = -np.inf
+        high = np.inf
+        if bounds is not None:
+            if bounds[0] is not None:
+                low = checked_number("lower bound", bounds[0])
+            if bounds[1] is not None:
+                high = checked_number("upper bound", bounds[1])
         allowed = "(lower, upper) with lower < upper, None for none"
         require(low < high, "bounds", value=bounds, allowed=allowed)
         require(len(values) > 0, "values", value=list(values), allowed="one or more")
@@ -57,9 +65,12 @@ class Observations:
 
 
 class Windows(NamedTuple):
-    """Nested ranges of gaps from `low` to `high`, and the level of each, the probability outside.
+    """Nested ranges of gaps, three arrays of shape (k,).
 
-    Three arrays of shape (k,), levels rising from 0.
+    Args:
+        level: Probability of the gaps outside each range, rising from 0.
+        low: First gap of each range.
+        high: Last gap of each range.
     """
 
     level: Array
@@ -67,45 +78,65 @@ class Windows(NamedTuple):
     high: Ints
 
 
+@dataclass(frozen=True, eq=False)
+class _GapProbabilities:
+    """Probability that a quantity lies in each gap, below it and above it, shape (n + 1,) each."""
+
+    inside: Array
+    below: Array
+    above: Array
+
+    @classmethod
+    def of(cls, n: int, quantile: float | None) -> _GapProbabilities:
+        """Return the probabilities of the next value, or of a quantile, among n values."""
+        from scipy.stats import binom
+
+        gaps = np.arange(n + 1)
+        if quantile is None:
+            return cls(np.full(n + 1, 1 / (n + 1)), gaps / (n + 1), (n - gaps) / (n + 1))
+        # The number of values below the quantile has a binomial distribution.
+        count = binom(n, quantile)
+        return cls(count.pmf(gaps), count.cdf(gaps - 1), count.sf(gaps))
+
+
 @lru_cache(maxsize=64)
 def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Windows:
-    """Nested windows of the n + 1 gaps between n sorted values, and the level of each.
+    """Return nested windows of the n + 1 gaps between n sorted values, and the level of each.
 
     Args:
         n: Number of values.
         quantile: Probability of the quantile in (0, 1); None for the next value.
-        open_ends: Ends without a physical bound: their gaps are removed first.
+        open_ends: Whether the lower and the upper end have no physical bound: gaps there are
+            removed first.
     """
-    from scipy.stats import binom
-
-    # probability of the quantity in each gap, in all lower and in all higher ones
-    gaps = np.arange(n + 1)
-    if quantile is None:
-        inside, below, above = np.full(n + 1, 1 / (n + 1)), gaps / (n + 1), (n - gaps) / (n + 1)
-    else:
-        law = binom(n, quantile)
-        inside, below, above = law.pmf(gaps), law.cdf(gaps - 1), law.sf(gaps)
-    low, high, level = 0, n, 0.0
+    gaps = _GapProbabilities.of(n, quantile)
+    low = 0
+    high = n
+    level = 0.0
     windows_by_level = {level: (low, high)}
     while low < high:
-        # a gap at an open end first, then the less probable one, then that where less was removed
-        is_low_closed, is_high_closed = not open_ends[0] or low > 0, not open_ends[1] or high < n
-        lowest, highest = (inside[low], below[low]), (inside[high], above[high])
-        if (is_low_closed, *lowest) <= (is_high_closed, *highest):
+        # Remove the gap at an open end first, then the less probable gap of the two ends, then the
+        # gap at the end where less was removed.
+        is_low_closed = not open_ends[0] or low > 0
+        is_high_closed = not open_ends[1] or high < n
+        lowest = (is_low_closed, gaps.inside[low], gaps.below[low])
+        highest = (is_high_closed, gaps.inside[high], gaps.above[high])
+        if lowest <= highest:
             low += 1
         else:
             high -= 1
-        level = max(level, min(below[low] + above[high], 1.0))
-        windows_by_level[level] = low, high  # of equal levels the last window
+        level = max(level, min(gaps.below[low] + gaps.above[high], 1.0))
+        windows_by_level[level] = (low, high)  # of equal levels the last window
     windows_by_level.pop(1.0, None)
-    first, last = np.array(list(windows_by_level.values())).T
-    return Windows(np.array(list(windows_by_level)), first, last)
+    ranges = np.array(list(windows_by_level.values()))
+    return Windows(np.array(list(windows_by_level)), low=ranges[:, 0], high=ranges[:, 1])
 
 
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:
-    """Return the α-cuts from ranks, and the least level at which the values decide both ends.
+    """Return the α-cuts from ranks, and the smallest level at which the values decide both ends.
 
     Below that level the cuts repeat the first that is finite; a finite physical bound is an end.
+    The cut at α = 1 is the sample's quantile, the median for the next value.
 
     Args:
         data: The values.
@@ -116,12 +147,13 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
     levels = np.append(nested.level, 1.0)
     lower = np.append(low, data.values)[nested.low]
     upper = np.append(data.values, high)[nested.high]
-    centre = float(np.quantile(data.values, 0.5 if quantile is None else quantile))  # cut at α = 1
+    centre = float(np.quantile(data.values, 0.5 if quantile is None else quantile))
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
         return Stepwise((0.0,), (centre,), (centre,)), 1.0
     first = finite[0]
-    lower[:first], upper[:first] = lower[first], upper[first]
-    centre = float(np.clip(centre, lower[-1], upper[-1]))
-    cuts = Stepwise(tuple(levels), (*lower, centre), (*upper, centre))
+    lower[:first] = lower[first]
+    upper[:first] = upper[first]
+    centre = float(np.clip(centre, lower[-1], upper[-1]))  # cuts are nested
+    cuts = Stepwise(tuple(levels), tuple(np.append(lower, centre)), tuple(np.append(upper, centre)))
     return cuts, float(levels[first])

@@ -13,8 +13,6 @@ from alphacut.base.errors import checked_number, require
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, checked_levels
 
-_ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
-
 
 def levels(steps: int) -> tuple[float, ...]:
     """Return the equally spaced α-levels 0, 1/steps, …, 1; `steps` = 4 gives the paper's five.
@@ -39,7 +37,7 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
         skip: Points of the sequence that are left out at its beginning.
     """
     root = 2.0
-    for _ in range(64):  # converges to g
+    for _ in range(64):  # the fixed-point iteration g = (1 + g)^(1/(d + 1)) converges to g
         root = (1 + root) ** (1 / (dimension + 1))
     step = root ** -np.arange(1.0, dimension + 1)
     k = np.arange(skip + 1, skip + count + 1)[:, None]
@@ -47,14 +45,22 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
 
 
 def chebyshev_points(dimension: int, count: int, *, skip: int = 0) -> Array:
-    """Return `quasi_random_points` of [−1, 1]^d, denser towards its faces (Chebyshev density)."""
+    """Return `quasi_random_points` of [−1, 1]^d, denser towards its faces (Chebyshev density).
+
+    They have the shape (count, dimension).
+    """
     return np.asarray(-np.cos(np.pi * quasi_random_points(dimension, count, skip=skip)))
 
 
 def corners(lower: Array, upper: Array) -> Array:
-    """Return all corners of a box, shape (2^d, d); axes without width count once."""
-    pairs = zip(lower, upper, strict=True)
-    return np.array(list(product(*[dict.fromkeys(pair) for pair in pairs])))
+    """Return all corners of a box, shape (2^d, d); axes without width count once.
+
+    Args:
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends.
+    """
+    axes = [dict.fromkeys(pair) for pair in zip(lower, upper, strict=True)]
+    return np.array(list(product(*axes)))
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
@@ -62,12 +68,13 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
     is_named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
     allowed = "a mapping, as {'E': Triangular(24, 25, 26)}"
     require(bool(is_named), "inputs", value=inputs, allowed=allowed)
-    return {
-        name: value
-        if isinstance(value, FuzzyNumber)
-        else Crisp(checked_number(f"input {name}", value))
-        for name, value in inputs.items()
-    }
+    numbers: dict[str, FuzzyNumber] = {}
+    for name, value in inputs.items():
+        if isinstance(value, FuzzyNumber):
+            numbers[name] = value
+        else:
+            numbers[name] = Crisp(checked_number(f"input {name}", value))
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -92,7 +99,7 @@ class Domain:
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():
             if isinstance(number, ClaimedNumber):
-                number.cut(alpha[0])  # refused where the values do not decide it
+                number.cut(alpha[0])  # raises where the values do not decide the cut
                 inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", inputs)
@@ -105,8 +112,9 @@ class Domain:
     @property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners of the boxes, two arrays of shape (levels, inputs)."""
-        numbers = self.inputs.values()
-        cuts = np.array([[number.cut(alpha) for number in numbers] for alpha in self.alpha])
+        pairs = product(self.alpha, self.inputs.values())
+        cuts = np.array([number.cut(alpha) for alpha, number in pairs])
+        cuts = cuts.reshape(len(self.alpha), len(self.inputs), 2)
         return cuts[..., 0], cuts[..., 1]
 
     @property
@@ -115,9 +123,12 @@ class Domain:
         return np.array([number.nominal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:
-        """Return which points (n, inputs) lie in the box of each level, a mask (levels, n)."""
+        """Return which points (n, inputs) lie in the box of each level, shape (levels, n).
+
+        Points that are outside by less than 1e-12 of the support, which is rounding, lie inside.
+        """
         lower, upper = self.boxes
-        tolerance = _ROUND_OFF * (upper[0] - lower[0])
+        tolerance = 1e-12 * (upper[0] - lower[0])
         above = (points >= (lower - tolerance)[:, None]).all(axis=2)
         below = (points <= (upper + tolerance)[:, None]).all(axis=2)
         return np.asarray(above & below)

@@ -43,23 +43,30 @@ class JointRule:
     named: bool = False
 
     def joint_level(self, beta: Array) -> Array:
-        """Level α of the joint cut made of m single cuts at level β, any shape.
+        """Return the level α of the joint cut that consists of m single cuts at level β.
 
-        α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
+        It is α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
+
+        Args:
+            beta: Levels β in [0, 1], any shape.
         """
         m = len(self.names)
         if m == 1:
             return np.asarray(beta, float)
         if not self.independent:
             return np.asarray(np.minimum(m * beta, 1.0))
-        below_1 = np.minimum(beta, 1 - 1e-16)  # where the logarithm is finite
+        # Written with logarithms the formula keeps its digits at small β; at β = 1 they are
+        # infinite.
+        below_1 = np.minimum(beta, 1 - 1e-16)
         return np.asarray(-np.expm1(m * np.log1p(-below_1)))
 
     @property
     def words(self) -> str:
         """Number of sources and their dependence, in words; empty for a single source."""
+        if len(self.names) == 1:
+            return ""
         sources = "independent sources" if self.independent else "sources of unknown dependence"
-        return f"{len(self.names)} {sources}" if len(self.names) > 1 else ""
+        return f"{len(self.names)} {sources}"
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ class ClaimedNumber(FuzzyNumber):
     Args:
         number: The cuts; below `decided` they repeat the first one that the values decide.
         claim: Which quantity the cuts contain, how often, and under which conditions.
-        decided: Least α at which the values decide both ends of the cut; 0 where they do
+        decided: Smallest α at which the values decide both ends of the cut; 0 where they do
             everywhere, or physical bounds fill in.
         joint: Rule by which its cuts were widened to hold together with others; None where they
             hold by themselves.
@@ -85,7 +92,7 @@ class ClaimedNumber(FuzzyNumber):
 
     @property
     def encloses(self) -> str:
-        """As of its cuts."""
+        """Name of the set that the box of the cuts encloses; see `FuzzyNumber.encloses`."""
         return self.number.encloses
 
     @property
@@ -103,8 +110,8 @@ class ClaimedNumber(FuzzyNumber):
         return self.number.cut(alpha)
 
     def __str__(self) -> str:
-        low, high = self.cut(self.decided)
-        ends = f"{low:.6g} … {high:.6g} at α = {self.decided:.4g}"
+        widest = self.cut(self.decided)
+        ends = f"{widest.lower:.6g} … {widest.upper:.6g} at α = {self.decided:.4g}"
         return f"{type(self).__name__}({self.claim.about}: {ends})"
 
     __repr__ = __str__

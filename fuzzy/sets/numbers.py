@@ -74,16 +74,19 @@ class FuzzyNumber(ABC):
 
     def cut(self, alpha: float) -> Cut:
         """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support."""
-        levels, lower, upper = self.cuts
         alpha = checked_level(alpha)
-        return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
+        cuts = self.cuts
+        lower = _interpolate(alpha, cuts.alpha, cuts.lower)
+        return Cut(lower, _interpolate(alpha, cuts.alpha, cuts.upper))
 
     def membership(self, x: ArrayLike) -> Array:
-        """Grade of membership μ in [0, 1] at `x`, any shape; NaN where `x` is NaN."""
-        levels, lower, upper = map(np.asarray, self.cuts)
+        """Return the grade of membership μ in [0, 1] at `x`, any shape; NaN where `x` is NaN."""
+        cuts = self.cuts
         x = np.asarray(x, float)
-        # of equal ends `interp` takes the last at them: the highest level
-        left, right = np.interp(x, lower, levels, left=0), np.interp(-x, -upper, levels, left=0)
+        # Where ends of several levels are equal, `interp` takes the last one: the highest level.
+        # The upper ends fall with α, so that they are reflected.
+        left = np.interp(x, cuts.lower, cuts.alpha, left=0)
+        right = np.interp(-x, -np.asarray(cuts.upper), cuts.alpha, left=0)
         return np.asarray(np.minimum(left, right))
 
     def plot(self, axes: Axes | None = None, **line: object) -> Axes:
@@ -92,10 +95,12 @@ class FuzzyNumber(ABC):
         `line` has keywords of `Axes.plot`, such as `color`.
         """
         axes = new_axes() if axes is None else axes
-        levels, lower, upper = map(np.asarray, self.cuts)
-        values = np.concatenate([lower[:1], lower, upper[::-1], upper[:1]])
+        cuts = self.cuts
+        support = cuts.lower[:1], cuts.upper[:1]  # where the function falls to 0
+        values = np.concatenate([support[0], cuts.lower, cuts.upper[::-1], support[1]])
+        levels = np.concatenate([[0.0], cuts.alpha, cuts.alpha[::-1], [0.0]])
         drawn: dict[str, Any] = line
-        axes.plot(values, np.concatenate([[0.0], levels, levels[::-1], [0.0]]), **drawn)
+        axes.plot(values, levels, **drawn)
         return axes
 
 
@@ -121,12 +126,19 @@ def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
-    """Return the lower or upper end at `alpha` by linear interpolation; exact at `levels`."""
+    """Return the lower or upper end at `alpha` by linear interpolation; exact at `levels`.
+
+    Args:
+        alpha: Level, from the first of `levels` on.
+        levels: Rising levels.
+        ends: End of the cut at each level.
+    """
     right = bisect_right(levels, alpha)
     if right == len(levels):
         return float(ends[-1])
     fraction = (alpha - levels[right - 1]) / (levels[right] - levels[right - 1])
     rise = ends[right] - ends[right - 1]
+    # The nearer end is the base, so that rounding does not lead out of the two ends.
     if fraction < 0.5:
         return float(ends[right - 1] + fraction * rise)
     return float(ends[right] - (1 - fraction) * rise)
@@ -137,15 +149,18 @@ class _Corners(FuzzyNumber):
     """Base of numbers with straight flanks: their fields are the corners in rising order."""
 
     def __post_init__(self) -> None:
-        key, names = type(self).__name__, [corner.name for corner in fields(self)]
+        key = type(self).__name__
+        names = [corner.name for corner in fields(self)]
         corners = [checked_number(key, getattr(self, name)) for name in names]
-        is_rising, order = (np.diff(corners) >= 0).all(), " <= ".join(names)
-        require(is_rising, key, value=corners, allowed=order)
+        is_rising = (np.diff(corners) >= 0).all()
+        require(is_rising, key, value=corners, allowed=" <= ".join(names))
 
     @cached_property
     def cuts(self) -> Cuts:
+        """The support, and the values of membership 1: the middle corner, or the middle two."""
         corners = [getattr(self, corner.name) for corner in fields(self)]
-        left, right = corners[(len(corners) - 1) // 2], corners[len(corners) // 2]
+        left = corners[(len(corners) - 1) // 2]
+        right = corners[len(corners) // 2]
         return Cuts((0.0, 1.0), (corners[0], left), (corners[-1], right))
 
 
@@ -203,12 +218,15 @@ class _Nested(FuzzyNumber):
 
     def __post_init__(self) -> None:
         levels = checked_levels(self.alpha)
-        lower, upper = (tuple(map(float, ends)) for ends in (self.lower, self.upper))
+        lower = tuple(float(end) for end in self.lower)
+        upper = tuple(float(end) for end in self.upper)
         is_complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
         is_complete = is_complete and len(levels) == len(lower) == len(upper)
-        allowed = f"levels that rise from 0 {'to' if self.to_one else 'up to'} 1, one for each end"
+        last = "to" if self.to_one else "up to"
+        allowed = f"levels that rise from 0 {last} 1, one for each end"
         require(is_complete, "alpha", value=(levels, len(lower), len(upper)), allowed=allowed)
-        ends = np.array([*lower, *upper[::-1]])
+        # Cuts are nested if the lower ends rise, the upper ends fall and the last cut is not empty.
+        ends = np.array(lower + upper[::-1])
         are_nested = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
         allowed = "finite ends, lower ones rising, upper falling"
         require(are_nested, "cuts", value=ends.tolist(), allowed=allowed)
@@ -243,8 +261,11 @@ class PiecewiseLinear(_Nested):
 class Stepwise(_Nested):
     """Fuzzy number from nested cuts, each of which holds from its level up to the next one.
 
-    The arguments are as of `PiecewiseLinear`, but the levels may end below 1; `encloses` is that of
-    `FuzzyNumber`.
+    Args:
+        alpha: Levels, rising from 0 to at most 1.
+        lower: Lower ends of the cuts, not falling with α.
+        upper: Upper ends of the cuts, not rising with α.
+        encloses: Name of a set as of `FuzzyNumber.encloses`.
     """
 
     encloses: str = ""
@@ -252,12 +273,15 @@ class Stepwise(_Nested):
     @cached_property
     def cuts(self) -> Cuts:
         """The cuts, each at its level and at the last float below the next one: with jumps."""
-        ends = [*(float(np.nextafter(level, 0.0)) for level in self.alpha[1:]), 1.0]
-        cuts = []
-        for start, end, lower, upper in zip(self.alpha, ends, self.lower, self.upper, strict=True):
-            cuts += [(level, lower, upper) for level in dict.fromkeys((start, end))]
-        alpha, lowers, uppers = zip(*cuts, strict=True)
-        return Cuts(alpha, lowers, uppers)
+        starts = np.array(self.alpha)
+        ends = np.append(np.nextafter(starts[1:], 0.0), 1.0)
+        # Each cut stands twice, at the first and the last level where it holds, unless these are
+        # one, as for a cut at α = 1.
+        levels = np.stack([starts, ends], axis=1).ravel()
+        is_kept = np.append(True, np.diff(levels) != 0)
+        lower = np.repeat(self.lower, 2)[is_kept]
+        upper = np.repeat(self.upper, 2)[is_kept]
+        return Cuts(tuple(levels[is_kept].tolist()), tuple(lower.tolist()), tuple(upper.tolist()))
 
     def cut(self, alpha: float) -> Cut:
         """The cut that holds at `alpha` in [0, 1]."""
@@ -267,7 +291,8 @@ class Stepwise(_Nested):
 
 def enclosed_set(numbers: Iterable[FuzzyNumber]) -> str:
     """Return the names of the sets that the box of some numbers encloses; empty without one."""
-    return " and ".join(dict.fromkeys(filter(None, (number.encloses for number in numbers))))
+    names = [number.encloses for number in numbers if number.encloses]
+    return " and ".join(dict.fromkeys(names))
 
 
 def outer_steps(
@@ -286,7 +311,8 @@ def outer_steps(
         alpha: Levels, rising, shape (A,).
         lower: Lower ends of the cuts, shape (A,).
         upper: Upper ends of the cuts, shape (A,).
-        encloses: As of `FuzzyNumber`.
+        encloses: Name of a set as of `FuzzyNumber.encloses`.
     """
-    levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
-    return Stepwise(levels, tuple(lower), tuple(upper), encloses)
+    levels = [min(float(level), round(float(level), 12)) for level in alpha]
+    levels[0] = 0.0
+    return Stepwise(tuple(levels), tuple(lower), tuple(upper), encloses)
