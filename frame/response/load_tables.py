@@ -1,6 +1,7 @@
-"""Duhamel integral of modes over a box of eigenvalues: Taylor series in λ over windows of time.
+"""Duhamel integrals of modes for many eigenvalues near each other: Taylor series in λ.
 
-R(t; λ) = ∫ exp(λ (t − s)) a(s) ds is ρ of `duhamel`, at one node and λ a point.
+R(t; λ) = ∫₀ᵗ exp(λ (t − s)) a(s) ds is ρ of `duhamel`. Here each pair of a node t and an eigenvalue
+λ costs a few operations, whatever the length of the load a.
 """
 
 from __future__ import annotations
@@ -22,97 +23,149 @@ from alphacut.frame.response.duhamel import responses_at_nodes
 
 Complex = NDArray[np.complex128]
 REACH = 6.0
-"""Largest change of phase (rad) over the box within a window."""
-MIN_PHASE = 1.0
-"""Least radius in rad of the circle that coefficients come from; a smaller one lifts rounding."""
+"""Largest difference of phases of the eigenvalues in a window, in rad.
+
+A larger one would need longer series, whose rounding grows like exp(REACH); a smaller one would
+need more windows.
+"""
 
 
 class LoadTable:
-    """R(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds of one mode near its λ in the middle of the box.
+    """R(t_j; λ) of one mode at T time nodes t_j, for eigenvalues λ near a given one.
 
-    Time is cut into windows so short that phases change little over the box within one. The part of
-    R that arises in the window of t_j is Σ_i moment[j, i] x^i with x = (λ − middle) / scale; what
-    earlier windows leave behind goes on as exp(λ (t_j − their end)).
+    Time is divided into windows so short that phases differ little between eigenvalues within one.
+    The part of R that arises in the window of t_j is Σ_i moment[j, i] x^i with x = (λ − midpoint) /
+    scale. What the earlier windows leave behind is multiplied by exp(λ (t_j − their end)).
 
-    The load is a, and λ strays from `middle` by `spread` in 1/s at most. What the series leave out
-    of R is at most `truncation` times ∫ |a(s)| exp(Re λ (t − s)) ds.
+    Args:
+        history: The load a.
+        time: Equally spaced nodes from 0, shape (T,), in s.
+        midpoint: The eigenvalue about which the series are expanded, in 1/s.
+        deviation: Largest |λ − midpoint|, in 1/s.
+
+    Attributes:
+        truncation: Relative truncation error: the series leave out at most this number times
+            ∫ |a(s)| exp(Re λ (t − s)) ds.
 
     Raises:
-        UnprovedError: Phases change by more than `REACH` over the box within a step.
+        UnprovedError: Phases differ by more than `REACH` within a step.
     """
 
-    def __init__(self, history: History, time: Array, middle: complex, spread: float) -> None:
-        h, steps = time[1] - time[0], len(time) - 1
-        length = min(steps, int(REACH / max(spread, 1e-12) / h))
+    def __init__(self, history: History, time: Array, midpoint: complex, deviation: float) -> None:
+        h = time[1] - time[0]
+        steps = len(time) - 1
+        length = min(steps, int(REACH / max(deviation, 1e-12) / h))
         if length < 1:
-            what = f"phases change by {spread * h:.3g} rad over the box within a step of {h:.4g} s"
+            difference = deviation * h
+            what = f"phases change by {difference:.3g} rad over the box within a step of {h:.4g} s"
             raise UnprovedError(what, "take a smaller step, or narrower inputs")
-        phase = max(spread * length * h, MIN_PHASE)
-        order = ceil(2.72 * phase + 18)
-        self.middle, self.scale, self.time = middle, 1 / (length * h), time
+        # radius in x of a circle around all eigenvalues; a smaller one would amplify rounding
+        radius = max(deviation * length * h, 1.0)
+        order = ceil(2.72 * radius + 18)
+        self.midpoint = midpoint
+        self.scale = 1 / (length * h)
+        self.time = time
         self.ends = np.arange(length, steps, length)
-        # |exp(z) − its series of n terms| ≤ |z|ⁿ/n! exp(2 |z|) for z = x τ, |z| up to `phase`
-        self.truncation = 2 * exp(order * log(phase) - lgamma(order + 1) + 2 * phase)
-        # Taylor coefficients, (T, order), by Cauchy's integral over a circle of radius `phase` in x
-        rate = middle + phase * self.scale * np.exp(2j * np.pi / order * np.arange(order))
+        # |exp(z) − Σ_{k < n} z^k/k!| ≤ |z|ⁿ/n! exp(2 |z|) for z = x τ/(length h), |z| ≤ radius
+        self.truncation = 2 * exp(order * log(radius) - lgamma(order + 1) + 2 * radius)
+        # Taylor coefficients, (T, order), by Cauchy's integral over that circle (a Fourier series)
+        rate = midpoint + radius * self.scale * np.exp(2j * np.pi / order * np.arange(order))
         (values,), _ = responses_at_nodes(rate, history, time, window=length)
-        self.moment = np.fft.fft(values, axis=1) / order / phase ** np.arange(order)
+        self.moment = np.fft.fft(values, axis=1) / order / radius ** np.arange(order)
 
     def response(self, rate: Array, node: Ints) -> Array:
-        """Return R, dR/dλ and d²R/dλ² at one node per point, (3, N), for eigenvalues (N,)."""
-        table = (self.middle, self.scale, self.moment, self.ends, self.time)
+        """Return R, dR/dλ and d²R/dλ² for N eigenvalues, each at a node of its own.
+
+        Args:
+            rate: Eigenvalues, shape (N,), in 1/s.
+            node: Index of the node of each one, shape (N,). Equal eigenvalues in a row whose nodes
+                rise are the fastest.
+
+        Returns:
+            Shape (3, N).
+        """
         out: Array = np.empty((3, len(rate)), complex)
-        _responses(np.ascontiguousarray(rate), node, *table, out)
+        _responses(
+            np.ascontiguousarray(rate),
+            node,
+            self.midpoint,
+            self.scale,
+            self.moment,
+            self.ends,
+            self.time,
+            out,
+        )
         return out
 
 
 @dataclass(frozen=True, eq=False)
 class LoadTables:
-    """Tables of all modes, made when they are first read."""
+    """Tables of one load for all n modes, which are made at first use.
 
-    history: History  # a, the load
-    time: Array  # nodes, (T,), in s
-    rate: TaylorModel  # λ_k over the unit box, polynomials, (n,)
-    share: TaylorModel  # what one unit of R_k puts into the outputs, polynomials, (n, m)
+    Args:
+        history: The load a.
+        time: Time nodes, shape (T,), in s.
+        rate: Polynomials of the eigenvalues λ_k over the unit box of the inputs, shape (n,).
+        share: Polynomials of what one unit of R_k adds to the m outputs, shape (n, m).
+    """
+
+    history: History
+    time: Array
+    rate: TaylorModel
+    share: TaylorModel
 
     @cached_property
     def tables(self) -> list[LoadTable]:
-        """One of each mode."""
-        pairs = zip(self.rate.value, self.rate.deviation(), strict=True)
-        return [LoadTable(self.history, self.time, complex(x), float(y)) for x, y in pairs]
+        """A table for each mode, over all values that its eigenvalue takes in the box."""
+        tables = []
+        for midpoint, deviation in zip(self.rate.value, self.rate.deviation(), strict=True):
+            table = LoadTable(self.history, self.time, complex(midpoint), float(deviation))
+            tables.append(table)
+        return tables
 
     @property
     def truncation(self) -> Array:
-        """Bound of the series' rest, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds, (n,)."""
+        """Truncation error of R_k as a fraction of ∫ |a(s)| exp(Re λ (t − s)) ds, shape (n,)."""
         return np.array([table.truncation for table in self.tables])
 
     def at_nodes(self, rate: Array) -> Array:
-        """R at all nodes, shape (S, T, n), for eigenvalues (S, n)."""
+        """Return R at all T nodes for S sets of eigenvalues (S, n): shape (S, T, n)."""
         (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
     def response(self, rate: Array, node: Ints) -> Array:
-        """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N, n), for eigenvalues (N, n)."""
+        """Return R, dR/dλ and d²R/dλ² for N sets of eigenvalues, each at a node of its own.
+
+        Args:
+            rate: Eigenvalues, shape (N, n), in 1/s.
+            node: Index of the node of each set, shape (N,).
+
+        Returns:
+            Shape (3, N, n).
+        """
         pairs = zip(self.tables, rate.T, strict=True)
         return np.stack([table.response(x, node) for table, x in pairs], -1)
 
 
 class Direct(LoadTables):
-    """What a load adds to outputs at once: share · a(t), as if R of the first mode were a(t)."""
+    """The direct feedthrough of a load to outputs, share · a(t), in the form of modal tables.
+
+    R of the first mode is a(t), and R of all others is zero.
+    """
 
     @property
     def truncation(self) -> Array:
-        """Zero, shape (n,)."""
+        """Zero, shape (n,): nothing is truncated."""
         return np.zeros(self.rate.shape)
 
     def at_nodes(self, rate: Array) -> Array:
-        """A at all nodes, shape (S, T, n)."""
+        """Return these R at all T nodes for S sets of eigenvalues: shape (S, T, n)."""
         R: Array = np.zeros((len(rate), len(self.time), rate.shape[1]))
         R[:, :, 0] = self.history.values(self.time)
         return R
 
     def response(self, rate: Array, node: Ints) -> Array:
-        """A and its derivatives by λ, which are zero, shape (3, N, n)."""
+        """Return these R at given nodes and their derivatives by λ, zeros: shape (3, N, n)."""
         R: Array = np.zeros((3, *rate.shape), complex)
         R[0, :, 0] = self.history.values(self.time[node])
         return R
@@ -129,19 +182,42 @@ def _responses(
     time: Array,
     out: Complex,
 ) -> None:
-    """Write R, dR/dλ and d²R/dλ² at N points, a λ and a node each, to `out` (3, N)."""
-    # `ends` are the last nodes of all windows but the last. R at the end of earlier windows is
-    # carried from window to window, and from a point to the next one of the same λ at a later node.
-    R, slope, curve, start, window = 0j, 0j, 0j, 0, 0
+    """Write R, dR/dλ and d²R/dλ² of N points, an eigenvalue and a node each.
+
+    R at the end of earlier windows is carried from window to window, and from a point to the next
+    one if that has the same λ and a node that is not earlier.
+
+    Args:
+        rate: Eigenvalues, shape (N,).
+        node: Nodes, shape (N,).
+        middle: As `LoadTable.midpoint`.
+        scale: As in `LoadTable`, as are the next three.
+        moment: Taylor coefficients, shape (T, order).
+        ends: Last nodes of all windows but the last one.
+        time: Time nodes, shape (T,).
+        out: Receives the results, shape (3, N).
+    """
+    R = 0j
+    slope = 0j
+    curve = 0j
+    start = 0
+    window = 0
     for p in range(len(rate)):
         if p == 0 or rate[p] != rate[p - 1] or node[p] < node[p - 1]:
-            R, slope, curve, start, window = 0j, 0j, 0j, 0, 0
+            R = 0j
+            slope = 0j
+            curve = 0j
+            start = 0
+            window = 0
         x = (rate[p] - middle) / scale
         while True:
             is_last = window == len(ends) or ends[window] >= node[p]
             end = node[p] if is_last else ends[window]
             tau = time[end] - time[start]
-            f, g, h = 0j, 0j, 0j  # Horner's scheme, twice differentiated
+            # Horner's scheme for the value f, the derivative g and half the second one h
+            f = 0j
+            g = 0j
+            h = 0j
             for i in range(moment.shape[1] - 1, -1, -1):
                 h = h * x + g
                 g = g * x + f
@@ -151,6 +227,12 @@ def _responses(
             g = g / scale + propagator * (slope + tau * R)
             h = 2 * h / scale**2 + propagator * (curve + 2 * tau * slope + tau * tau * R)
             if is_last:
-                out[0, p], out[1, p], out[2, p] = f, g, h
+                out[0, p] = f
+                out[1, p] = g
+                out[2, p] = h
                 break
-            R, slope, curve, start, window = f, g, h, end, window + 1
+            R = f
+            slope = g
+            curve = h
+            start = end
+            window = window + 1
