@@ -248,8 +248,10 @@ def _decide_limit(
         record: Record under which the peak is attained; empty if there is none.
         input_units: SI units of the inputs.
     """
-    alpha, largest_allowed = peak.alpha, limit.outwards
-    max_peak, min_peak = peak.max_peak_bounds, peak.min_peak_bounds
+    alpha = peak.alpha
+    largest_allowed = limit.outwards
+    max_peak = peak.max_peak_bounds
+    min_peak = peak.min_peak_bounds
 
     # A response of a cut exceeds the limit if the largest peak does.
     is_exceeded = max_peak.lower > largest_allowed

@@ -200,7 +200,8 @@ class CriticalMeasures:
     @property
     def lognormal_median(self) -> Ends:
         """Bounds of the median of the lognormal fit, exp of the mean logarithm, (levels,) each."""
-        low, high = np.log(self.low), np.log(self.high)
+        low = np.log(self.low)
+        high = np.log(self.high)
         return Ends(np.exp(low.mean(axis=1)), np.exp(high.mean(axis=1)))
 
     @property
@@ -212,7 +213,8 @@ class CriticalMeasures:
         """
         n_records = self.low.shape[1]
         require(n_records > 1, "records", value=n_records, allowed="two records or more")
-        low, high = np.log(self.low), np.log(self.high)
+        low = np.log(self.low)
+        high = np.log(self.high)
         # Let x be the logarithms, z the midpoints of their intervals and r the radii. The standard
         # deviation is the norm of x minus its mean over √(n - 1). Subtracting the mean is a
         # projection, which lengthens no vector, so that the standard deviations of x and z differ
@@ -239,7 +241,8 @@ def counts_between(records: Sequence[TriedMeasures], measure: Array) -> Ends:
         Both numbers, shape (levels, measures) each.
     """
     shape = (records[0].exceeded.shape[1], len(measure))
-    count_all, count_some = np.zeros(shape), np.zeros(shape)
+    count_all = np.zeros(shape)
+    count_some = np.zeros(shape)
     for record in records:
         by_some, by_all = record.exceeded
         after = np.searchsorted(record.measure, measure)
@@ -289,7 +292,8 @@ class LimitFragility(LimitResult):
         """
         from scipy.special import ndtr
 
-        low, high = self.critical.low[level], self.critical.high[level]
+        low = self.critical.low[level]
+        high = self.critical.high[level]
         curves = []
         for end in [low] if np.array_equal(low, high) else [low, high]:
             logarithms = np.log(end)
@@ -352,7 +356,8 @@ class Fragility(Answer):
 
     def _crossings_text(self, part: LimitFragility) -> str:
         """Return the ranges over the records of first crossing and last non-exceedance as text."""
-        first, last = part.critical.low_reached[0], part.critical.high_reached[0]
+        first = part.critical.low_reached[0]
+        last = part.critical.high_reached[0]
         return (
             f"first crossing {_range_text(first.min(), first.max(), self.unit)},"
             f" last non-exceedance {_range_text(last.min(), last.max(), self.unit)}"
@@ -477,7 +482,8 @@ class Fragility(Answer):
 
 def _level_text(ends: Ends, level: int, unit: str, *, unit_size: float = 1.0) -> str:
     """Return the range of a quantity on a level as text, in a unit of a size in SI units."""
-    low, high = float(ends.lower[level]), float(ends.upper[level])
+    low = float(ends.lower[level])
+    high = float(ends.upper[level])
     return _range_text(low / unit_size, high / unit_size, unit)
 
 
@@ -585,7 +591,8 @@ def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
     require(is_moved_by_record, "fragility", value="of another motion", allowed=allowed)
     for limit in limits:
         if yields(model):
-            fits, allowed = limit.side == "", "limits of magnitudes, of columns that yield"
+            fits = limit.side == ""
+            allowed = "limits of magnitudes, of columns that yield"
         else:
             fits = limit.outwards > 0 and not limit.mean
             allowed = "limits of each record that the structure at rest keeps"

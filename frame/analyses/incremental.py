@@ -37,7 +37,8 @@ GRID_RATIO = 1.1
 neighbours may be missed; a larger ratio saves time in proportion to its logarithm)."""
 RESOLUTION = 0.01
 """Relative width to which changes are bisected (tuned: it is the error of critical measures)."""
-SOME, ALL = 0, 1
+SOME = 0
+ALL = 1
 """Indices of the largest demand of a cut, which tells whether some structure exceeds the limit, and
 of the smallest demand, which tells whether all structures do."""
 
@@ -221,7 +222,8 @@ class IncrementalAnalysis:
 
         The shape is (structures, inputs).
         """
-        cuts, structures = self.cuts, [self.cuts.nominal[np.newaxis]]
+        cuts = self.cuts
+        structures = [self.cuts.nominal[np.newaxis]]
         for level, (low, high) in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
             # 16 points inside the cut, on its faces, and of its corners (tuned: more are slower and
             # leave less to the searches).
@@ -254,7 +256,8 @@ class IncrementalAnalysis:
         The shapes are (2, levels, limits and events), and the same with a last axis of inputs.
         """
         points, demands = self.moved[scale]
-        lower, upper = self.cuts.lower[:, np.newaxis], self.cuts.upper[:, np.newaxis]
+        lower = self.cuts.lower[:, np.newaxis]
+        upper = self.cuts.upper[:, np.newaxis]
         is_inside = (points >= lower) & (points <= upper)
         inside = np.all(is_inside, axis=-1, keepdims=True)  # (levels, structures, 1)
         largest = np.where(inside, demands, -1.0).argmax(axis=1)
@@ -273,13 +276,15 @@ class IncrementalAnalysis:
             level: Index of the cut.
             event: Index of the limit or event.
         """
-        low, high = self.cuts.lower[level], self.cuts.upper[level]
+        low = self.cuts.lower[level]
+        high = self.cuts.upper[level]
         directions = np.concatenate([np.diag(high - low), np.diag(low - high)])
         demands, points = self._extremes(scale)
         # Steps from 1/4 to 1/32 of the width of the cut (tuned: smaller ones gain little).
         size = 1 / 4
         while size >= 1 / 32:
-            before, point = demands[side, level, event], points[side, level, event]
+            before = demands[side, level, event]
+            point = points[side, level, event]
             self._move(scale, np.clip(point + size * directions, low, high))
             demands, points = self._extremes(scale)
             if np.isclose(demands[side, level, event], before, rtol=RESOLUTION / 10):
@@ -326,7 +331,8 @@ class ScaledPeaks(Answer):
         for record, by_output in self.peaks.items():
             texts = []
             for output, (largest, smallest) in by_output.items():
-                low, high = float(smallest[0, -1]), float(largest[0, -1])
+                low = float(smallest[0, -1])
+                high = float(largest[0, -1])
                 ends = range_text(low, high, Nature.ATTAINED)
                 texts.append(f"{output} {ends} {self.units[output]}".strip())
             title = f"peaks at scale {self.scales[-1]:g}"
@@ -395,7 +401,8 @@ def incremental(
     Raises:
         RefusedError: The columns do not yield, or a scale is not positive.
     """
-    value, allowed = "of another structure", "columns that yield"
+    value = "of another structure"
+    allowed = "columns that yield"
     require(yields(model), "incremental", value=value, allowed=allowed)
     tried = np.unique([checked_number("scale", scale, positive=True) for scale in scales])
     outputs = [*map(str, model.outputs)]

@@ -148,7 +148,8 @@ class Peak:
         This is so if more than half of the gap or error, and more than `WIDENING` of the peak, is
         what responses may add between the time nodes.
         """
-        bound, attained = float(self.far_end[0]), float(self.reached[0])
+        bound = float(self.far_end[0])
+        attained = float(self.reached[0])
         has_gap = self.nature is Nature.GUARANTEED and np.isfinite(attained)
         width = abs(bound - attained) if has_gap else float(self.error[0])
         return self.between_nodes > max(width / 2, WIDENING * abs(bound))
@@ -160,7 +161,8 @@ class Peak:
         The shape is (levels,). It is NaN where no attained value is known, and 0 for a bound of 0.
         """
         attained = np.where(np.isfinite(self.reached), self.reached, np.nan)
-        difference, size = np.abs(self.far_end - attained), np.abs(self.far_end)
+        difference = np.abs(self.far_end - attained)
+        size = np.abs(self.far_end)
         ratio = np.divide(difference, size, out=np.zeros_like(size), where=size > 0)
         return np.asarray(ratio)
 
@@ -215,7 +217,8 @@ def _peak_of(band: Envelope, name: str) -> Peak:
     between = None if band.between is None else band.between[:, column]
 
     # The largest peak of each cut, and bounds of it at the nodes and within the steps.
-    upper, lower = ends.upper.max(axis=1), ends.lower.max(axis=1)
+    upper = ends.upper.max(axis=1)
+    lower = ends.lower.max(axis=1)
     bound_at_nodes = ends.upper + error
     bound = within_steps(bound_at_nodes, between).max(axis=1)
     if band.searched_peaks is not None and is_magnitude:
@@ -234,7 +237,8 @@ def _peak_of(band: Envelope, name: str) -> Peak:
     above = bound - upper
     peak_error = np.maximum(above, below)
     if is_guaranteed:
-        lower, upper = np.maximum(lower, least_lower), upper + above
+        lower = np.maximum(lower, least_lower)
+        upper = upper + above
         peak_error = np.zeros_like(upper)
     elif nature is Nature.ESTIMATED:
         # The error within the steps raises the peaks only, so that it does not lower this bound.
@@ -266,11 +270,14 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
         column: Index of the output.
         between: What responses may add within the time steps, shape (levels,).
     """
-    lower, upper = found.lower[:, column], found.upper[:, column]
-    attained, least_upper = upper, lower + between
+    lower = found.lower[:, column]
+    upper = found.upper[:, column]
+    attained = upper
+    least_upper = lower + between
     attained_at = dict(zip(found.inputs, found.upper_at[0, column].tolist(), strict=True))
     if found.encloses:
-        attained, least_upper = np.full_like(upper, -np.inf), np.full_like(lower, np.inf)
+        attained = np.full_like(upper, -np.inf)
+        least_upper = np.full_like(lower, np.inf)
         attained_at = {}
     return Peak(
         alpha=found.alpha,

@@ -108,7 +108,8 @@ class Probability(Answer):
         """Return a row for each limit, with bounds on the lowest and on the highest level."""
         rows = []
         for part in self.events.values():
-            low, high = float(part.interval.lower[0]), float(part.interval.upper[0])
+            low = float(part.interval.lower[0])
+            high = float(part.interval.upper[0])
             # The interval is rounded outwards.
             interval = range_text(low, high, Nature.GUARANTEED, 3)
             row = {
@@ -364,11 +365,13 @@ def _limit_probability(
         is_random: Whether there are random inputs.
     """
     # The bounds are computed for 201 further limits, and for the limit itself, a ratio of 1.
-    smallest, largest = ratios.lower.min(), ratios.upper.max()
+    smallest = ratios.lower.min()
+    largest = ratios.upper.max()
     limits = np.append(np.linspace(0.95 * smallest, 1.05 * largest, 201), 1.0)
     low = _bounds_over_points(_fractions_above(ratios.lower, limits), level).lower
     at_nodes = _bounds_over_points(_fractions_above(ratios.upper, limits), level)
-    lower_at_nodes, high = at_nodes.lower[:, -1], at_nodes.upper
+    lower_at_nodes = at_nodes.lower[:, -1]
+    high = at_nodes.upper
     fractions = _fractions_above(ratios.within_steps, np.ones(1))
     within_steps = _bounds_over_points(fractions, level)
     added = (

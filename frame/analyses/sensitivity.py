@@ -163,4 +163,5 @@ def _steepest_ascent(
         peaks = sign * np.abs(flow.values(tried)[..., output]).max(axis=1)
         if peaks.max() <= best:
             return AttainedPeak(sign * best, point)
-        best, point = float(peaks.max()), tried[peaks.argmax()]
+        best = float(peaks.max())
+        point = tried[peaks.argmax()]

@@ -133,7 +133,8 @@ def scaled_records(
         name = record.name or f"record {number}"
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
         measures = {"PGA": record.extremes[0], "Sa(T1)": response}
-        is_moving, allowed = min(measures.values()) > 0, "a record that moves something"
+        is_moving = min(measures.values()) > 0
+        allowed = "a record that moves something"
         require(is_moving, f"record {name}", value="zero throughout", allowed=allowed)
 
         # The free vibration after the record is included for five natural periods, in which a
@@ -449,7 +450,8 @@ def mean_peaks(
         reached_at = dict(zip(cuts.names, farthest, strict=True))
         if of_records[0].encloses:
             # No structure of the box is known to belong to the enclosed set.
-            reached, reached_at = np.full_like(lower, -np.inf), {}
+            reached = np.full_like(lower, -np.inf)
+            reached_at = {}
         found[f"mean {name}"] = replace(
             of_records[0],
             nature=Nature.weakest(peak.nature for peak in of_records),

@@ -84,7 +84,8 @@ class Tolerances(Answer):
             scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
         rows = [self._row("scale of all ranges", kept=scale, beside=self._exceeded_text())]
         for name, support in self.supports.items():
-            text, relative = "–", ""
+            text = "–"
+            relative = ""
             if self.kept is not None:
                 ends = rounded_ends(*support.kept, Nature.ATTAINED)
                 text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in ends))
@@ -158,7 +159,8 @@ def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str,
         nominal, (low, high) = number.nominal, number.support
         scaled[name] = Crisp(nominal)
         if scale > 0 and high > low:
-            lower, upper = nominal - scale * (nominal - low), nominal + scale * (high - nominal)
+            lower = nominal - scale * (nominal - low)
+            upper = nominal + scale * (high - nominal)
             scaled[name] = Interval(lower, upper)
     return scaled
 
@@ -253,7 +255,8 @@ def tolerances(
 
     # The largest scale at which no known response exceeds a limit, and the next one that was tried.
     encloses = enclosed_set(inputs.values())
-    clear, passed = None, np.inf
+    clear = None
+    passed = np.inf
     if not encloses:
         passed = min(filter(is_exceeded, tried), default=np.inf)
         clear = max((scale for scale in tried if scale < passed), default=None)

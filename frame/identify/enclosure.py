@@ -43,7 +43,8 @@ def enclosure(
     Returns:
         Lower and upper ends of the box, or None if no parameters agree with the modes.
     """
-    lower, upper = lower.copy(), upper.copy()
+    lower = lower.copy()
+    upper = upper.copy()
     # Ranges of amplitudes that were not measured, by mode and floor.
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
     for _ in range(6):  # passes (tuned: later ones hardly narrow a box)
@@ -61,7 +62,8 @@ def enclosure(
         has_width = width > 0
         for k in np.flatnonzero(has_width):
             low, high = relaxation.bounds(relaxation.logs[k])
-            lower[k], upper[k] = max(low, lower[k]), min(high, upper[k])
+            lower[k] = max(low, lower[k])
+            upper[k] = min(high, upper[k])
         if (lower > upper).any():
             return None
         narrowed_by = 1 - (upper - lower)[has_width] / width[has_width]
@@ -100,7 +102,8 @@ class LinearRelaxation:
         if low == high:
             return low * self.one
         k = self.count
-        self.lower[k], self.upper[k] = low, high
+        self.lower[k] = low
+        self.upper[k] = high
         self.count += 1
         return np.asarray(np.eye(1, len(self.one), k)[0])
 
@@ -240,7 +243,8 @@ class ChainRelaxation(LinearRelaxation):
         if self.is_empty:
             return
         low_logs, high_logs = chain.ranges(lower, upper)
-        smallest_factors, largest_factors = np.exp(low_logs), np.exp(high_logs)
+        smallest_factors = np.exp(low_logs)
+        largest_factors = np.exp(high_logs)
         for cut, (low, high) in zip(modes, ranges, strict=True):
             self._add_frequency(cut, smallest_factors, largest_factors)
             if cut.shape:
@@ -284,7 +288,8 @@ class ChainRelaxation(LinearRelaxation):
             relative_eigenvalue: λ over its largest value, as an expression.
             eigenvalue: Largest value of λ, in 1/s².
         """
-        chain, n = self.chain, len(self.mass)
+        chain = self.chain
+        n = len(self.mass)
         unit = float(chain.stiffness.mean())  # scale of the forces
         nothing = 0.0 * self.one
         shears = []
@@ -364,15 +369,19 @@ class ChainRelaxation(LinearRelaxation):
             low: Smallest factors of stiffnesses and masses, shape (2, floors).
             high: Largest factors.
         """
-        chain, k = self.chain, cut.mode - 1
+        chain = self.chain
+        k = cut.mode - 1
         below = self.eigenvalue_upper[k - 1] if k else -np.inf
         above = self.eigenvalue_lower[k + 1] if k + 1 < len(self.eigenvalue_lower) else np.inf
-        midpoint, radius = (low + high) / 2, (high - low) / 2
+        midpoint = (low + high) / 2
+        radius = (high - low) / 2
         values, vectors = chain_modes(chain.stiffness * midpoint[0], chain.mass * midpoint[1])
-        shape, value = vectors[:, k], values[k]
+        shape = vectors[:, k]
+        value = values[k]
         drift = np.diff(shape, prepend=0.0)
         # xᵀK x and xᵀM x are linear functions of the factors with these coefficients.
-        strain, inertia = chain.stiffness * drift**2, chain.mass * shape**2
+        strain = chain.stiffness * drift**2
+        inertia = chain.mass * shape**2
         smallest_quotient = float(strain @ low[0] / (inertia @ high[1]))
         largest_quotient = float(strain @ high[0] / (inertia @ low[1]))
         is_above_last = below < min(self.eigenvalue_lower[k], smallest_quotient)
@@ -391,7 +400,8 @@ class ChainRelaxation(LinearRelaxation):
         error_above = squared_residual / (above - largest_quotient)
 
         unit = float(inertia.sum() * value)
-        strains, inertias = strain @ np.array(self.stiffness), inertia @ np.array(self.mass)
+        strains = strain @ np.array(self.stiffness)
+        inertias = inertia @ np.array(self.mass)
         for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):
             row = sign * (strains - end * inertias) / unit
             self.rows.append(row - 1e-12 * self.one)

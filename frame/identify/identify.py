@@ -70,7 +70,8 @@ def identify(
         (False, True)
     """
     evidence = Evidence.of(frame, inputs, modes, held_out=held_out, alpha=alpha)
-    priors, nominal = evidence.prior.values(), evidence.chain.nominal
+    priors = evidence.prior.values()
+    nominal = evidence.chain.nominal
     levels = np.asarray(alpha, float)
     lower = np.full((len(levels), len(priors)), np.inf)
     upper = -lower
@@ -81,7 +82,8 @@ def identify(
         # The sets are nested, so that the box of each level lies inside that of the last one.
         prior_cuts = np.array([evidence.cut(number, level) for number in priors])
         prior_low, prior_high = np.log(prior_cuts.T / nominal)
-        low, high = np.maximum(prior_low, low), np.minimum(prior_high, high)
+        low = np.maximum(prior_low, low)
+        high = np.minimum(prior_high, high)
         box = None
         if (low <= high).all():
             box = enclosure(evidence.chain, low, high, evidence.modes(level))
@@ -90,7 +92,8 @@ def identify(
             break
         low, high = box
         # This level, and all higher ones unless they are computed.
-        lower[k:], upper[k:] = nominal * np.exp(low), nominal * np.exp(high)
+        lower[k:] = nominal * np.exp(low)
+        upper[k:] = nominal * np.exp(high)
 
     # Rounding of the exponential function, outwards and within the priors.
     if np.isfinite(lower).all():
@@ -145,7 +148,8 @@ class Evidence:
         are_rising = bool(modes) and sorted(set(numbers)) == numbers
         require(are_rising, "identify.modes", value=numbers, allowed="one or more, rising")
         is_part = set(held_out) < set(numbers)
-        shown, allowed = ", ".join(map(str, held_out)), f"some of modes {numbers}, not all"
+        shown = ", ".join(map(str, held_out))
+        allowed = f"some of modes {numbers}, not all"
         require(is_part, "identify.held_out", value=shown, allowed=allowed)
 
         measured = tuple(mode for mode in modes if mode.mode not in held_out)
@@ -258,10 +262,13 @@ class Identified:
         numbers: dict[str, FuzzyNumber] = {}
         for column, name in enumerate(self.names):
             prior = self.evidence.prior[name]
-            alpha, decided = self.alpha, float(self.alpha[0])
-            lower, upper = self.lower[:, column], self.upper[:, column]
+            alpha = self.alpha
+            decided = float(self.alpha[0])
+            lower = self.lower[:, column]
+            upper = self.upper[:, column]
             if not isinstance(prior, ClaimedNumber):
-                alpha, decided = np.append(0.0, alpha), 0.0
+                alpha = np.append(0.0, alpha)
+                decided = 0.0
                 lower = np.append(prior.support.lower, lower)
                 upper = np.append(prior.support.upper, upper)
             steps = outer_steps(
@@ -292,10 +299,8 @@ class Identified:
         upper = -lower
         if not self.is_refuted:
             for k in range(len(self.alpha)):
-                low, high = (
-                    np.log(self.lower[k] / chain.nominal),
-                    np.log(self.upper[k] / chain.nominal),
-                )
+                low = np.log(self.lower[k] / chain.nominal)
+                high = np.log(self.upper[k] / chain.nominal)
                 eigenvalues = np.maximum(eigenvalue_ranges(chain, low, high), 0.0)
                 lower[k], upper[k] = np.sqrt(eigenvalues) / (2 * np.pi)
         modes = (*self.evidence.measured, *self.evidence.held_out)
@@ -312,7 +317,8 @@ class Identified:
         """What was learned, as data for tables and files."""
         if self.is_refuted:
             return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
-        inputs, prior = {}, {}
+        inputs = {}
+        prior = {}
         for column, name in enumerate(self.names):
             inputs[name] = Ends(self.lower[:, column], self.upper[:, column])
             before = widest_cut(self.evidence.prior[name])

@@ -60,7 +60,8 @@ class Predictions:
         predictions = []
         for mode in sorted(self.measured.keys() - set(self.learned_from)):
             if mode <= self.lower.shape[1]:
-                low, high = float(self.lower[0, mode - 1]), float(self.upper[0, mode - 1])
+                low = float(self.lower[0, mode - 1])
+                high = float(self.upper[0, mode - 1])
                 measured = self.measured[mode]
                 is_inside = low <= measured <= high
                 predictions.append(Prediction(mode, measured, (low, high), is_inside))

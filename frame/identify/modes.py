@@ -46,7 +46,8 @@ class Chain:
     """
 
     def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
-        n, values = frame.floors, frame.parameters
+        n = frame.floors
+        values = frame.parameters
         allowed = "none: a storey softened by weight has no stiffness of such a product"
         require(not frame.gravity, "frame.gravity", value=frame.gravity, allowed=allowed)
         self.names = tuple(names)
@@ -134,7 +135,9 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        key, hertz, numbers = f"mode {self.mode}", self.frequency.nominal, [self.mode, *self.shape]
+        key = f"mode {self.mode}"
+        hertz = self.frequency.nominal
+        numbers = [self.mode, *self.shape]
         allowed = "numbers from 1 on"
         require(min(numbers) >= 1, f"{key}: mode and floors", value=numbers, allowed=allowed)
         require(hertz > 0, f"{key}: frequency", value=hertz, allowed="positive values in Hz")
@@ -266,7 +269,8 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     variance = (deviation or 0.0) ** 2
     if deviation is None and len(ratios) > 1:
         variance = float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2))
-    value, cure = f"{np.sqrt(variance):.2g} of its amplitude", "take means of several rows"
+    value = f"{np.sqrt(variance):.2g} of its amplitude"
+    cure = "take means of several rows"
     key = f"{what}: scatter of floor {reference}"
     max_scatter = 0.2  # beyond it the expansions to second order are too inaccurate
     is_small = bool(np.isfinite(ratios).all()) and variance <= max_scatter**2

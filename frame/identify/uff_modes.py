@@ -37,7 +37,8 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     for found in sets:
         if found is None:
             continue
-        mode, hertz = found.mode, found.hertz
+        mode = found.mode
+        hertz = found.hertz
         key = f"{path.name}, data set 55"
         require(mode not in modes, key, f"mode {mode} again", "each mode once")
         key = f"{path.name}, mode {mode}"
@@ -75,7 +76,8 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
         IndexError: The data set is damaged.
     """
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
-    is_normal, is_complex = analysis == 2, analysis in (3, 7)
+    is_normal = analysis == 2
+    is_complex = analysis in (3, 7)
     if not (is_normal or is_complex):
         return None
     numbers_of_head = floats(head[7])
@@ -116,7 +118,8 @@ def _real_amplitudes(
         RefusedError: An unknown is missing or not finite, or the phases differ too much.
     """
     missing = [name for name in floors if name.lower() not in amplitudes]
-    value, allowed = f"without {', '.join(missing)}", f"unknowns of {[*amplitudes][:8]} …"
+    value = f"without {', '.join(missing)}"
+    allowed = f"unknowns of {[*amplitudes][:8]} …"
     require(not missing, key, value, allowed)
     values = np.array([amplitudes[name.lower()] for name in floors])
     require(np.isfinite(values).all(), key, "not finite", "finite amplitudes")

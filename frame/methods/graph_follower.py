@@ -91,7 +91,8 @@ class Storage:
         Returns:
             The places where one of these graphs is now the best.
         """
-        jet, top = self.flow.taylor(points), self.top.reshape(-1)
+        jet = self.flow.taylor(points)
+        top = self.top.reshape(-1)
         slopes = np.abs(np.moveaxis(jet.first, -1, 0)).reshape(len(self.steepest), -1)
         self.steepest = np.maximum(self.steepest, slopes.max(axis=1))
         best_new = np.full(top.shape, -1)  # index among the new graphs; -1 for none
@@ -176,7 +177,8 @@ class GraphFollower:
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis])
         shape = (n_levels, *storage.top.shape)
-        bounds, predicted_gain = np.zeros(shape), np.zeros(shape)
+        bounds = np.zeros(shape)
+        predicted_gain = np.zeros(shape)
         best = np.full(shape, -1)
         limit = self.tolerance * flow.scale[:, np.newaxis]  # gain worth a graph, (outputs, 1)
         bend = float(self.order > 1)
@@ -201,9 +203,11 @@ class GraphFollower:
                     is_later = improved[0] > node
                     later = tuple(indices[is_later] for indices in improved)
                     maxima = storage.predicted(later, box, local_maximum, bend=bend)
-                    predicted[later], target[later] = maxima.value, maxima.point
+                    predicted[later] = maxima.value
+                    target[later] = maxima.point
             # Post-processing (Fig. 24): at every node the best of all graphs counts.
-            bounds[level], best[level] = storage.top, storage.best
+            bounds[level] = storage.top
+            best[level] = storage.best
             predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
 
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))

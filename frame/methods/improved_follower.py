@@ -118,7 +118,8 @@ class ImprovedFollower:
             asked: Bounds of (-output, output) whose gain counts, shape (levels, times, outputs, 2);
                 all by default.
         """
-        n_levels, d = len(flow.boxes.alpha), len(flow.boxes.names)
+        n_levels = len(flow.boxes.alpha)
+        d = len(flow.boxes.names)
         storage = Storage(flow)
         shape = (n_levels, *storage.top.shape)
         out = PassBounds(np.zeros(shape), np.zeros((*shape, d)), np.zeros(shape), storage)
@@ -127,9 +128,11 @@ class ImprovedFollower:
         has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
         for done, level in enumerate(reversed(range(n_levels))):
             # Points of the quasi-random sequence that no other level and no other seed uses.
-            box, skip = flow.boxes.unit_ends(level), 100_003 * (n_levels * self.seed + level + 1)
+            box = flow.boxes.unit_ends(level)
+            skip = 100_003 * (n_levels * self.seed + level + 1)
             tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
-            max_graphs, first = self.budget * (done + 1) // n_levels, len(storage)
+            max_graphs = self.budget * (done + 1) // n_levels
+            first = len(storage)
             has_width = bool((box[1] > box[0]).any())
             if has_width:
                 # The values alone of 256 trajectories of each kind are looked at, and 64 graphs are
@@ -156,7 +159,8 @@ class ImprovedFollower:
                     points = points[: max(1, max_graphs - len(storage))]
                     for chunk in np.array_split(points, -(-len(points) // chunk_size)):
                         models.predict(storage.add(chunk))
-                        computed, allowed = len(storage) - first, max(1, max_graphs - first)
+                        computed = len(storage) - first
+                        allowed = max(1, max_graphs - first)
                         tick(min(1.0, computed / allowed))
                     points = models.proposals(max_graphs - len(storage))
             # Optima of the models that are not worth a graph are worth their values.
@@ -187,7 +191,8 @@ def _chunk_size(flow: UnitFlow) -> int:
     Their arrays have at most 64 million numbers (512 MB): for each graph the outputs at all nodes,
     or the powers of the step map within a block of nodes, each with its derivatives.
     """
-    d, n_times = len(flow.boxes.names), flow.time.size
+    d = len(flow.boxes.names)
+    n_times = flow.time.size
     states = 2 * len(frequencies(flow.flow.system)) if isinstance(flow.flow, LinearFlow) else 0
     count = max(n_times * len(flow.outputs), (isqrt(n_times) + 1) * states**2)
     return int(np.clip(64e6 / (count * (1 + d + d * d)), 1, BATCH))
@@ -232,8 +237,10 @@ class _LevelModels:
     def __init__(
         self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask | None
     ) -> None:
-        self.storage, self.box = storage, box
-        self.limit, self.asked = limit, asked
+        self.storage = storage
+        self.box = box
+        self.limit = limit
+        self.asked = asked
         self.sampled: Array = np.full(storage.top.shape, -np.inf)
         self.sampled_at = np.zeros((*storage.top.shape, len(box[0])))
         self.predicted = storage.top.copy()
@@ -268,7 +275,8 @@ class _LevelModels:
         Returns:
             Unit coordinates, shape (points, inputs).
         """
-        storage, d = self.storage, len(self.radius)
+        storage = self.storage
+        d = len(self.radius)
         count = 8 * len(storage)
         optima, partners = storage.points[rng.choice(storage.best.ravel(), (2, count))]
         # A third of the random numbers lies at the ends of the range.
@@ -285,12 +293,14 @@ class _LevelModels:
             # region more proposals are wrong, with a smaller one more are needed).
             reach = 0.6 * np.maximum(self.radius, 1e-300)
             maxima = self.storage.predicted(places, self.box, maximise, reach=reach)
-            self.predicted[places], self.target[places] = maxima.value, maxima.point
+            self.predicted[places] = maxima.value
+            self.target[places] = maxima.point
 
     @property
     def least_gains(self) -> Array:
         """Gain of each bound that is worth a graph, shape (times, outputs, 2)."""
-        top, peak = self.storage.top, self.storage.flow.peak[:, np.newaxis]
+        top = self.storage.top
+        peak = self.storage.flow.peak[:, np.newaxis]
         # Within 2 % of a peak, 2 % of the tolerance is worth a graph (tuned: this costs a Newton
         # step or two for each peak).
         near_peak = top >= (1 - 0.02) * np.maximum(top.max(axis=0), 0.0)

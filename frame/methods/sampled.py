@@ -64,7 +64,8 @@ class Sampled:
         at = np.zeros((*shape, len(flow.boxes.names)))
         for done, level in enumerate(reversed(range(n_levels))):
             if done:  # a wider box contains the trajectories of the narrower one
-                bounds[level], at[level] = bounds[level + 1], at[level + 1]
+                bounds[level] = bounds[level + 1]
+                at[level] = at[level + 1]
             points = self.points(*flow.boxes.unit_ends(level))
             tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
             values, index = largest_values(flow, points, tick)
@@ -101,7 +102,9 @@ class PeakSearch:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the attained envelope of all outputs on all levels, with searched peaks."""
-        cuts, outputs, yielding_flow = flow.boxes, tuple(map(str, flow.outputs)), flow.flow
+        cuts = flow.boxes
+        outputs = tuple(map(str, flow.outputs))
+        yielding_flow = flow.flow
         assert isinstance(yielding_flow, YieldingFlow)
         domain = Domain(cuts.inputs, tuple(cuts.alpha))
         band = _Band(flow, domain, yielding_flow)
@@ -161,8 +164,10 @@ class _Band:
 
     def __init__(self, flow: UnitFlow, domain: Domain, yielding_flow: YieldingFlow) -> None:
         cuts = flow.boxes
-        self.names, self.outputs = cuts.names, tuple(map(str, flow.outputs))
-        self.domain, self.yielding_flow = domain, yielding_flow
+        self.names = cuts.names
+        self.outputs = tuple(map(str, flow.outputs))
+        self.domain = domain
+        self.yielding_flow = yielding_flow
         shape = (len(cuts.alpha), len(flow.time), len(flow.outputs), 2)
         self.bounds = np.full(shape, -np.inf)
         self.at = np.zeros((*shape, len(cuts.names)))
@@ -201,7 +206,8 @@ def independent_excess(
         The largest excess over time and over both sides, 0 or more, shape (levels, outputs), and
         the number.
     """
-    excess, count = np.zeros((len(bounds), len(flow.outputs))), 0
+    excess = np.zeros((len(bounds), len(flow.outputs)))
+    count = 0
     for level in range(len(bounds)):
         points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
         values, _ = largest_values(flow, points)
