@@ -1,18 +1,20 @@
-"""Auto: what is best known of an envelope, by the proof that is forecast to be the cheaper one.
+"""Auto: the best known method for an envelope, chosen by the forecast work of the proofs.
 
-1. Up to six fuzzy inputs the branch and bound is a proof, for any number the dual bound is. The one
-   with less forecast work comes first, the other where it refuses or leaves a wide gap. The branch
-   and bound is first tried on the box as it is, and on parts of it where nothing else remains.
-2. A guarantee with a gap of more than a tenth of a peak is not the only answer: the improved
-   follower looks for motions that reach more. Where a named tolerance is not proved, it estimates
-   the envelope, and proved bounds stand outside it.
-3. Without a proof the follower remains, and without derivatives, where columns yield, a search of
-   peaks.
+1. Up to six fuzzy inputs, branch and bound is a proof; for any number of inputs, the dual bound is.
+   The one with less forecast work is tried first, and the other one if the first fails or leaves a
+   wide gap. Branch and bound is tried on the whole box first, and on sub-boxes if nothing else
+   remains.
+2. If the gap of a guarantee is more than a tenth of a peak, the improved follower looks for
+   responses that attain more. If a stated tolerance is not proved, the follower estimates the
+   envelope, and guaranteed bounds stand outside it.
+3. Without a proof the follower remains, and if columns yield, so that there are no derivatives, a
+   search of peaks.
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -36,30 +38,22 @@ from alphacut.frame.numbers import WIDE
 
 LOG = logging.getLogger(__name__)
 
-BOXES = 1000
-"""Boxes that a proof may look at for each bound, on average."""
 FEW_INPUTS = 4
-"""Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
-FINEST = 1e-4
-"""Gap of peaks, as a fraction of each, below which the dual bound takes too long."""
-FOLLOWED = 0.15
-"""Fraction of the tolerance that is worth a graph: a follower's error is up to seven times it."""
-SHOWN_OF_REST = 0.8
-"""Fraction of the progress left that the next method takes; one method is usually enough."""
-ROUNDING = 1e-9
-"""Fraction of a peak by which a motion that is followed may be off."""
+"""Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance (tuned)."""
 
 
 @dataclass(frozen=True)
 class Auto:
-    """The method and its options.
+    """The automatic choice of a method, and its options.
 
     Args:
-        tolerance: Error wanted, as a fraction of each output's peak or, where the envelope is not
-            relative, in m or the unit of the first output; 1e-3 of each peak unless given.
-        seed: Of the follower.
-        workers: Threads of the proof, which do not change the result; all cores unless given.
-        peaks: Whether the error is that of the peaks, and a proof with a wider gap is kept.
+        tolerance: Wanted error, as a fraction of the peak of each output, or in the unit of the
+            first displacement (of the first output if there is none) if the envelope is not
+            relative; 1e-3 of each peak by default.
+        seed: Seed of the follower.
+        workers: Number of threads of the proof, which does not change the result; by default all
+            cores.
+        peaks: Whether the error is that of the peaks, so that a proof with a wider gap is kept.
         magnitudes: Whether nothing is read off bounds below the peaks, which may be wide then.
 
     Raises:
@@ -79,11 +73,14 @@ class Auto:
 
     @property
     def is_for_all_nodes(self) -> bool:
-        """Whether a tolerance holds for all bounds, and not for the peaks alone."""
+        """Whether a stated tolerance holds for all bounds, and not for the peaks alone."""
         return self.tolerance is not None and not self.peaks
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the envelope on all levels, by a proof if possible; its first note says why."""
+        """Return the envelope on all levels, by a proof if possible.
+
+        The first note of the envelope says which method was chosen, and why.
+        """
         tolerance = flow.tolerance(self.tolerance)
         if isinstance(flow.flow, YieldingFlow):
             found = PeakSearch().run(flow, progress)
@@ -91,36 +88,50 @@ class Auto:
         if not isinstance(flow.flow, LinearFlow):
             follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
-        follower = ImprovedFollower(FOLLOWED * tolerance, seed=self.seed)
-        reasons, proved = list[str](), list[Envelope]()
-        for attempt, proof in enumerate(self._proofs(flow, reasons)):
+
+        # The error of a follower is up to seven times the gain that is worth a graph (measured).
+        follower = ImprovedFollower(0.15 * tolerance, seed=self.seed)
+        reasons: list[str] = []
+        proved: list[Envelope] = []
+        attempts = _progress_of_attempts(progress)
+        for proof in self._proofs(flow, reasons):
             try:
-                proved.append(proof.run(flow, _of_attempt(progress, attempt)))
+                found = proof.run(flow, next(attempts))
             except UnprovedError as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            if self._is_close(proved[-1], flow):
-                return _noted(proved[-1], "; ".join([f"{proof.name} succeeded", *reasons]))
+            if self._is_close(found, flow):
+                return _noted(found, "; ".join([f"{proof.name} succeeded", *reasons]))
+            proved.append(found)
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
+
         best = min(proved, key=lambda found: _gap(found, flow), default=None)
         if best is not None and not self.is_for_all_nodes:
             if _gap(best, flow) <= WIDE:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
-            outer, inner = _sides(best)  # bounds above the reached peak are worth motions
-            asked = outer > inner.max(1, keepdims=True)
-            followed = follower.run_pass(flow, _of_attempt(progress, len(reasons)), asked)
+            # Responses are worth computing where bounds lie above the attained peak.
+            outer, inner = _sides(best)
+            asked = outer > inner.max(axis=1, keepdims=True)
+            followed = follower.run_pass(flow, next(attempts), asked)
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
-        found = follower.run(flow, _of_attempt(progress, len(reasons)))
+        found = follower.run(flow, next(attempts))
         found = replace(found, outer=best.proved if best else None)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
-        """Return the proofs to try, in their order; refusals are appended to `reasons`."""
-        proof, dual = Proof(None, self.tolerance, BOXES, workers=self.workers), self._dual(flow)
+        """Return the proofs to try, in their order.
+
+        Args:
+            flow: The problem.
+            reasons: Reasons why a proof is not possible are appended to this list.
+        """
+        # A proof looks at 1000 boxes for each bound on average (tuned: more hardly close gaps).
+        proof = Proof(None, self.tolerance, boxes=1000, workers=self.workers)
+        dual = self._dual(flow)
         if len(flow.boxes.names) > MAX_PARAMETERS:
-            return [dual]  # which itself refuses what cannot be proved
-        works = list[float]()  # that are forecast
-        methods = list[Proof | DualProof]()
+            return [dual]
+        works: list[float] = []
+        methods: list[Proof | DualProof] = []
         for method in (proof, dual):
             try:
                 with refusing():
@@ -131,70 +142,97 @@ class Auto:
         if len(methods) < 2:
             return methods
         undivided = replace(proof, parts=1)
-        # the branch and bound has the same gap at all nodes
+        # Branch and bound has the same gap at all nodes; the dual bound only at peaks.
         if self.is_for_all_nodes or works[0] <= works[1]:
             return [undivided, dual, proof]
         return [dual, undivided]
 
     def _dual(self, flow: UnitFlow) -> DualProof:
-        tolerance, inputs = max(self.tolerance or DEFAULT_TOLERANCE, FINEST), len(flow.boxes.names)
-        dual = DualProof(workers=self.workers, below=1.0 if self.magnitudes else DualProof.below)
-        if self.is_for_all_nodes:  # gaps below the peaks stay wide in any case
-            return dual
-        if flow.relative and inputs <= (MAX_PARAMETERS if self.tolerance else FEW_INPUTS):
-            return replace(dual, gap=tolerance, peaks=tolerance)
+        """Return the dual bound with gaps that fit the tolerance."""
+        dual = DualProof(workers=self.workers)
+        if self.magnitudes:
+            dual = replace(dual, below=1.0)
+        if self.is_for_all_nodes:
+            return dual  # gaps below the peaks stay wide in any case
+        max_inputs = MAX_PARAMETERS if self.tolerance else FEW_INPUTS
+        if flow.relative and len(flow.boxes.names) <= max_inputs:
+            # With a smaller gap of peaks than 1e-4 the dual bound takes too long (tuned).
+            gap = max(self.tolerance or DEFAULT_TOLERANCE, 1e-4)
+            return replace(dual, gap=gap, peaks=gap)
         return dual if self.tolerance is None else replace(dual, peaks=WIDE)
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
-        if self.is_for_all_nodes:  # a little more for rounding
-            allowed = (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
+        """Return whether the gap of a guaranteed envelope suffices."""
+        if self.is_for_all_nodes:
+            allowed = flow.tolerance(self.tolerance) * flow.scale * (1 + 1e-9)  # rounding
             return bool((proved.error <= allowed).all())
-        is_of_few_inputs = flow.relative and len(flow.boxes.names) <= FEW_INPUTS
-        peak_gap = 2 * self.tolerance if self.tolerance and is_of_few_inputs else WIDE
+        has_few_inputs = flow.relative and len(flow.boxes.names) <= FEW_INPUTS
+        peak_gap = 2 * self.tolerance if self.tolerance and has_few_inputs else WIDE
         return _gap(proved, flow) <= peak_gap
 
 
-def _of_attempt(progress: Progress | None, number: int) -> Progress | None:
-    """Return the progress of a method that is tried after `number` others.
+def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None]:
+    """Yield the progress of one method after another that is tried.
 
-    Whether more methods are needed is not known beforehand: each is shown as most of what is left.
+    It is not known beforehand whether more methods are needed; one is usually enough. Each one is
+    shown as 80 % of what is left.
     """
-    left = 1 - SHOWN_OF_REST
-    return progress and subprogress(progress, 1 - left**number, 1 - left ** (number + 1))
+    left = 1.0
+    while True:
+        ends = 1 - left, 1 - 0.2 * left
+        yield None if progress is None else subprogress(progress, *ends)
+        left *= 0.2
 
 
 def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:
-    """Return a guaranteed envelope with larger values inside it that graphs reach."""
-    values = followed.bounds - ROUNDING * np.abs(followed.bounds).max((0, 1, 3))[:, None]
+    """Return a guaranteed envelope with the larger values that a follower attains.
+
+    Args:
+        proved: The guaranteed envelope.
+        flow: The problem.
+        followed: Attained bounds of the same problem. Their values may be wrong by a 1e-9th of the
+            peak through rounding, which is subtracted.
+    """
+    rounding = 1e-9 * np.abs(followed.bounds).max(axis=(0, 1, 3))[:, np.newaxis]
+    values = followed.bounds - rounding
     outer, inner = _sides(proved)
-    better, at = values > inner, np.stack([proved.lower_at, proved.upper_at], -2)
+    better = values > inner
     inner = np.where(better, values, inner)
-    at = np.where(better[..., None], flow.boxes.to_physical(followed.points), at)
+    at = np.stack([proved.lower_at, proved.upper_at], axis=-2)
+    at = np.where(better[..., np.newaxis], flow.boxes.to_physical(followed.points), at)
     combined = replace(
         proved,
         inner=Ends(-inner[..., 0], inner[..., 1]),
         lower_at=at[..., 0, :],
         upper_at=at[..., 1, :],
-        error=(outer - inner).max(-1),
+        error=(outer - inner).max(axis=-1),
     )
     return replace(combined, facts={**combined.facts, "gap_of_peaks": _gap(combined, flow)})
 
 
 def _sides(proved: Envelope) -> tuple[Array, Array]:
-    """Return proved and reached upper bounds of (−output, output), shape (A, T, m, 2) each."""
+    """Return guaranteed and attained upper bounds of (-output, output) of a guaranteed envelope.
+
+    Returns:
+        Both bounds, shape (levels, times, outputs, 2) each.
+    """
     assert proved.inner is not None
-    outer = np.stack([-proved.lower, proved.upper], -1)
-    return outer, np.stack([-proved.inner.lower, proved.inner.upper], -1)
+    outer = np.stack([-proved.lower, proved.upper], axis=-1)
+    inner = np.stack([-proved.inner.lower, proved.inner.upper], axis=-1)
+    return outer, inner
 
 
 def _gap(proved: Envelope, flow: UnitFlow) -> float:
-    """Return the largest gap between proved and reached peak, as a fraction of the peak."""
-    outer, inner = (bounds.max(1) for bounds in _sides(proved))  # (A, m, 2)
-    peak = np.where(flow.at_rest, flow.peak, outer.max(-1))
-    return float(((outer - inner).max(-1) / np.maximum(peak, 1e-300)).max())
+    """Return the largest gap between guaranteed and attained peak, as a fraction of the peak."""
+    outer, inner = _sides(proved)
+    outer_peaks = outer.max(axis=1)  # (levels, outputs, 2)
+    inner_peaks = inner.max(axis=1)
+    peak = np.where(flow.at_rest, flow.peak, outer_peaks.max(axis=-1))
+    gaps = (outer_peaks - inner_peaks).max(axis=-1)
+    return float((gaps / np.maximum(peak, 1e-300)).max())
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:
-    """Return the envelope with a text as its first note, which is logged as well."""
+    """Return the envelope with a text as its first note; the text is logged, too."""
     LOG.info("envelope: %s", why)
     return replace(envelope, notes=(why, *envelope.notes))

@@ -1,9 +1,10 @@
-"""Proved envelopes of linear structures with many fuzzy inputs: Lagrangian relaxation as a method.
+"""Guaranteed envelopes of linear structures with many fuzzy inputs, by Lagrangian relaxation.
 
-A linear structure with classical modes answers as a sum over modes of functions of few intervening
-variables each (section 7 of the paper): frequency, decay and shares, which bend little over the
-box. `bounds.dual_function` states the bound, which holds for any multipliers. The cost is one of
-modes, tables and nodes, and hardly one of inputs.
+The response of a linear structure with classical modes is a sum over modes of functions of few
+intervening variables each (section 7 of the paper): frequency, decay and participation factors,
+which are nearly linear in the inputs over the box. `bounds.dual_function` states the bound, which
+holds for any multipliers. The cost is in proportion to the numbers of modes, table entries and time
+nodes, and hardly depends on the number of inputs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.base.threads import KernelThreads
@@ -34,31 +35,24 @@ from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.structures.linear import frequencies
 
-DRIFT = 1e-6
-"""Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""
-NEAR = 1e-3
-"""Fraction of the box about the nominal inputs over which modes are enclosed if any part of the box
-can be proved."""
-WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
-"""Fractions of the work at which the passes over all nodes begin and end, about."""
 Problems = dict[tuple[int, int], OutputBounds]
-"""Bounds of an output on a side, by their indices."""
+"""Bounds of -output (side 0) and output (side 1), by the indices of the output and of the side."""
 
 
 @dataclass(frozen=True)
 class DualProof:
-    """The method and its options.
+    """The dual bound as a method, and its options.
 
     Args:
-        gap: Distance of proved and attained bounds that suffices, as a fraction of each output's
-            peak; what the remainders leave may be more.
-        peaks: The same of the bounds above a peak, above which the box of inputs is parted.
-        below: Gap that suffices below a peak, as a fraction of the distance from it; at 1 peaks
-            alone are bounded.
-        slabs: Most parts of the modes' ranges for a bound.
-        steps: Most evaluations of the dual function for each of them.
-        parts: Most parts of the box that a peak is worth, and that are refused.
-        workers: Threads, which do not change the result; all cores unless given.
+        gap: Distance of guaranteed bounds and attained values that suffices, as a fraction of the
+            peak of each output. The Taylor remainders may leave a wider gap.
+        peaks: The same for the bounds above a peak. Where they are wider, the box is bisected.
+        below: Gap that suffices below a peak, as a fraction of the distance from the peak. With 1
+            only the peaks are bounded.
+        slabs: Largest number of cells of the modes' ranges for a bound.
+        steps: Largest number of evaluations of the dual function for each cell.
+        parts: Largest number of sub-boxes for a peak, and of sub-boxes that may be refused.
+        workers: Number of threads, which does not change the result; by default all cores.
 
     Raises:
         RefusedError: A value is not positive.
@@ -81,38 +75,41 @@ class DualProof:
         """Return the guaranteed envelope of all outputs on all levels.
 
         Raises:
-            UnprovedError: The structure has no classical modes that can be enclosed, or the motion
-                is not the exact one.
+            UnprovedError: The structure has no classical modes that can be enclosed, or the
+                integrator is not the exact one.
         """
         return prove(self, flow, progress)
 
     @property
     def bounds_peaks_alone(self) -> bool:
-        """Whether no bound below a peak is worth any work."""
+        """Whether bounds below a peak are not worth any work."""
         return self.below >= 1
 
     def peak_gap(self, flow: UnitFlow) -> Array:
-        """Return the gap at peaks that suffices, shape (m,)."""
+        """Return the gap that suffices at the peak of each output, shape (outputs,)."""
         return self.peaks * flow.peak
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Return the most evaluations of the dual function for a bound.
+        """Return the largest number of evaluations of the dual function for a bound.
 
-        A small part of the box is bounded first, so that what no part can mend is refused at once.
+        A small part of the box is modelled first, so that a structure that cannot be bounded over
+        any sub-box is refused at once.
 
         Raises:
-            UnprovedError: No mode of the structure can be enclosed, however narrow a part is.
+            UnprovedError: No mode of the structure can be enclosed, however narrow the box is.
         """
-        rates = frequencies(flow.system)
-        if rates[0] <= DRIFT * rates[-1]:
+        # With a smaller ratio of frequencies, rounding of the stiffness may hide a rigid motion.
+        omega = frequencies(flow.system)
+        if omega[0] <= 1e-6 * omega[-1]:
             what = "a mode does not oscillate: the stiffness lets the structure drift"
             raise UnprovedError(what, "take improved-graph-follower")
-        ends = np.stack([boxes.lower[0], boxes.upper[0]])
-        near = boxes.nominal + NEAR * (ends - boxes.nominal)
-        if (near[1] > near[0]).any():
-            Box(flow.system, boxes.names, flow.time, *near).level(
-                np.arange(2), np.full(len(flow.outputs), np.inf)
-            )
+        # Modes are enclosed over a thousandth of the box if they are over any sub-box.
+        low = boxes.nominal + 1e-3 * (boxes.lower[0] - boxes.nominal)
+        high = boxes.nominal + 1e-3 * (boxes.upper[0] - boxes.nominal)
+        if (high > low).any():
+            first_nodes = np.arange(2)
+            any_error = np.full(len(flow.outputs), np.inf)
+            Box(flow.system, boxes.names, flow.time, low, high).level(first_nodes, any_error)
         return float(self.slabs * self.steps)
 
     def call_kernels(self) -> None:
@@ -122,82 +119,124 @@ class DualProof:
         call_bound_cell()
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[Answer]:
-        """Return bounds on each level of a box, or the refusal where modes are not enclosed."""
-        answers, wider = list[Answer](), np.full(goal.outer.shape[1:], np.inf)
+        """Return bounds on each level of a box, or the error of a level that cannot be bounded.
+
+        Args:
+            flow: The exact response.
+            boxes: The box on each level, from the widest to the narrowest.
+            goal: Which bounds are needed, and what is known.
+        """
+        answers: list[Answer] = []
+        wider = np.full(goal.outer.shape[1:], np.inf)
         for k, (low, high) in enumerate(zip(boxes.lower, boxes.upper, strict=True)):
             box = Box(flow.system, boxes.names, flow.time, low, high)
             try:
-                is_fuzzy = (high > low).any()
-                found = self._relaxed(flow, box, goal, k, wider) if is_fuzzy else _exact(box)
+                if (high > low).any():
+                    found = self._level_bounds(flow, box, goal, k, wider=wider)
+                else:
+                    found = _exact_bounds(box)
                 answers.append(found)
-                wider = found.outer  # what holds on a wider level holds on those inside it
-            except UnprovedError as refusal:
-                answers.append(refusal)
+                wider = found.outer  # a narrower box lies inside the wider one
+            except UnprovedError as error:
+                answers.append(error)
         return answers
 
-    def _relaxed(self, flow: LinearFlow, box: Box, goal: Goal, k: int, wider: Array) -> BoxBounds:
-        """Bounds on level k by those of a wider one, and what motions at the maximisers reach."""
-        needed, outer = goal.needed[k], np.minimum(goal.outer[k], wider)
-        nodes, outputs = np.flatnonzero(needed.any((1, 2))), np.flatnonzero(needed.any((0, 2)))
+    def _level_bounds(
+        self, flow: LinearFlow, box: Box, goal: Goal, k: int, *, wider: Array
+    ) -> BoxBounds:
+        """Return the bounds on one level of a box of inputs.
+
+        Args:
+            flow: The exact response.
+            box: The box on the level; some input has a width.
+            goal: Which bounds are needed, and what is known.
+            k: Index of the level in `goal`.
+            wider: Bounds of (-output, output) over a box that contains this one, shape (times,
+                outputs, 2).
+        """
+        needed = goal.needed[k]
+        outer = np.minimum(goal.outer[k], wider)
+        nodes = np.flatnonzero(needed.any(axis=(1, 2)))
+        outputs = np.flatnonzero(needed.any(axis=(0, 2)))
         is_complete = bool(needed.all())
         gap = (self.gap if is_complete else self.peaks) * goal.peak
         level = box.level(nodes, numbers.TRUNCATION * gap[outputs], outputs)
         problems: Problems = {}
-        for o, s in zip(*np.nonzero(needed.any(0)), strict=True):
-            index = int(np.searchsorted(outputs, o)), int(s)
-            problems[o, s] = OutputBounds.initial(level, *index, gap[o], goal.incumbent[k, o, s])
-            problems[o, s].out[0] = outer[nodes, o, s]
+        for o, s in zip(*np.nonzero(needed.any(axis=0)), strict=True):
+            index = int(np.searchsorted(outputs, o))
+            problem = OutputBounds.initial(level, index, int(s), gap[o], goal.incumbent[k, o, s])
+            problem.out[0] = outer[nodes, o, s]
+            problems[o, s] = problem
+
+        n_levels = len(goal.needed)
+        tick = subprogress(goal.tick, k / n_levels, (k + 1) / n_levels)
         with KernelThreads(goal.workers, self.call_kernels) as pool:
-            # 1. find multipliers with low bounds, and inputs with high values of the models
-            tick = subprogress(goal.tick, k / len(goal.needed), (k + 1) / len(goal.needed))
-            self._minimise(problems, goal, flow, box, pool, needed[nodes], is_complete, tick)
+            # 1. Find multipliers with low bounds, and inputs with large values of the models.
+            if is_complete:
+                self._minimise(problems, goal, flow, box, pool, progress=tick)
+            else:
+                self._minimise_peaks(problems, pool, needed=needed[nodes])
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
-                outer[nodes, o, s], unit[nodes, o, s] = problem.out[0], problem.at
-            # 2. raise the incumbents to what the exact motions at these inputs reach
-            node, output, side = np.nonzero(needed)
-            at, is_moved = unit[needed], unit[needed].any(1)  # most may be the centre
-            reached = np.stack([x[node, output] for x in box.centre_motion()])
-            if is_moved.any():
-                moved = (at[is_moved], node[is_moved], output[is_moved])
-                reached[:, is_moved] = box.reached(*moved)
-            value, error = reached
-            inner, attained_error = np.full(needed.shape, -np.inf), np.zeros(needed.shape[:2])
-            inner[needed] = np.where(side, value, -value) - error
-            np.maximum.at(attained_error, (node, output), 2 * error)
-            above = dict[tuple[int, int], Ints]()
+                outer[nodes, o, s] = problem.out[0]
+                unit[nodes, o, s] = problem.at
+
+            # 2. The exact responses at these inputs attain values, which raise the incumbents.
+            inner, attained_error = _attained_values(box, needed, unit=unit)
             for (o, s), problem in problems.items():
                 problem.wanted_gap = self.peaks * goal.peak[o]
                 problem.reached = max(problem.reached, inner[:, o, s].max())
-                above[o, s] = problem.nodes_above(np.flatnonzero(needed[nodes, o, s]))
-            # 3. prune ends of the box that hold no peak above the incumbent and the gap
-            peaks = [peak for peak in problems if len(above[peak])]
+
+            # 3. Prune ends of the box that contain no peak above the incumbent and the gap.
             shape = (*needed.shape[1:], len(box.low))
-            shares, remaining, pruned = np.zeros(shape), np.empty((2, *shape)), outer.copy()
-            remaining[:] = np.stack([box.low, box.high])[:, None, None]
-            jobs = [pool.submit(prune_ends, level, problems[x], above[x]) for x in peaks]
-            for (o, s), job in zip(peaks, jobs, strict=True):
-                low, high, over_pruned, share = job.result()
-                shares[o, s, box.active] = share
+            fractions = np.zeros(shape)
+            remaining = np.empty((2, *shape))
+            remaining[:] = np.stack([box.low, box.high])[:, np.newaxis, np.newaxis]
+            pruned = outer.copy()
+            jobs = []
+            for (o, s), problem in problems.items():
+                above = problem.nodes_above(np.flatnonzero(needed[nodes, o, s]))
+                if len(above):
+                    job = pool.submit(prune_ends, level, problem, above)
+                    jobs.append((o, s, nodes[above], job))
+            for o, s, nodes_above, job in jobs:
+                low, high, bounds_over_pruned, gap_fractions = job.result()
+                fractions[o, s, box.active] = gap_fractions
                 remaining[:, o, s] = box.inputs(np.stack([low, high]))
-                pruned[nodes[above[o, s]], o, s] = over_pruned
-            # 4. bound from below how low a peak can be
-            between, least = np.zeros(needed.shape[:2]), None
+                pruned[nodes_above, o, s] = bounds_over_pruned
+
+            # 4. Bound the smallest peaks.
+            between = np.zeros(needed.shape[:2])
+            least_peaks = None
             if is_complete:
                 between = level.line_deviation()
-                least = self._least_peaks(flow, box, level, between, pool)
+                least_peaks = _least_peaks(flow, box, level, between=between, pool=pool)
         return BoxBounds(
             outer=outer,
             inner=inner,
             at=box.inputs(unit),
             between=between,
-            shares=shares,
+            shares=fractions,
             attained_error=attained_error,
             remaining=remaining,
             pruned=pruned,
-            least_peaks=least,
+            least_peaks=least_peaks,
             facts={"single_modes": len(level.models.oscillators)},
         )
+
+    def _minimise_peaks(self, problems: Problems, pool: Executor, *, needed: Mask) -> None:
+        """Minimise the dual functions of some bounds once.
+
+        Args:
+            problems: The bounds, which are improved in place.
+            pool: Threads.
+            needed: Bounds that are asked for, shape (times, outputs, 2).
+        """
+        jobs = []
+        for (o, s), problem in problems.items():
+            effort = problem.effort(numbers.PEAK_CELLS, numbers.PEAK_STEPS, 1.0)
+            jobs.append((problem, np.flatnonzero(needed[:, o, s]), effort))
+        improve_all(jobs, pool, lambda done: None, peaks_alone=self.bounds_peaks_alone)
 
     def _minimise(
         self,
@@ -206,86 +245,179 @@ class DualProof:
         flow: LinearFlow,
         box: Box,
         pool: Executor,
-        needed: Mask,
-        is_complete: bool,
+        *,
         progress: Progress,
     ) -> None:
-        """Minimise the dual functions of bounds `needed` (J, m, 2), each passed over thrice."""
-        if not is_complete:
-            efforts = int(numbers.PEAK_CELLS), int(numbers.PEAK_STEPS), 1.0
-            jobs = [
-                (problem, np.flatnonzero(needed[:, o, s]), problem.effort(*efforts))
-                for (o, s), problem in problems.items()
-            ]
-            alone = self.bounds_peaks_alone
-            return improve_all(jobs, pool, lambda done: None, peaks_alone=alone)
+        """Minimise the dual functions of all bounds in three passes.
+
+        The first pass shows where the peaks are. The second one bisects cells where gaps are wide.
+        The third one bisects further where bounds lie above a peak.
+
+        Args:
+            problems: The bounds, which are improved in place.
+            goal: What is known of the peaks.
+            flow: The exact response.
+            box: The box.
+            pool: Threads.
+            progress: Called with the completed fraction.
+
+        Raises:
+            UnprovedError: The models are too inaccurate over the box, and bisections would help.
+        """
         if self.bounds_peaks_alone:
-            # no bound at a node matters that lies below the peak in the middle of the box
-            motion = flow.values(box.inputs(np.zeros((1, len(box.active)))))[0]
-            jobs = [
-                (x, np.flatnonzero(np.isinf(x.out[0])), x.effort(1, 1)._replace(ascents=0))
-                for x in problems.values()
-            ]
+            # No bound at a node matters that lies below the peak at the midpoint of the box. Bounds
+            # that are still infinite are made finite without effort.
+            jobs = []
+            for problem in problems.values():
+                effort = problem.effort(1, 1)._replace(ascents=0)
+                jobs.append((problem, np.flatnonzero(np.isinf(problem.out[0])), effort))
             improve_all(jobs, pool, lambda done: None)
+            midpoint = box.inputs(np.zeros((1, len(box.active))))
+            response = flow.values(midpoint)[0]
             for (o, _), problem in problems.items():
-                problem.out[1], problem.at[:] = motion[:, o] * problem.side, 0.0
-        # a first pass shows the peaks, a second halves cells where gaps are wide, a third does so
-        # further where bounds lie above a peak
-        cells_at_peaks = int(numbers.CELLS_ABOVE_PEAK * self.slabs)
-        first_cells = int(numbers.FIRST_CELLS) if self.bounds_peaks_alone else self.slabs
-        for number, (cells, steps, slack, multiple) in enumerate(
-            (
-                (1, 1, float(self.bounds_peaks_alone), 0.0),
-                (first_cells, self.steps, self.below, numbers.REMAINDER_MULTIPLE),
-                (cells_at_peaks, self.steps, 1.0, numbers.REMAINDER_MULTIPLE_AT_PEAKS),
-            )
-        ):
-            jobs = [
-                (problem, problem.open_nodes(slack), problem.effort(cells, steps, slack, multiple))
-                for problem in problems.values()
-            ]
-            tick = subprogress(progress, *WORK_OF_PASSES[number : number + 2])
-            improve_all(jobs, pool, tick, peaks_alone=self.bounds_peaks_alone and number == 2)
-            if number == 0 and not goal.last:
-                self._require_narrow(problems, box, goal.peak)
+                problem.out[1] = response[:, o] * problem.side
+                problem.at[:] = 0.0
 
-    def _require_narrow(self, problems: Problems, box: Box, peak: Array) -> None:
-        """Refuse a box whose Taylor remainders exceed `WIDE` of a peak, if bisections help."""
-        for (o, _), problem in problems.items():
-            shares = np.zeros(len(box.low))
-            highest = int(problem.out[1].argmax())
-            addition, shares[box.active] = remainder_addition(problem, highest)
-            if addition > numbers.WIDE * peak[o] and halvings(shares, self.parts) >= 1:
-                what = f"the remainders of the modes are {addition / peak[o]:.2g} of a peak"
-                raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
+        alone = self.bounds_peaks_alone
+        self._improve(
+            problems, pool, 1, 1, slack=float(alone), tick=subprogress(progress, 0.0, 0.05)
+        )
+        if not goal.last:
+            self._require_accurate(problems, box, goal.peak)
+        self._improve(
+            problems,
+            pool,
+            numbers.FIRST_CELLS if alone else self.slabs,
+            self.steps,
+            slack=self.below,
+            multiple=numbers.REMAINDER_MULTIPLE,
+            tick=subprogress(progress, 0.05, 0.75),
+        )
+        self._improve(
+            problems,
+            pool,
+            numbers.CELLS_ABOVE_PEAK * self.slabs,
+            self.steps,
+            slack=1.0,
+            multiple=numbers.REMAINDER_MULTIPLE_AT_PEAKS,
+            tick=subprogress(progress, 0.75, 1.0),
+            peaks_alone=alone,
+        )
 
-    def _least_peaks(
+    def _improve(
         self,
-        flow: LinearFlow,
-        box: Box,
-        level: LevelModels,
-        between: Array,
+        problems: Problems,
         pool: Executor,
-    ) -> Ends:
-        """Lower bound of each output's smallest peak, and the peak of a motion that peaks low."""
-        count = len(level.structure.order)
-        bounds, units = zip(*pool.map(partial(least_peak, level), range(count)), strict=True)
-        unit, d = np.stack(units), len(box.active)
-        # steepest descent over corners, from the inputs that the lower bounds name
-        moves = 1 - 2 * np.eye(d + 1, d)  # one coordinate changes its sign, or none
-        for _ in range(int(numbers.LEAST_PEAK_DESCENTS)):
-            tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
-            unit = tried[np.abs(flow.values(box.inputs(tried))).max(1).argmin(0)]
-        reached = [
-            box.peak_over_time(unit[o], between[:, [o]], np.array([o]))[0] for o in range(count)
-        ]
-        return Ends(np.array(bounds), np.array(reached))
+        cells: int,
+        steps: int,
+        *,
+        slack: float,
+        tick: Progress,
+        multiple: float = 0.0,
+        peaks_alone: bool = False,
+    ) -> None:
+        """Improve all bounds that exceed the values of the models by more than suffices.
+
+        Args:
+            problems: The bounds, which are improved in place.
+            pool: Threads.
+            cells: Largest number of cells of a bound.
+            steps: Largest number of evaluations of the dual function for a cell.
+            slack: `Effort.slack_below_peak`.
+            tick: Called with the completed fraction.
+            multiple: `Effort.remainder_multiple`.
+            peaks_alone: Whether only the bounds of peaks are lowered.
+        """
+        jobs = []
+        for problem in problems.values():
+            effort = problem.effort(cells, steps, slack, multiple)
+            jobs.append((problem, problem.open_nodes(slack), effort))
+        improve_all(jobs, pool, tick, peaks_alone=peaks_alone)
+
+    def _require_accurate(self, problems: Problems, box: Box, peak: Array) -> None:
+        """Check that Taylor remainders are at most `WIDE` of a peak, or bisections are too many.
+
+        Raises:
+            UnprovedError: They are larger; the error names the input to bisect.
+        """
+        for (o, _), problem in problems.items():
+            fractions = np.zeros(len(box.low))
+            highest = int(problem.out[1].argmax())
+            addition, fractions[box.active] = remainder_addition(problem, highest)
+            if addition > numbers.WIDE * peak[o] and halvings(fractions, self.parts) >= 1:
+                what = f"the remainders of the modes are {addition / peak[o]:.2g} of a peak"
+                raise UnprovedError(what, "take narrower inputs", int(fractions.argmax()))
 
 
-def _exact(box: Box) -> BoxBounds:
-    """Bounds where no input has a width: the exact motion with its rounding."""
+def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Array]:
+    """Return what exact responses attain at one point for each bound.
+
+    Args:
+        box: The box.
+        needed: Bounds of (-output, output) that are asked for, shape (times, outputs, 2).
+        unit: Unit coordinates of the points, shape (times, outputs, 2, inputs with a width).
+
+    Returns:
+        The values less the bound of their rounding, shape (times, outputs, 2), -∞ for bounds that
+        are not asked for; and twice the largest bound of the rounding, shape (times, outputs).
+    """
+    node, output, side = np.nonzero(needed)
+    points = unit[needed]
+    value, error = (x[node, output] for x in box.centre_motion())
+    # Most points may be the midpoint of the box, whose response is known.
+    is_moved = points.any(axis=1)
+    if is_moved.any():
+        moved = box.reached(points[is_moved], node[is_moved], output[is_moved])
+        value[is_moved], error[is_moved] = moved
+    inner = np.full(needed.shape, -np.inf)
+    inner[needed] = np.where(side, value, -value) - error
+    attained_error = np.zeros(needed.shape[:2])
+    np.maximum.at(attained_error, (node, output), 2 * error)
+    return inner, attained_error
+
+
+def _least_peaks(
+    flow: LinearFlow, box: Box, level: LevelModels, *, between: Array, pool: Executor
+) -> Ends:
+    """Return bounds of the smallest peak of each output over a box.
+
+    Args:
+        flow: The exact response.
+        box: The box.
+        level: Models of the response over the box.
+        between: Bound of the distance of outputs from straight lines in the step before each node,
+            shape (times, outputs).
+        pool: Threads.
+
+    Returns:
+        A lower bound, and the peak of a response that has a small one, shape (outputs,) each.
+    """
+    count = len(level.structure.order)
+    found = [*pool.map(partial(least_peak, level), range(count))]
+    lower = np.array([bound for bound, _ in found])
+    unit = np.stack([point for _, point in found])
+    # Steepest descent over the corners of the box, from the points at which the bounds are taken.
+    # In each step one coordinate changes its sign, or none.
+    d = len(box.active)
+    sign_changes = 1 - 2 * np.eye(d + 1, d)
+    for _ in range(numbers.LEAST_PEAK_DESCENTS):
+        tried = np.unique((unit[:, np.newaxis] * sign_changes).reshape(-1, d), axis=0)
+        peaks = np.abs(flow.values(box.inputs(tried))).max(axis=1)
+        unit = tried[peaks.argmin(axis=0)]
+    reached = []
+    for o in range(count):
+        peak = box.peak_over_time(unit[o], between[:, [o]], np.array([o]))
+        reached.append(float(peak.item()))
+    return Ends(lower, np.array(reached))
+
+
+def _exact_bounds(box: Box) -> BoxBounds:
+    """Return the bounds over a box without width: the exact response and its rounding."""
     value, error = box.centre_motion()
-    sides, margin, between = np.stack([-value, value], -1), error[..., None], box.centre_straying()
+    sides = np.stack([-value, value], axis=-1)
+    margin = error[..., np.newaxis]
+    between = box.centre_straying()
+    no_coordinates = np.zeros(0)
     return BoxBounds(
         outer=sides + margin,
         inner=sides - margin,
@@ -293,5 +425,7 @@ def _exact(box: Box) -> BoxBounds:
         between=between,
         shares=np.zeros((*sides.shape[1:], len(box.low))),
         attained_error=2 * error,
-        least_peaks=Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0), between)),
+        least_peaks=Ends(
+            (np.abs(value) - error).max(axis=0), box.peak_over_time(no_coordinates, between)
+        ),
     )
