@@ -1,15 +1,15 @@
-"""Proof: guaranteed bounds of linear structures with up to six fuzzy inputs.
+"""Guaranteed bounds of linear structures with up to six fuzzy inputs, by branch and bound.
 
-1. Displacements oscillate in the inputs; the modes' eigenvalues λ_k(p) and shares C_k(p) do not
-   (section 7). Their series about the middle of a box give q(t; p) = 2 Re Σ C_k exp(λ_k t), and
-   likewise the motion under a record (`frame.modes.damped`).
-2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
-   the error of the motion (`frame.bounds.model_error`). The degree rises until that takes a
-   fifth of the gap wanted. Where it does not, the box is refused and bisected
+1. Displacements oscillate in the inputs; the eigenvalues λ_k(p) of the modes and the participation
+   factors C_k(p) do not (section 7 of the paper). Their polynomials about the midpoint of a box
+   give the modal model q(t; p) = 2 Re Σ_k C_k exp(λ_k t), and likewise the response to a record
+   (`frame.modes.damped`).
+2. The residual of these polynomials in the equations of motion is bounded over the whole box, and
+   with it the error of the response (`frame.bounds.model_error`). The degree rises until the error
+   takes a fifth of the wanted gap. If it does not fall that far, the box is bisected
    (`frame.bounds.spatial_branch_and_bound`).
-3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
-   levels, between a point that is attained and a bound that is proved
-   (`frame.bounds.branch_and_bound`).
+3. Branch and bound encloses the extreme values of the model at all nodes, for all outputs, sides
+   and levels, between an attained value and a guaranteed bound (`frame.bounds.branch_and_bound`).
 """
 
 from __future__ import annotations
@@ -57,17 +57,18 @@ class GapError(UnprovedError):
 
 @dataclass(frozen=True)
 class Proof:
-    """The method and its options.
+    """Branch and bound as a method, and its options.
 
     Args:
-        gap: Wanted distance of attained and proved bounds, as the tolerance; a tenth of that unless
-            given.
-        tolerance: Largest error allowed, what the gap may grow to where a smaller one is not
-            proved: a fraction of each output's peak, or in the unit of the first displacement (the
-            first output without one) where the envelope is not relative; 1e-3 unless given.
-        boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
-        parts: Most parts of the box that a peak is worth, and that are refused.
-        workers: Threads, which do not change the result; all cores unless given.
+        gap: Wanted distance of attained values and guaranteed bounds, as a fraction of the peak of
+            each output, or in the unit of the first displacement (of the first output if there is
+            none) if the envelope is not relative; by default a tenth of the tolerance.
+        tolerance: Largest distance allowed, to which the gap may grow if a smaller one is not
+            proved, in the same unit; 1e-3 of each peak by default.
+        boxes: Largest number of boxes looked at for each bound, on average. If it is reached, the
+            gap is wider.
+        parts: Largest number of sub-boxes for a peak, and of sub-boxes that may be refused.
+        workers: Number of threads, which does not change the result; by default all cores.
 
     Raises:
         RefusedError: A value is not positive.
@@ -95,20 +96,21 @@ class Proof:
         return prove(replace(self, tolerance=tolerance), flow, progress)
 
     def peak_gap(self, flow: UnitFlow) -> Array:
-        """Return the tolerance of each output, shape (m,)."""
+        """Return the largest gap allowed at the peak of each output, shape (outputs,)."""
         return flow.scale * self._gaps[-1]
 
     @property
     def _gaps(self) -> tuple[float, ...]:
-        """Gaps that are tried on a part, in units of the tolerance."""
+        """Gaps that are tried on a sub-box, the smallest first, in units of the outputs' scale."""
         tolerance = self.tolerance or DEFAULT_TOLERANCE
         return (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Return the expected work on the box, in evaluations of a mode's motion at a node.
+        """Return the expected work on a box, in evaluations of the response of a mode at a node.
 
         Raises:
-            UnprovedError: There are too many inputs, or the structure is not known to lose energy.
+            UnprovedError: There are too many inputs, damping is given by a ratio of each mode, or
+                the structure is not known to lose energy.
         """
         n_inputs = int((boxes.upper[0] > boxes.lower[0]).sum())
         if n_inputs > MAX_PARAMETERS:
@@ -127,54 +129,88 @@ class Proof:
         call_examine()
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
-        """Return proved and attained bounds on each level of a part of the box.
+        """Return guaranteed bounds and attained values on each level of a sub-box.
 
         Raises:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance, or
-                the structure has no smooth oscillating modes over the part.
+                the structure has no smooth oscillating modes over the sub-box.
         """
 
-        def within(gap: float) -> list[BoxBounds]:
+        def bounds_within(gap: float) -> list[BoxBounds]:
             model, error = self._accurate_model(flow, boxes, goal.scale, gap)
             return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
 
-        for gap in self._gaps[:-1]:  # the narrowest first
+        for gap in self._gaps[:-1]:
             with suppress(GapError, BisectionError):
-                return within(gap)
-        return within(self._gaps[-1])
+                return bounds_within(gap)
+        return bounds_within(self._gaps[-1])
 
     def _accurate_model(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
-        """Modal model of a box whose proved error, (T, m), is a fifth of the gap at most."""
-        max_degree, step, before = _max_degree(len(boxes.names)), 0, np.inf
-        degree = min(int(numbers.FIRST_DEGREE), max_degree)
+        """Return a modal model of a box that is accurate enough for a gap.
+
+        Args:
+            flow: The exact response.
+            boxes: The box on each level.
+            scale: Unit of the gap for each output, shape (outputs,).
+            gap: The gap.
+
+        Returns:
+            The model, and the guaranteed bound of its error at the time nodes, shape (times,
+            outputs), which is at most a fifth of the gap.
+
+        Raises:
+            GapError: No degree is accurate enough, and bisections would help.
+            BisectionError: Too many bisections would be needed.
+        """
+        max_degree = _max_degree(len(boxes.names))
+        degree = min(numbers.FIRST_DEGREE, max_degree)
+        last_step = 0
+        last_excess = np.inf
         while True:
             model = ModalModel.of_degree(flow, boxes, degree, numbers.LEFT_OUT_MODES * gap * scale)
             error = proved_error(model)
             excess = float((error / scale).max()) / (numbers.MAX_ERROR_FRACTION * gap)
             if excess <= 1:
                 return model, error
-            # factor of the error by a degree more, and how many degrees more it takes at that rate
-            decay = (excess / before) ** (1 / step) if step else numbers.FIRST_DECAY
+            # The factor of the error for each further degree, and the number of degrees that are
+            # needed at this rate.
+            decay = numbers.FIRST_DECAY
+            if last_step:
+                decay = (excess / last_excess) ** (1 / last_step)
             further = np.log(excess) / -np.log(decay) if decay < 1 else np.inf
-            if degree == max_degree or (step and not degree + further < max_degree + 1):
-                raise self._refusal(model, excess, decay)
-            step = min(max(1, int(numbers.DEGREE_CAUTION * further)), max_degree - degree)
-            degree, before = degree + step, excess
+            is_hopeless = last_step > 0 and not degree + further < max_degree + 1
+            if degree == max_degree or is_hopeless:
+                raise self._gap_error(model, excess, decay)
+            last_step = min(max(1, int(numbers.DEGREE_CAUTION * further)), max_degree - degree)
+            last_excess = excess
+            degree += last_step
 
-    def _refusal(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
-        """A `GapError` with the input to bisect; a `BisectionError` if too many are needed."""
+    def _gap_error(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
+        """Return the error for a model that is too inaccurate.
+
+        It is a `GapError` that names the input to bisect, or a `BisectionError` if too many
+        bisections are needed.
+
+        Args:
+            model: The model of the last degree that was tried.
+            excess: Its error over the allowed one.
+            decay: Factor of the error for each further degree.
+        """
         what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * excess:.3g} of it,"
         what += " takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        input_shares, max_degree = tail_shares(model), _max_degree(len(model.boxes.names))
-        with_all_degrees = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
-        # halving the inputs that contribute divides the error of degree N by 2^(N + 1)
-        halvings = max(1.0, np.ceil(with_all_degrees / (max_degree + 1)))
-        if not halvings / (input_shares**2).sum() <= np.log2(self.parts):
+        fractions = _error_fractions(model)
+        max_degree = _max_degree(len(model.boxes.names))
+        # Halving the inputs that contribute divides the error of the degree N by 2^(N + 1). The
+        # halvings are distributed among the inputs in proportion to their fractions of the error.
+        log2_excess = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
+        halvings = max(1.0, np.ceil(log2_excess / (max_degree + 1)))
+        are_affordable = halvings / (fractions**2).sum() <= np.log2(self.parts)
+        if not are_affordable:
             return BisectionError(what, cure)
-        return GapError(what, cure, int(input_shares.argmax()))
+        return GapError(what, cure, int(fractions.argmax()))
 
 
 def bound_levels(
@@ -186,135 +222,182 @@ def bound_levels(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> list[BoxBounds]:
-    """Bounds of all outputs at each node and on each level of a modal model, by branch and bound.
+    """Return bounds of all outputs at each node and on each level by branch and bound.
 
-    The narrowest level comes first, whose best points are good ones of the wider levels too.
+    The narrowest level is bounded first, whose best points are also good ones of wider levels.
 
-    `model_error` (T, m) bounds the model's distance from the exact motion. `gap` is the wanted
-    difference of proved and reached bounds in units of `scale` (m,), `budget` the most boxes for a
-    bound, on average.
+    Args:
+        model: Modal model of the response.
+        model_error: Guaranteed bound of its error at the nodes, shape (times, outputs).
+        scale: Unit of the gap for each output, shape (outputs,).
+        gap: Wanted difference of guaranteed bounds and attained values.
+        budget: Largest number of boxes for a bound, on average.
+        workers: Number of threads.
+        progress: Called with the completed fraction.
+
+    Returns:
+        The bounds on each level, in the order of `model.boxes.alpha`.
 
     Raises:
-        BisectionError: The gap is not above twice the model error and rounding.
+        BisectionError: The gap does not exceed twice the model error and rounding.
     """
     direct = direct_error_in_steps(model)
-    model, error = model.in_units(scale), model_error / scale
+    model = model.in_units(scale)
+    error = model_error / scale
     rounding = Remainder(model, *model.boxes.unit_ends(0)).margin[..., 0]
-    # so that rounding does not lift the gap above what was asked for
+    # Model error and rounding are added to the bounds on either side. The search has the rest of
+    # the gap, a little less so that rounding does not make the sum larger than the gap.
     least_gap = float((2 * error + rounding).max())
     search_gap = (1 - 1e-6) * gap - least_gap
     if search_gap <= 0:
         what = f"rounding and errors of the modes, {least_gap:.3g}, pass the gap of {gap:.3g}"
         raise BisectionError(what, "take the method dual, a shorter duration or a wider gap")
-    levels, of_levels = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
-    for level in reversed(range(levels)):
-        tick = subprogress(progress, len(of_levels) / levels, (len(of_levels) + 1) / levels)
+
+    n_levels = len(model.boxes.alpha)
+    all_optima: list[Optima] = []  # from the narrowest level on, as the two following lists
+    all_proved: list[Array] = []
+    n_boxes: list[int] = []
+    for done, level in enumerate(reversed(range(n_levels))):
         lower, upper = model.boxes.unit_ends(level)
         optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
-        if of_levels:  # what the level inside attains is attained here too
-            inside = of_levels[-1][0]
+        if all_optima:  # a wider box contains what the narrower one attains
+            inside = all_optima[-1]
             better = inside.value > optima.value
-            optima.value[better], optima.point[better] = inside.value[better], inside.point[better]
-        proved, used = enclosed(
-            *(model, lower, upper, optima),
+            optima.value[better] = inside.value[better]
+            optima.point[better] = inside.point[better]
+        proved, count = enclosed(
+            model,
+            lower,
+            upper,
+            optima,
             gap=search_gap,
             budget=budget,
             workers=workers,
-            progress=tick,
+            progress=subprogress(progress, done / n_levels, (done + 1) / n_levels),
         )
-        LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], used)
-        of_levels.append((optima, proved, used))
+        LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], count)
+        all_optima.append(optima)
+        all_proved.append(proved)
+        n_boxes.append(count)
+
     error_between = _error_between_nodes(model, error, direct=direct / scale)
     between = (_line_deviation(model) + error_between) * scale
     facts = {
         "model_error": float(error.max()),
         "degree": model.degree,
-        "boxes": sum(used for *_, used in of_levels) / levels,
-        "evaluations": 1 / levels,
+        "boxes": sum(n_boxes) / n_levels,
+        "evaluations": 1 / n_levels,
     }
-    shape, bounds, outer = (*error.shape, 2), list[BoxBounds](), np.full(2 * error.size, np.inf)
-    shares = np.broadcast_to(tail_shares(model), (*shape[1:], len(model.boxes.names)))
-    for optima, proved, _ in reversed(of_levels):
-        outer = np.minimum(outer, proved)  # what holds on a wider level holds on those inside it
-        inner = optima.value.reshape(shape) - (error + rounding)[..., None]
-        bounds.append(
-            BoxBounds(
-                outer=(outer.reshape(shape) + error[..., None]) * scale[:, None],
-                inner=inner * scale[:, None],
-                at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
-                between=between,
-                shares=shares,
-                attained_error=2 * (error + rounding) * scale,
-                facts=facts,
-            )
+    shape = (*error.shape, 2)
+    fractions = np.broadcast_to(_error_fractions(model), (*shape[1:], len(model.boxes.names)))
+    attained_error = error + rounding
+    bounds = []
+    outer = np.full(2 * error.size, np.inf)
+    for optima, proved in zip(reversed(all_optima), reversed(all_proved), strict=True):
+        outer = np.minimum(outer, proved)  # a narrower box lies inside the wider ones
+        inner = optima.value.reshape(shape) - attained_error[..., np.newaxis]
+        box_bounds = BoxBounds(
+            outer=(outer.reshape(shape) + error[..., np.newaxis]) * scale[:, np.newaxis],
+            inner=inner * scale[:, np.newaxis],
+            at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
+            between=between,
+            shares=fractions,
+            attained_error=2 * attained_error * scale,
+            facts=facts,
         )
+        bounds.append(box_bounds)
     return bounds
 
 
 def _line_deviation(model: ModalModel) -> Array:
-    """Bound of how far outputs lie beyond both their values in the step to each node, (T, m).
+    """Return a bound of how far the model lies beyond both ends of a step within the step.
 
-    Where no force jumps, it bounds how far they stray from a straight line there.
+    If no force jumps in the step, it is a bound of the distance from a straight line.
+
+    Returns:
+        Bound for the step before each node, shape (times, outputs), in the units of the model.
+
+    Raises:
+        UnprovedError: A mode may not oscillate.
     """
-    reach, rate = np.ones(len(model.boxes.names)), model.eigenvalue
-    growth, spread = largest_growth(rate, reach), rate.imag.deviation()
-    decay = -growth, rate.real.deviation() - rate.value.real  # least and greatest of each mode
-    omega = np.abs(rate.value.imag) - spread, np.abs(rate.value.imag) + spread
+    # With the eigenvalue λ = -g ± iω of a mode, the ranges of g and ω over the box, shape (2,
+    # modes), and those of q = g/ω.
+    eigenvalue = model.eigenvalue
+    growth = largest_growth(eigenvalue, np.ones(len(model.boxes.names)))
+    decay = np.stack([-growth, eigenvalue.real.deviation() - eigenvalue.value.real])
+    radius = eigenvalue.imag.deviation()
+    midpoint = np.abs(eigenvalue.value.imag)
+    omega = np.stack([midpoint - radius, midpoint + radius])
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
-    grids = list[Array]()
+    q_lower = (decay[0] / omega).min(axis=0)
+    q_upper = (decay[1] / omega).max(axis=0)
+    grids = []  # of σ = (-q + i) ω for each mode
     for k in range(model.count):
-        q = min(decay[0][k] / w[k] for w in omega), max(decay[1][k] / w[k] for w in omega)
-        along_omega = np.linspace(omega[0][k], omega[1][k], int(numbers.DEVIATION_POINTS))
-        grids.append(np.multiply.outer(-np.linspace(*q, 3) + 1j, along_omega))
-    responses = list[Response]()
+        along_omega = np.linspace(omega[0, k], omega[1, k], numbers.DEVIATION_POINTS)
+        along_q = np.linspace(q_lower[k], q_upper[k], 3)
+        grids.append(np.multiply.outer(-along_q + 1j, along_omega))
+
+    responses = []
     for part in motion_parts(model, growth):
         load = None if part.load is None else part.load.history
-        spreads = 2 * np.stack([part.share.real.deviation(), part.share.imag.deviation()], 1)
-        # of a load itself by the first mode's share
-        of_modes = [None] if isinstance(part.load, Direct) else grids
-        for k, sigma in enumerate(of_modes):
+        deviations = [part.share.real.deviation(), part.share.imag.deviation()]
+        radii = 2 * np.stack(deviations, axis=1)
+        # What a force adds at once is proportional to the force, with the first coefficient.
+        sigmas: list[Array | None] = [*grids]
+        if isinstance(part.load, Direct):
+            sigmas = [None]
+        for k, sigma in enumerate(sigmas):
             shape = (1, 1) if sigma is None else sigma.shape
-            kappa = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
-            responses.append(Response(sigma, load, 0, kappa, spreads[k]))
-    by_magnitude = np.sum([x.line_deviation(model.flow.time) for x in responses], axis=0)
-    straying = narrowed_straying(responses, model.flow.time, by_magnitude)
-    return narrowed_at_jumps(responses, model.flow.time, straying)
+            coefficient = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
+            responses.append(Response(sigma, load, 0, coefficient, radii[k]))
+    time = model.flow.time
+    by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)
+    deviation = narrowed_straying(responses, time, by_magnitude)
+    return narrowed_at_jumps(responses, time, deviation)
 
 
 def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:
-    """Bound of what the model's error in the step to a node exceeds its smaller end by, (T, m).
+    """Return by how much the error of the model may exceed its smaller end within a step.
 
     Args:
         model: The model.
-        error: Bound of its error at nodes, shape (T, m).
-        direct: Bound of the part of the error within the step to each node that is in what forces
-            add to outputs at once, shape (T, m); it may be zero at the nodes.
+        error: Bound of its error at the nodes, shape (times, outputs).
+        direct: Bound of the error within the step before each node of what forces add to outputs at
+            once, same shape; it may be zero at the nodes.
+
+    Returns:
+        Bound for the step before each node, same shape.
     """
-    # All but that part decays no faster than exp(g t), g < 0 the least growth rate: within a step
-    # of length h it is at most exp(−g h) times what it is at the end.
-    exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
-    swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
-    added = np.zeros_like(error)
+    # All of the error but `direct` decays no faster than exp(g t), where g < 0 is the smallest
+    # growth rate. Within a step of the length h it is at most exp(-g h) times its value at the end.
+    rate = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
+    swell = float(np.exp(np.maximum(-rate, 0.0).max() * model.flow.step))
     within = swell * np.maximum(error[1:], error[:-1]) + direct[1:]
+    added = np.zeros_like(error)
     added[1:] = within - np.minimum(error[1:], error[:-1])
     return added
 
 
-def tail_shares(model: ModalModel) -> Array:
-    """Return each input's fraction of the terms of highest degree, about its part in the error."""
-    index = model.eigenvalue.exponents  # of the terms, (terms, d)
-    top = index.sum(1) == model.degree
-    weight = np.zeros(len(index))
+def _error_fractions(model: ModalModel) -> Array:
+    """Return an estimate of the fraction of each input in the error of a model, shape (inputs,).
+
+    It is the fraction of the input in the terms of the highest degree.
+    """
+    exponents = model.eigenvalue.exponents  # (terms, inputs)
+    weight = np.zeros(len(exponents))
     for polynomials in (model.eigenvalue, model.coefficient):
-        size = np.abs(polynomials.coefficients).reshape(len(index), -1)
-        weight += (size / np.maximum(size.max(0), 1e-300)).max(1)
-    shares = weight[top] @ index[top]
-    return np.asarray(shares / max(float(shares.sum()), 1e-300))
+        magnitudes = np.abs(polynomials.coefficients).reshape(len(exponents), -1)
+        largest = np.maximum(magnitudes.max(axis=0), 1e-300)
+        weight += (magnitudes / largest).max(axis=1)
+    is_highest = exponents.sum(axis=1) == model.degree
+    by_input = weight[is_highest] @ exponents[is_highest]
+    return np.asarray(by_input / max(float(by_input.sum()), 1e-300))
 
 
-def _max_degree(d: int) -> int:
-    degree = int(numbers.MAX_DEGREE)
-    while comb(d + degree, d) > numbers.MAX_TERMS:
+def _max_degree(n_inputs: int) -> int:
+    """Return the largest degree of polynomials of so many inputs with at most `MAX_TERMS` terms."""
+    degree = numbers.MAX_DEGREE
+    while comb(n_inputs + degree, n_inputs) > numbers.MAX_TERMS:
         degree -= 1
     return degree
