@@ -21,7 +21,7 @@ from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import arias_fractions
-from alphacut.frame.structures.linear import LinearSystem, has_matrices, modal_damping_ratios
+from alphacut.frame.structures.linear import LinearSystem, has_matrices, nominal_modes
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy import FuzzyNumber
@@ -50,8 +50,9 @@ def nominal_mode(model: StructureModel) -> NominalMode:
     if not has_matrices(model):
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
-    omega, ratios = modal_damping_ratios(model)
-    return NominalMode(period=2 * pi / float(omega[0]), ratio=float(ratios[0]))
+    modes = nominal_modes(model)
+    period = 2 * pi / float(modes.frequencies[0])
+    return NominalMode(period=period, ratio=float(modes.damping_ratios[0]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) + Σ b_i(p) f_i(t) (section 6.1).
 
 A structure is written once, as an `Assembly` over both number types: jets at S parameter sets,
-which `evaluate` condenses to `Matrices`, and Taylor models over a box. In shapes, … is the S
-parameter sets of jets, and nothing for Taylor models.
+which `evaluate` condenses to `Matrices`, and Taylor models over a box. In shapes, … stands for the
+S parameter sets of jets, and for nothing of Taylor models.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Generic, Self, TypeGuard, TypeVar, cast
+from typing import Any, Generic, NamedTuple, Self, TypeGuard, TypeVar, cast
 
 import numpy as np
 
@@ -28,27 +28,28 @@ Number = TypeVar("Number", Jet, TaylorModel)
 
 @dataclass(frozen=True, eq=False)
 class Assembly(Generic[Number]):
-    """A structure of n unknowns and m outputs with its parameters as jets or as Taylor models.
+    """A structure of n unknowns and m outputs whose parameters are jets or Taylor models.
 
-    Its damping is D = dashpots + a M + b K_springs + 2 M Φ diag(ζ_k ω_k) Φᵀ M.
+    Its damping matrix is D = dashpots + a M + b K_springs + 2 M Φ diag(ζ_k ω_k) Φᵀ M.
 
     Args:
         mass: M, shape (…, n, n), in kg.
-        springs: K of the springs, shape (…, n, n), in N/m.
-        weights: What weights take from K (P-Delta), the same shape; None for nothing.
-        dashpots: Their part of D, shape (…, n, n), in N s/m.
+        springs: Stiffness K_springs of the springs, shape (…, n, n), in N/m.
+        weights: What weights subtract from the stiffness (P-Delta), the same shape; None for none.
+        dashpots: Damping matrix of the dashpots, shape (…, n, n), in N s/m.
         rayleigh: a in 1/s and b in s, shape (…) each.
         ratios: ζ, shape (…) each: none, one of all modes, or one of each by rising frequency.
         q0: Initial displacements, shape (…, n), in m.
         v0: Initial velocities, shape (…, n), in m/s.
-        row_factors: What the outputs' rows are multiplied by, shape (…, m).
-        rows: What outputs take of [q; v], shape (m, 2n), or (…, m, 2n) where parameters are in it.
-        accelerated: What they take of absolute accelerations, shape (m, n).
-        pattern: ι, how the unknowns move rigidly with the ground, shape (n,).
-        massive: Unknowns that have mass, rising.
+        row_factors: Factors of the rows of the outputs, shape (…, m).
+        rows: Coefficients of the outputs on [q; v], shape (m, 2n), or (…, m, 2n) if they depend on
+            parameters.
+        accelerated: Coefficients of the outputs on absolute accelerations, shape (m, n).
+        pattern: ι, the displacements under a unit displacement of the ground, shape (n,).
+        massive: Indices of the unknowns that have mass, rising.
         loads: Forces on unknowns that have mass.
-        columns: Each of them at the amplitude 1 of its history, shape (…, n, F), in N, impulses in
-            N s; None where there are none.
+        columns: Each of them at the amplitude 1 of its history, shape (…, n, forces), in N, that of
+            an impulse in N s; None without forces.
     """
 
     mass: Number
@@ -74,30 +75,40 @@ class Assembly(Generic[Number]):
 
     @property
     def forces(self) -> Number | None:
-        """Columns b, one a history of forces, shape (…, n, H), in N; None without one."""
-        keys = [force.history and force.history.identity for force in self.loads]
-        columns = [history.identity for history in distinct_histories(self.loads)]
-        return self._summed(np.array([[key == x for x in columns] for key in keys], float))
+        """Force under a unit of each distinct history, shape (…, n, H), in N; None without one."""
+        histories = distinct_histories(self.loads)
+        belongs = np.zeros((len(self.loads), len(histories)))
+        for row, force in zip(belongs, self.loads, strict=True):
+            if force.history is not None:
+                row[:] = [force.history.identity == history.identity for history in histories]
+        return self._summed(belongs)
 
     @property
     def static(self) -> Number | None:
         """Force under which the structure rests at the start besides q0, shape (…, n, 1)."""
-        histories = [force.history for force in self.loads]
-        first = [x.values(np.zeros(1))[0] if x and x.is_static else 0.0 for x in histories]
-        return self._summed(np.array(first, float)[:, None])
+        first_values = np.zeros((len(self.loads), 1))
+        for row, force in zip(first_values, self.loads, strict=True):
+            if force.history is not None and force.history.is_static:
+                row[:] = force.history.values(np.zeros(1))
+        return self._summed(first_values)
 
     @property
     def impulse(self) -> Number | None:
-        """Impulse at t = 0, shape (…, n, 1), in N s; v0 comes before it."""
+        """Impulse at t = 0, shape (…, n, 1), in N s; v0 is the velocity before it."""
         return self._summed(np.array([[float(force.history is None)] for force in self.loads]))
 
-    def _summed(self, weight: Array) -> Number | None:
-        """Σ_F b_F weight_Fk over all forces, shape (…, n, k); None where all are zero."""
-        return self.columns @ weight if self.columns is not None and weight.any() else None
+    def _summed(self, weights: Array) -> Number | None:
+        """Return the sums of the forces with weights (forces, k), shape (…, n, k).
+
+        None where all weights are zero.
+        """
+        if self.columns is None or not weights.any():
+            return None
+        return self.columns @ weights
 
 
 def stack(values: Sequence[Number]) -> Number:
-    """Joins numbers shape (…) to one of shape (…, e)."""
+    """Return e numbers of shape (…) as one number of shape (…, e)."""
     return type(values[0]).stack(values)
 
 
@@ -163,20 +174,34 @@ def has_matrices(model: object) -> TypeGuard[LinearSystem]:
 
 
 def histories(system: LinearSystem) -> dict[str, History]:
-    """Histories of all loads by name, in the order of `Matrices.pushes`: load, force1, …."""
-    of_ground = {} if system.ground is None else {"load": system.ground}
-    of_forces = enumerate(distinct_histories(system.loads), start=1)
-    return of_ground | {f"force{k}": history for k, history in of_forces}
+    """Return the histories of all loads by name, as "load" of the ground and "force1" of a force.
+
+    Their order is that of the columns of `Matrices.pushes`.
+    """
+    named: dict[str, History] = {} if system.ground is None else {"load": system.ground}
+    for number, history in enumerate(distinct_histories(system.loads), start=1):
+        named[f"force{number}"] = history
+    return named
 
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
     """The structure at S parameter sets, each entry a jet, its massless unknowns condensed.
 
-    Units are those of `Assembly`. Shapes are (S, n, n) of `mass`, `damping` and `stiffness`, (S, n,
-    1) of `q0`, `v0`, `static` and `impulse`, (S, n, H) of `forces`, (n, 1) of `rigid`, which is ι,
-    and (m, n) of `accelerated`: accelerations that outputs read besides their rows, to which a
-    force on the same unknown adds at once.
+    Units are those of `Assembly`.
+
+    Args:
+        mass: M, shape (S, n, n).
+        damping: D, shape (S, n, n).
+        stiffness: K, shape (S, n, n).
+        q0: Initial displacements, shape (S, n, 1).
+        v0: Initial velocities, shape (S, n, 1).
+        rigid: ι, shape (n, 1).
+        accelerated: Coefficients of the outputs on absolute accelerations, shape (m, n). A force on
+            an accelerated unknown adds to the output at once.
+        forces: Force under a unit of each history, shape (S, n, H); None without one.
+        static: Force under which the structure rests at the start, shape (S, n, 1), if any.
+        impulse: Impulse at t = 0, shape (S, n, 1), if any.
     """
 
     mass: Jet
@@ -197,7 +222,7 @@ class Matrices:
 
     @property
     def start(self) -> Jet:
-        """Initial state [q; v], shape (S, 2n, 1)."""
+        """Initial state [q; v], shape (S, 2n, 1), under the static force and after the impulse."""
         q0, v0 = self.q0, self.v0
         if self.static is not None:
             q0 = q0 + inverse(self.stiffness) @ self.static
@@ -206,16 +231,23 @@ class Matrices:
         return concatenate([q0, v0], -2)
 
     def pushes(self, *, ground: bool) -> Jet:
-        """Accelerations by a unit of each load, the ground's first, shape (S, n, L)."""
+        """Return the accelerations by a unit of each load, shape (S, n, loads).
+
+        With `ground` the first column is that of the base excitation, −ι.
+        """
         shape = (*self.mass.value.shape[:-1], int(ground))
-        columns = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
+        of_ground = np.broadcast_to(self.rigid[:, : int(ground)], shape)
+        columns = [self.mass.like(-of_ground)]
         if self.forces is not None:
             columns.append(self.inverse_mass @ self.forces)
         return concatenate(columns, -1)
 
     @property
     def feeds(self) -> Jet | None:
-        """What a unit of each force adds to outputs at once, shape (S, m, H); None if nothing."""
+        """Feedthrough: what a unit of each force adds to outputs at once, shape (S, m, H).
+
+        None where forces add nothing at once.
+        """
         if self.forces is None or not self.accelerated.any():
             return None
         fed: Jet = self.accelerated @ self.pushes(ground=False)
@@ -230,33 +262,53 @@ def evaluate(
     derivatives: bool,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
-    """A structure's matrices and rows C at points (S, d) of d parameters, in SI units.
+    """Return the matrices of a structure and its output rows at S parameter sets.
 
-    Output is C [q; v], C of shape (S, m, 2n). Other parameters keep their nominal values. With
-    `derivatives` all are differentiated by `names`, twice. Without `by_ratios` damping lacks the
-    part that is given by ratios of the modes, which needs all modes.
+    Args:
+        system: The structure.
+        names: Names of d parameters; others keep their nominal values.
+        points: Their values in SI units, shape (S, d).
+        derivatives: Whether all is differentiated by them, twice.
+        by_ratios: Whether damping has the part that is given by ratios of the modes, which takes
+            all modes.
+
+    Returns:
+        The matrices, whose unknowns all have mass, and the rows C, shape (S, m, 2n), of the outputs
+        C [q; v].
+
+    Raises:
+        RefusedError: Damping is given by ratios, and the stiffness is not positive definite.
+        numpy.linalg.LinAlgError: The mass, or the stiffness of the massless unknowns, is singular.
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
-    values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
+    fixed_columns = np.tile(list(fixed.values()), (len(points), 1))
+    values = np.hstack([points, fixed_columns])
     p = variables(values, [*names, *fixed], names if derivatives else ())
     full = system.assembly(p)
-    n, a = len(full.pattern), full.massive
-    mass, stiffness, damping = full.mass, full.stiffness, full.dashpots
+
+    damping = full.dashpots
     for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
         if factor.value.any() or factor.first.any():
             damping = damping + factor[:, None, None] * matrix
+    mass, stiffness = full.mass, full.stiffness
     rows: Jet | Array = full.rows
-    if len(a) < n:  # unknowns b without mass are condensed, q_b = −K_bb⁻¹ K_ba q_a (Guyan 1965)
-        b, inner = np.setdiff1d(np.arange(n), a), (slice(None), a[:, None], a)
+
+    size, a = len(full.pattern), full.massive
+    if len(a) < size:
+        # Unknowns b without mass, damping and loads are in equilibrium with the others (Guyan
+        # 1965): q_b = T q_a with T = −K_bb⁻¹ K_ba. Then K_aa + K_ab T is the stiffness.
+        b = np.setdiff1d(np.arange(size), a)
         follow = -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
+        inner = (slice(None), a[:, None], a)
         mass, damping = mass[inner], damping[inner]
         stiffness = stiffness[inner] + stiffness[:, a[:, None], b] @ follow
-        # columns of displacements, then of velocities
-        columns = [full.rows[:, a + k] + full.rows[:, b + k] @ follow for k in (0, n)]
-        rows = concatenate(columns, -1)
+        on_displacements = full.rows[:, a] + full.rows[:, b] @ follow
+        on_velocities = full.rows[:, a + size] + full.rows[:, b + size] @ follow
+        rows = concatenate([on_displacements, on_velocities], -1)
     if full.ratios and by_ratios:
         damping = damping + modal_damping(mass, stiffness, full.ratios)
-    forces, static, impulse = (x and x[:, a] for x in (full.forces, full.static, full.impulse))
+
+    forces, static, impulse = full.forces, full.static, full.impulse
     matrices = Matrices(
         mass=mass,
         damping=damping,
@@ -265,67 +317,109 @@ def evaluate(
         v0=full.v0[:, a, None],
         rigid=full.pattern[a, None],
         accelerated=full.accelerated[:, a],
-        forces=forces,
-        static=static,
-        impulse=impulse,
+        forces=None if forces is None else forces[:, a],
+        static=None if static is None else static[:, a],
+        impulse=None if impulse is None else impulse[:, a],
     )
-    if full.accelerated.any():  # q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f
-        reading = matrices.accelerated @ matrices.inverse_mass
-        rows = rows - reading @ concatenate([stiffness, damping], -1)
+    if full.accelerated.any():
+        # the absolute acceleration is q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f, whose last term
+        # `Matrices.feeds` has
+        on_forces = matrices.accelerated @ matrices.inverse_mass
+        rows = rows - on_forces @ concatenate([stiffness, damping], -1)
     return matrices, full.row_factors[..., None] * rows
 
 
 def undamped_modes(mass: Array, stiffness: Array) -> tuple[Array, Array]:
-    """λ = ω², rising, and modes φ of K φ = λ M φ with φᵀM φ = 1, shapes (…, n) and (…, n, n)."""
-    inverse_factor = np.linalg.inv(np.linalg.cholesky(mass))  # L⁻¹ of M = L Lᵀ
+    """Return the undamped modes K φ = λ M φ with φᵀM φ = 1.
+
+    Args:
+        mass: Symmetric positive definite matrices M, shape (…, n, n).
+        stiffness: Symmetric matrices K, the same shape.
+
+    Returns:
+        The eigenvalues λ = ω², rising, shape (…, n), and the mode shapes as columns, shape
+        (…, n, n).
+
+    Raises:
+        numpy.linalg.LinAlgError: A mass matrix is not positive definite.
+    """
+    # With M = L Lᵀ the problem is L⁻¹ K L⁻ᵀ y = λ y, φ = L⁻ᵀ y.
+    inverse_factor = np.linalg.inv(np.linalg.cholesky(mass))
     transposed = inverse_factor.swapaxes(-1, -2)
     squared, vectors = np.linalg.eigh(inverse_factor @ stiffness @ transposed)
     return squared, transposed @ vectors
 
 
 def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
-    """D = M Φ diag(2 ζ_k ω_k) Φᵀ M, shape (S, n, n), in N s/m, with its derivatives.
+    """Return the damping matrix D = M Φ diag(2 ζ_k ω_k) Φᵀ M with its derivatives.
 
-    It follows the parameters through the modes Φ, and is not frozen at their nominal values. Modes
-    of one ratio may have equal frequencies.
+    D follows the parameters through the modes Φ, and is not frozen at their nominal values. Modes
+    of the same ratio may have equal frequencies.
 
-    M and K are symmetric and positive definite, shape (S, n, n). There is one ratio ζ, shape (S,),
-    of all modes, or one of each mode by rising frequency.
+    Args:
+        mass: Symmetric positive definite matrices M, shape (S, n, n).
+        stiffness: Symmetric positive definite matrices K, the same shape.
+        ratios: One ratio ζ, shape (S,), of all modes, or one of each mode by rising frequency.
+
+    Returns:
+        D, shape (S, n, n), in N s/m.
 
     Raises:
         RefusedError: A stiffness is not positive definite, but for rounding.
     """
-    squared, X = undamped_modes(mass.value, stiffness.value)
-    ratio = (squared / np.maximum(abs(squared).max(-1, keepdims=True), 1e-300)).min()
+    squared, shapes = undamped_modes(mass.value, stiffness.value)
+    largest = np.maximum(abs(squared).max(-1, keepdims=True), 1e-300)
+    ratio = (squared / largest).min()
     what = f"such that a squared frequency is {ratio:.1e} of the greatest"
     cure = "support what moves freely, join storeys that are too stiff, or give dampers"
     require(ratio > 1e-12, "stiffness", value=what, allowed="more than 1e-12 of it", cure=cure)
-    Y, A = X.swapaxes(-1, -2) @ mass.value, inverse(mass) @ stiffness
-    G, omega = Y @ A.first @ X, np.sqrt(squared)
-    total, number = mass * 0.0, np.full(squared.shape[-1], 0)
+
+    number = np.full(squared.shape[-1], 0)  # of the ratio of each mode
     if len(ratios) > 1:
         entries = [(x.value.tobytes(), x.first.tobytes(), x.second.tobytes()) for x in ratios]
-        same = [[x == y for y in entries] for x in entries]
-        number = np.argmax(same, axis=1)  # that of the first mode with the same ratio
+        # the number of the first mode with the same ratio
+        number = np.array([entries.index(entry) for entry in entries])
+
+    # With A = M⁻¹ K = Φ diag(λ) Φ⁻¹ and Φ⁻¹ = Φᵀ M, D is M Σ_k ζ_k f_k(A), where f_k(λ) = 2 √λ of
+    # the modes of ratio k and 0 of others. The derivatives of f(A) are (Daleckii and Krein, AMS
+    # Transl. 47, 1965), with G_i = Φ⁻¹ A_i Φ and divided differences f[·]:
+    #     (Φ⁻¹ f(A)_i Φ)_ab = f[λ_a, λ_b] (G_i)_ab,
+    #     (Φ⁻¹ f(A)_ij Φ)_ab = f[λ_a, λ_b] (Φ⁻¹ A_ij Φ)_ab
+    #         + Σ_c f[λ_a, λ_c, λ_b] ((G_i)_ac (G_j)_cb + (G_j)_ac (G_i)_cb).
+    inverse_shapes = shapes.swapaxes(-1, -2) @ mass.value
+    dynamic = inverse(mass) @ stiffness
+    first = inverse_shapes @ dynamic.first @ shapes
+    second = inverse_shapes @ dynamic.second @ shapes
+    omega = np.sqrt(squared)
+    total = mass * 0.0
     for k in np.unique(number):
-        # f(A) of f(λ) = 2 √λ for the modes of this ratio, 0 for others
-        quotients, second_quotients = _divided_differences(omega, number == k)
-        f = [np.where(number == k, 2 * omega, 0.0)[:, None] * X, quotients * G]
-        pairs = np.einsum("sikj,asik,bskj->absij", second_quotients, G, G, optimize=True)
-        bend = quotients * (Y @ A.second @ X) + pairs + pairs.swapaxes(0, 1)
-        of_modes = Jet.of(f[0] @ Y, X @ f[1] @ Y, X @ bend @ Y)  # Daleckii, Krein 1965
-        total = total + ratios[k][:, None, None] * (mass @ of_modes)
+        f = _divided_differences(omega, number == k)
+        pairs = np.einsum("sikj,asik,bskj->absij", f.second, first, first, optimize=True)
+        bend = f.first * second + pairs + pairs.swapaxes(0, 1)
+        value = np.where(number == k, 2 * omega, 0.0)[:, None] * shapes
+        function = Jet.of(
+            value @ inverse_shapes,
+            shapes @ (f.first * first) @ inverse_shapes,
+            shapes @ bend @ inverse_shapes,
+        )
+        total = total + ratios[k][:, None, None] * (mass @ function)
     return total
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
-    """Refuse modes of unequal damping ratio (n,) that change places between parameter sets.
+    """Refuse modes of unequal damping ratio that change places between parameter sets.
 
-    M and K are given at S sets, the nominal ones first, shape (S, n, n).
+    Args:
+        mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
+        stiffness: K at the same, shape (S, n, n).
+        ratios: Damping ratios of the modes by rising frequency, shape (n,).
+
+    Raises:
+        RefusedError: A mode is most similar to a nominal mode of another place and ratio.
     """
     shapes = undamped_modes(mass, stiffness)[1]
-    similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # of nominal shapes (rows) and others
-    nominal = similarity.argmax(1)  # the nominal mode that each mode is most like, (S, n)
+    similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # (S, nominal modes, modes)
+    nominal = similarity.argmax(axis=1)  # the nominal mode that each mode is most like, (S, n)
     for _, k in np.argwhere(ratios[nominal] != ratios):
         pair = f"modes {min(k, nominal[:, k].min()) + 1} and {max(k, nominal[:, k].max()) + 1}"
         what = f"unequal where {pair} may cross"
@@ -333,33 +427,45 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
         raise RefusedError("damping ratios", what, "modes apart", cure)
 
 
-def _divided_differences(omega: Array, inside: Mask) -> tuple[Array, Array]:
-    """f[λ_i, λ_j], (S, n, n), and f[λ_i, λ_k, λ_j], (S, n, n, n), of f = 2 √λ `inside`, else 0."""
-    # modes inside may have equal λ, not one inside and one outside
-    both_inside, sums = inside[:, None] & inside, omega[:, :, None] + omega[:, None]
-    gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
+class _DividedDifferences(NamedTuple):
+    """First and second divided differences, shapes (S, n, n) and (S, n, n, n)."""
+
+    first: Array
+    second: Array
+
+
+def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
+    """Return f[λ_i, λ_j] and f[λ_i, λ_k, λ_j], by [i, j] and [i, k, j], of a part of f = 2 √λ.
+
+    Args:
+        omega: ω = √λ of n modes at S parameter sets, shape (S, n). Modes inside may have equal
+            frequencies, but not one inside and one outside.
+        inside: Modes where f is 2 √λ, shape (n,); it is 0 at the others.
+    """
+    both_inside = inside[:, None] & inside
     one_inside = inside[:, None] != inside
-    f, safe = np.where(inside, 2 * omega, 0.0), np.where(one_inside, gaps, 1.0)
-    first = np.where(
-        both_inside, 2 / sums, np.where(one_inside, (f[:, :, None] - f[:, None]) / safe, 0.0)
-    )
-    # f[x, y, z] = (f[x, y] − f[y, z]) / (x − z) by a pair of which one is inside, one outside
-    i_k = (first[:, :, None] - first[:, None]) / safe[..., None]
-    i_j = (first[..., None] - first[:, None]) / safe[:, :, None]
+    f = np.where(inside, 2 * omega, 0.0)
+    sums = omega[:, :, None] + omega[:, None]
+    gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
+    safe_gaps = np.where(one_inside, gaps, 1.0)
+
+    # 2 (√x − √y) / (x − y) = 2 / (√x + √y) has no cancellation where both modes are inside.
+    quotients = (f[:, :, None] - f[:, None]) / safe_gaps
+    first = np.where(both_inside, 2 / sums, np.where(one_inside, quotients, 0.0))
+
+    # Inside, f[x, y, z] = −2 / ((√x + √y) (√y + √z) (√z + √x)). Else it is the quotient
+    # (f[x, y] − f[y, z]) / (x − z) by a pair of which one mode is inside and one outside.
     closed = -2 / (sums[..., None] * sums[:, None] * sums[:, :, None])
-    mixed = np.where(one_inside[..., None], i_k, np.where(one_inside[:, None], i_j, 0.0))
-    return first, np.where(both_inside[..., None] & inside, closed, mixed)
+    by_i_k = (first[:, :, None] - first[:, None]) / safe_gaps[..., None]
+    by_i_j = (first[..., None] - first[:, None]) / safe_gaps[:, :, None]
+    mixed = np.where(one_inside[..., None], by_i_k, np.where(one_inside[:, None], by_i_j, 0.0))
+    second = np.where(both_inside[..., None] & inside, closed, mixed)
+    return _DividedDifferences(first, second)
 
 
 def frequencies(system: LinearSystem) -> Array:
-    """Undamped angular frequencies at the nominal parameters, rising, shape (n,), in rad/s."""
-    return modal_damping_ratios(system)[0]
-
-
-def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
-    """Undamped ω in rad/s and ratios φᵀDφ/(2ω) of all modes at nominal values, shape (n,) each."""
-    modes = nominal_modes(system)
-    return modes.frequencies, modes.damping_ratios
+    """Return the undamped ω at the nominal parameters, rising, shape (n,), in rad/s."""
+    return nominal_modes(system).frequencies
 
 
 @dataclass(frozen=True, eq=False)
@@ -383,10 +489,15 @@ class NominalModes:
 def nominal_modes(system: LinearSystem) -> NominalModes:
     """Return the undamped modes at the nominal parameters."""
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
-    M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
-    squared, shapes = undamped_modes(M, K)
+    mass, damping = matrices.mass.value[0], matrices.damping.value[0]
+    squared, shapes = undamped_modes(mass, matrices.stiffness.value[0])
     omega = np.sqrt(np.maximum(squared, 0.0))
-    ratios = np.einsum("ik,ij,jk->k", shapes, D, shapes) / np.maximum(2 * omega, 1e-300)
+    modal_damping_constants = np.einsum("ik,ij,jk->k", shapes, damping, shapes)
     influence = matrices.rigid[:, 0]
-    participation = shapes.T @ M @ influence
-    return NominalModes(omega, ratios, participation**2, float(influence @ M @ influence))
+    participation = shapes.T @ mass @ influence
+    return NominalModes(
+        frequencies=omega,
+        damping_ratios=modal_damping_constants / np.maximum(2 * omega, 1e-300),
+        effective_masses=participation**2,
+        moved_mass=float(influence @ mass @ influence),
+    )
