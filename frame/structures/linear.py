@@ -374,7 +374,7 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     cure = "support what moves freely, join storeys that are too stiff, or give dampers"
     require(ratio > 1e-12, "stiffness", value=what, allowed="more than 1e-12 of it", cure=cure)
 
-    number = np.full(squared.shape[-1], 0)  # of the ratio of each mode
+    number: Ints = np.zeros(squared.shape[-1], int)  # of the ratio of each mode
     if len(ratios) > 1:
         entries = [(x.value.tobytes(), x.first.tobytes(), x.second.tobytes()) for x in ratios]
         # the number of the first mode with the same ratio

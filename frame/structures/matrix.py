@@ -94,17 +94,17 @@ class MatrixStructure(LinearSystem):
 
     def __post_init__(self) -> None:
         """Store terms and loads as tuples; refuse values that are not allowed."""
-        for kind in ("parameters", "observed"):
-            value = getattr(self, kind)
+        for name in ("parameters", "observed"):
+            value = getattr(self, name)
             is_table = isinstance(value, Mapping)
-            require(is_table, kind, value=type(value).__name__, allowed="a dict by name")
-        for kind in KINDS[:3]:
+            require(is_table, name, value=type(value).__name__, allowed="a dict by name")
+        for kind in KINDS:
             require_sequence(kind, getattr(self, kind), "a list of pairs (factor, array)")
         require_sequence("ratios", self.ratios, "a list of damping ratios")
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
-        for kind in ("mass", "stiffness", "observed"):
-            require(len(getattr(self, kind)) > 0, kind, value=None, allowed="one entry at least")
+        for name in ("mass", "stiffness", "observed"):
+            require(len(getattr(self, name)) > 0, name, value=None, allowed="one entry at least")
         require_names("name of a parameter", self.parameters)
         require_names("name of an output", self.observed)
         require_loads(self.ground, self.loads)
@@ -117,14 +117,22 @@ class MatrixStructure(LinearSystem):
         for name, factor in self.row_factors.items():
             require_choice("row_factors", name, self.observed)
             self._require_factor(f"observed: {name}", factor)
+        self._require_forces_on_masses()
+        self._require_ratios()
+
+    def _require_forces_on_masses(self) -> None:
         for force in self.loads:
             self._require_factor("a force", force.amplitude)
             missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
             what, allowed = f"on unknowns {missing}", "on unknowns that have mass"
             require(not len(missing), "force", value=what, allowed=allowed)
-        ratios = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
-        are_ratios = all(Parameter("", range=RATIO).admits(x, x) for x in ratios)
-        is_allowed = are_ratios and len(ratios) in (0, 1, len(self.massive))
+
+    def _require_ratios(self) -> None:
+        """Refuse damping ratios outside [0, 1), and a number of them that is not that of modes."""
+        is_allowed = len(self.ratios) in (0, 1, len(self.massive))
+        for ratio in self.ratios:
+            value = self.parameters.get(ratio, np.nan) if isinstance(ratio, str) else ratio
+            is_allowed = is_allowed and Parameter("", range=RATIO).admits(value, value)
         allowed = f"one number or parameter, or one a mode, {RATIO}"
         require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
 
@@ -149,12 +157,20 @@ class MatrixStructure(LinearSystem):
         return np.setdiff1d(np.arange(self.size), self.massive)
 
     def nominal_terms(self, kind: str) -> Array:
-        """Terms of the matrix "mass" or "stiffness" at nominal parameters, shape (terms, n, n)."""
+        """Return the terms of M, D or K at nominal parameters, shape (terms, n, n).
+
+        Args:
+            kind: "mass", "damping" or "stiffness".
+        """
         factors = [float(value_of(factor, self.parameters)) for factor, _ in getattr(self, kind)]
         return np.array(factors)[:, None, None] * self._arrays[kind]
 
     def _require_definite(self) -> None:
-        mass, stiffness = (self.nominal_terms(x).sum(axis=0) for x in ("mass", "stiffness"))
+        """Refuse a mass or stiffness that is not positive definite where it has to be.
+
+        That is M over the unknowns that have mass, and K over the others, which have no dampers.
+        """
+        mass, stiffness = self.nominal_terms("mass").sum(axis=0), self.nominal_terms("stiffness")
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
@@ -163,13 +179,14 @@ class MatrixStructure(LinearSystem):
         if (traces < 0).any():
             cure = f"turn the sign of term {int(traces.argmin()) + 1}: it seems to be −M"
         require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
-        self._require_stable(stiffness)
+        total = stiffness.sum(axis=0)
+        self._require_stable(total)
         if not len(b):
             return
-        least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
+        smallest = np.linalg.eigvalsh(total[np.ix_(b, b)]).min() / np.abs(total).max()
         allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
-        require(least > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
-        damped = [int(k) for k in b if any(array[k].any() for _, array in self.damping)]
+        require(smallest > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
+        damped = [int(k) for k in b if self._arrays["damping"][:, k].any()]
         what, allowed = f"of unknowns {damped[:5]} without mass", "dampers between those with mass"
         require(not damped, "damping", value=what, allowed=allowed)
 
@@ -238,28 +255,47 @@ class MatrixStructure(LinearSystem):
                 )
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
-        """A term of a matrix: its factor, and its dense or sparse array made exactly symmetric."""
+        """Return the factor and the array of a term of a matrix.
+
+        Args:
+            kind: "mass", "damping" or "stiffness".
+            term: Pair (factor, array), dense or sparse, of the user's.
+
+        Returns:
+            The factor, as simple as it is, and the dense array, which is made exactly symmetric.
+
+        Raises:
+            RefusedError: The term is no such pair, or the array is not symmetric.
+        """
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         what, allowed = type(term).__name__, "pairs (factor, array)"
         require(is_pair, f"term of {kind}", value=what, allowed=allowed)
         factor, value = term
         self._require_factor(kind, factor)
-        factor = factor.simplest if isinstance(factor, Monomial) else factor
-        array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
-        size = np.shape(self.mass[0][1])[0]
+        if isinstance(factor, Monomial):
+            factor = factor.simplest
+        array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
+        size, key = np.shape(self.mass[0][1])[0], f"array of {kind}"
         what, allowed = f"of shape {array.shape}", f"({size}, {size})"
         cure = "all matrices have as many rows and columns as there are unknowns"
-        require(array.shape == (size, size), f"{key} {kind}", what, allowed, cure)
+        require(array.shape == (size, size), key, value=what, allowed=allowed, cure=cure)
         require_numbers(kind, array)
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
         is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
         allowed, cure = "symmetric arrays", "mirror one triangle"
-        require(is_symmetric, f"{key} {kind}", value=what, allowed=allowed, cure=cure)
+        require(is_symmetric, key, value=what, allowed=allowed, cure=cure)
         return factor, np.asarray((array + array.T) / 2, float)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
+        """Refuse a factor that gives no number, or one whose derivatives are not known.
+
+        Args:
+            kind: What the factor is of, for the message.
+            factor: A number, the name of a parameter, or a function, which is called once with
+                jets.
+        """
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
@@ -270,66 +306,81 @@ class MatrixStructure(LinearSystem):
         require(is_number, f"factor of {kind}", value=repr(value), allowed=allowed)
 
     def _require_vectors(self) -> None:
+        """Refuse initial values, rows of outputs and forces that do not fit the unknowns."""
         n = self.size
         vectors: list[tuple[str, Any]]
         vectors = [(name, getattr(self, name)) for name in ("q0", "v0", "pattern")]
         vectors += [(f"observed: {name}", row) for name, row in self.observed.items()]
         vectors += [("force", force.at) for force in self.loads]
         for name, value in vectors:
-            if value is not None:
-                require_numbers(name, value)
-                shapes = [(n,), (2 * n,)] if name.startswith("observed") else [(n,)]
-                what, allowed = f"of shape {np.shape(value)}", f"{' or '.join(map(str, shapes))}"
-                require(np.shape(value) in shapes, name, value=what, allowed=allowed)
+            if value is None:
+                continue
+            require_numbers(name, value)
+            shapes = [(n,)]
+            if name.startswith("observed"):
+                shapes.append((2 * n,))
+            what, allowed = f"of shape {np.shape(value)}", " or ".join(map(str, shapes))
+            require(np.shape(value) in shapes, name, value=what, allowed=allowed)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Matrices, rows and loads at parameters `p`, jets or Taylor models."""
+        """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""
         n = self.size
-        nothing: Number = lifted(0.0, p)
-        shape = (*nothing.value.shape, n)
-        q0, v0 = (np.zeros(n) if x is None else x for x in (self.q0, self.v0))
-        mass, damping, stiffness = (
-            values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
+        zero: Number = lifted(0.0, p)
+        matrices = {
+            kind: values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
             for kind, arrays in self._arrays.items()
-        )
-        forces = values_of([force.amplitude for force in self.loads], p)
-        placed = np.array([force.at for force in self.loads], float).reshape(-1, n)
+        }
+        rows = np.zeros((len(self.observed), 2 * n))
+        for row, observed in zip(rows, self.observed.values(), strict=True):
+            row[: len(observed)] = observed
+        columns: Number | None = None
+        if self.loads:
+            amplitudes = values_of([force.amplitude for force in self.loads], p)
+            unit_forces = np.array([force.at for force in self.loads], float)
+            columns = amplitudes[..., None, :] * unit_forces.T
         return Assembly(
-            mass=mass,
-            springs=stiffness,
+            mass=matrices["mass"],
+            springs=matrices["stiffness"],
             weights=None,
-            dashpots=damping,
-            rayleigh=(nothing, nothing),
+            dashpots=matrices["damping"],
+            rayleigh=(zero, zero),
             ratios=[lifted(ratio, p) for ratio in self.ratios],
-            q0=nothing.like(np.broadcast_to(q0, shape)),
-            v0=nothing.like(np.broadcast_to(v0, shape)),
+            q0=self._start(self.q0, zero),
+            v0=self._start(self.v0, zero),
             row_factors=values_of([self.row_factors.get(x, 1.0) for x in self.observed], p),
-            rows=np.array([np.pad(x, (0, 2 * n - len(x))) for x in self.observed.values()], float),
+            rows=rows,
             accelerated=np.zeros((len(self.observed), n)),
             pattern=np.ones(n) if self.pattern is None else np.asarray(self.pattern, float),
             massive=self.massive,
             loads=self.loads,
-            columns=forces[..., None, :] * placed.T if self.loads else None,
+            columns=columns,
         )
+
+    def _start(self, values: Array | None, zero: Number) -> Number:
+        """Return initial values as a number of the type of `zero`; 0 where none are given."""
+        given = np.zeros(self.size) if values is None else values
+        return zero.like(np.broadcast_to(given, (*zero.value.shape, self.size)))
 
     @cached_property
     def _arrays(self) -> dict[str, Array]:
-        """Arrays of the terms by kind, shape (terms, n, n) each."""
-        shape = (-1, self.size, self.size)
-        terms = {kind: [array for _, array in getattr(self, kind)] for kind in KINDS}
-        return {kind: np.array(arrays, float).reshape(shape) for kind, arrays in terms.items()}
+        """Arrays of the terms of M, D and K by their kinds, shape (terms, n, n) each."""
+        arrays: dict[str, Array] = {}
+        for kind in KINDS:
+            terms = [array for _, array in getattr(self, kind)]
+            arrays[kind] = np.array(terms, float).reshape(-1, self.size, self.size)
+        return arrays
 
 
 def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) -> Number:
-    """Values of e factors at parameters shape (…) as one number shape (…, e)."""
+    """Return the values of e factors at parameters of shape (…) as one number of shape (…, e)."""
     if not factors:
-        nothing: Number = lifted(0.0, p)
-        return nothing.like(np.zeros((*nothing.value.shape, 0)))
+        zero: Number = lifted(0.0, p)
+        return zero.like(np.zeros((*zero.value.shape, 0)))
     return stack([lifted(factor, p) for factor in factors])
 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
-    """A factor's value at parameters as a number of their type, shape (…)."""
+    """Return the value of a factor at parameters, as a number of their type, shape (…)."""
     value = value_of(factor, p)
     like: Number = next(iter(p.values()))
     if isinstance(value, type(like)):
@@ -338,18 +389,19 @@ def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
 
 
 def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
-    """A factor's value at parameters."""
+    """Return the value of a factor: a number, the name of a parameter, or a function of them."""
     if isinstance(factor, str):
         return p[factor]
     return factor(p) if callable(factor) else factor
 
 
 def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
-    """Fraction of each mode's strain energy in some terms of K = Σ K_i, shape (modes,).
+    """Return the fraction of the strain energy of each mode in some terms of K, shape (modes,).
 
-    It is Σ φᵀK_i φ / φᵀK φ over the terms K_i of these indices, for the modes φ by rising
-    frequency. The loss factor of a mode is to first order the mean of those of its parts with these
-    weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
+    With K = Σ K_i it is Σ φᵀK_i φ / φᵀK φ over the terms K_i of these indices, for the modes φ by
+    rising frequency. To first order the loss factor of a mode is the mean of those of its parts
+    with these weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982). The modes are those at
+    nominal values.
     """
     unit: Array = np.eye(system.size)
     every_unknown = {f"u{k}": unit[k] for k in range(system.size)}
@@ -362,9 +414,11 @@ def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints)
     return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
 
 
-NUMBER = r"[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?"
-BASE = rf"(?:(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<number>{NUMBER}))"
-FACTOR = re.compile(rf"\s*{BASE}\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*")
+FACTOR = re.compile(
+    r"\s*(?:(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<number>[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?))"
+    r"\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*"
+)
+"""A name or a number with a whole exponent, as l^3 or 12."""
 
 
 @dataclass(frozen=True)
@@ -385,19 +439,23 @@ class Monomial:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """The monomial of a text such as "12*E*I/l^3", of ``*``, ``/`` and ``^`` or ``**``.
+        """Return the monomial of a text such as "12*E*I/l^3", of ``*``, ``/`` and ``^`` or ``**``.
 
         Raises:
             RefusedError: The text is another kind of expression.
         """
-        coefficient, powers = 1.0, dict[str, int]()
+        coefficient = 1.0
+        powers: dict[str, int] = {}
         tokens = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
-        for operator, token in zip(["*", *tokens[1::2]], tokens[::2], strict=True):
+        operators = ["*", *tokens[1::2]]
+        for operator, token in zip(operators, tokens[::2], strict=True):
             match = FACTOR.fullmatch(token)
             if match is None:
                 allowed = 'a product of powers of parameters, as "1", "Ec" or "2*E*I*l^-2"'
                 raise RefusedError("factor", repr(text[:60]), allowed)
-            power = int(match["power"] or 1) * (1 if operator == "*" else -1)
+            power = int(match["power"] or 1)
+            if operator == "/":
+                power = -power
             if name := match["name"]:
                 powers[name] = powers.get(name, 0) + power
             else:
@@ -405,21 +463,24 @@ class Monomial:
         return cls(coefficient, tuple((name, k) for name, k in powers.items() if k))
 
     def __str__(self) -> str:
-        """The factors as they are parsed, such as 12*E*I*l^-3."""
-        powers = [name if k == 1 else f"{name}^{k}" for name, k in self.powers]
-        has_number = self.coefficient != 1 or not powers
-        return "*".join([f"{self.coefficient:g}"] * has_number + powers)
+        """Return the factors as they are parsed, such as 12*E*I*l^-3."""
+        factors = [name if power == 1 else f"{name}^{power}" for name, power in self.powers]
+        if self.coefficient != 1 or not factors:
+            factors.insert(0, f"{self.coefficient:g}")
+        return "*".join(factors)
 
     @property
     def simplest(self) -> Monomial | str | float:
-        """The number or parameter's name if it is one, of which proofs know more; else itself."""
+        """The number or the name of a parameter if it is one, of which proofs know more."""
         if not self.powers:
             return self.coefficient
-        return self.powers[0][0] if self.powers == ((str(self), 1),) else self
+        is_name = self.powers == ((str(self), 1),)
+        return str(self) if is_name else self
 
     def __call__(self, p: Mapping[str, Any]) -> Any:
-        """Value at parameters, which may be numbers, arrays or anything with × and powers."""
+        """Return the value at parameters, numbers, arrays or anything with × and powers."""
         factors = [p[name] if power == 1 else p[name] ** power for name, power in self.powers]
         # nothing is multiplied by 1, which would add rounding to a Taylor model
-        numbers = [self.coefficient] if self.coefficient != 1 or not factors else []
-        return reduce(lambda product, factor: factor * product, [*numbers, *factors])
+        if self.coefficient != 1 or not factors:
+            factors.insert(0, self.coefficient)
+        return reduce(lambda product, factor: factor * product, factors)

@@ -31,13 +31,22 @@ from alphacut.frame.structures.loads import Force, require_loads
 from alphacut.frame.structures.model import Dynamics, PlacedForce, StructureModel
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 
-# names of the parameters that each list holds, by floor or storey, and of values that may be single
 SYMBOLS = {
-    **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
-    **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}"},
-    **{"yield_force": "fy{}", "yield_drift": "dy{}", "hardening": "hardening{}"},
+    "masses": "m{}",
+    "lengths": "l{}",
+    "columns": "c{}",
+    "stiffness": "k{}",
+    "dampers": "d{}",
+    "q0": "q{}_0",
+    "v0": "v{}_0",
+    "second_moment": "I{}",
+    "yield_force": "fy{}",
+    "yield_drift": "dy{}",
+    "hardening": "hardening{}",
 }
+"""Names of the parameters of each list, {} for the number of the floor or storey."""
 SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
+"""Names of the parameters of arguments that may be one number."""
 MOMENT = "overturning_moment"
 SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
@@ -145,11 +154,14 @@ class StoreyFrame(LinearSystem):
             is_floor = force.at in range(1, n + 1)
             require(is_floor, "floor", value=force.at, allowed=f"1 to {n}")
             checked_number("amplitude", force.amplitude)
+
         defaults: dict[str, tuple[float, ...]] = dict.fromkeys(("dampers", "q0", "v0"), (0.0,) * n)
-        defaults["columns"] = () if len(self.stiffness) else (2.0,) * n
-        yields = len(self.yield_force) or len(self.yield_drift)
-        defaults["hardening"] = (0.0,) * n if yields else ()
-        for name in (*defaults, "loads", "stiffness", "yield_force", "yield_drift"):
+        if not len(self.stiffness):
+            defaults["columns"] = (2.0,) * n
+        if len(self.yield_force) or len(self.yield_drift):
+            defaults["hardening"] = (0.0,) * n
+        others = ("loads", "stiffness", "columns", "yield_force", "yield_drift", "hardening")
+        for name in ("dampers", "q0", "v0", *others):
             values = tuple(getattr(self, name)) or defaults.get(name, ())
             object.__setattr__(self, name, values)
         names = self.outputs or [f"q{z + 1}" for z in range(n)]
@@ -161,19 +173,25 @@ class StoreyFrame(LinearSystem):
         self.require_standing({})
 
     def _require_values(self) -> None:
+        """Refuse lists of a wrong length, and numbers outside the range of their parameter."""
         for name in ("masses", "stiffness", "lengths", "yield_force", "yield_drift"):
-            if getattr(self, name) is not None and not isinstance(getattr(self, name), str):
-                require_sequence(name, getattr(self, name), "one value a floor, from below")
+            values = getattr(self, name)
+            if values is not None and not isinstance(values, str):
+                require_sequence(name, values, "one value a floor, from below")
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
         sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
         for name, symbol in {**SYMBOLS, **SINGLE}.items():
-            values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
+            values = getattr(self, name)
             if values is None:
                 continue
             is_single = np.ndim(values) == 0 or name == "modulus"
-            (checked_number if is_single else require_numbers)(name, values)
+            if is_single:
+                checked_number(name, values)
+            else:
+                require_numbers(name, values)
+            parameter = of_storey_frame(symbol.format(""))
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
@@ -184,29 +202,31 @@ class StoreyFrame(LinearSystem):
         require_choice("rayleigh_of", self.rayleigh_of, ("initial", "tangent"))
 
     def _require_springs(self) -> None:
+        """Refuse springs that are given twice or not at all, and contradictory yielding."""
         names = ("modulus", "second_moment", "columns", "lengths")
         given = [x for x in names if getattr(self, x) is not None and np.size(getattr(self, x))]
-        needed = ["modulus", "second_moment", "lengths"]
+        examples = {"modulus": "200e9", "second_moment": "1e-6", "lengths": "[3.0]"}
+        needed, alternative = [*examples], ", or stiffness, as [30e6]"
         if len(self.stiffness):
-            beside, allowed = ", ".join(x for x in given if x != "lengths"), "either stiffness or"
-            require(not beside, beside, value="there", allowed=f"{allowed} what makes it")
-            needed = ["lengths"] if self.gravity else []
+            beside = ", ".join(name for name in given if name != "lengths")
+            allowed = "either stiffness or what makes it"
+            require(not beside, beside, value="there", allowed=allowed)
+            needed, alternative = ["lengths"] if self.gravity else [], ""
         for name in needed:
-            example = {"lengths": "[3.0]", "modulus": "200e9", "second_moment": "1e-6"}[name]
-            cure = f"give {name}, as {example} in SI"
-            cure += "" if len(self.stiffness) else ", or stiffness, as [30e6]"
+            cure = f"give {name}, as {examples[name]} in SI{alternative}"
             require(name in given, name, value=None, allowed=SPRING_KEYS, cure=cure)
+
         has_force, has_drift = bool(len(self.yield_force)), bool(len(self.yield_drift))
         require(
-            not has_force & has_drift,
+            not (has_force and has_drift),
             "yield_force",
             value="beside yield_drift",
             allowed="one of them",
             cure="leave out yield_drift: it is yield_force over stiffness",
         )
         if len(self.hardening):
-            allowed = "one of them beside hardening"
-            require(has_force | has_drift, "yield_force, yield_drift", value=None, allowed=allowed)
+            key, allowed = "yield_force, yield_drift", "one of them beside hardening"
+            require(has_force or has_drift, key, value=None, allowed=allowed)
 
     @property
     def floors(self) -> int:
@@ -226,7 +246,7 @@ class StoreyFrame(LinearSystem):
     @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
-        return _named("zeta{}", () if self.damping_ratio is None else self.damping_ratio)
+        return {} if self.damping_ratio is None else _named("zeta{}", self.damping_ratio)
 
     @cached_property
     def parameters(self) -> dict[str, float]:
@@ -236,17 +256,20 @@ class StoreyFrame(LinearSystem):
         lists = ["stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"]
         for name in (*lists, "yield_force", "yield_drift", "hardening"):
             named |= _named(SYMBOLS[name], getattr(self, name), single=False)
-        named |= zip(("rayleigh_mass", "rayleigh_stiffness"), self.rayleigh, strict=True)
-        forces = zip(self.force_names, self.loads, strict=True)
-        return named | self.ratios | {x: checked_number(x, y.amplitude) for x, y in forces}
+        named["rayleigh_mass"], named["rayleigh_stiffness"] = self.rayleigh
+        named |= self.ratios
+        for name, force in zip(self.force_names, self.loads, strict=True):
+            named[name] = checked_number(name, force.amplitude)
+        return named
 
     @property
     def force_names(self) -> tuple[str, ...]:
         """Names of the loads' amplitudes in their order: "F3", "F3_2" of a second one; "J3"."""
-        names = list[str]()
+        names: list[str] = []
         for force in self.loads:
-            name = f"{'J' if force.history is None else 'F'}{force.at}"  # J of an impulse
-            n_before = sum(x.partition("_")[0] == name for x in names)
+            symbol = "J" if force.history is None else "F"  # J of an impulse
+            name = f"{symbol}{force.at}"
+            n_before = sum(other.partition("_")[0] == name for other in names)
             names.append(f"{name}_{n_before + 1}" if n_before else name)
         return tuple(names)
 
@@ -281,19 +304,27 @@ class StoreyFrame(LinearSystem):
         """Refuse nothing: the ranges of a frame's parameters have no negative damping."""
 
     def group(self, name: str) -> tuple[str, ...]:
-        """The parameters that a short name stands for: "m" for m1 … mn; else itself."""
-        patterns = [x for x in (*SYMBOLS.values(), "zeta{}") if x.format(1) in self.parameters]
-        groups = {
-            pattern.format("").replace("_", ""): [pattern.format(z + 1) for z in range(self.floors)]
-            for pattern in patterns
-        }
-        groups |= {"F": list(self.force_names)} if self.loads else {}
-        allowed = ", ".join([*groups, *self.parameters])
-        require({name} <= {*groups, *self.parameters}, "parameter", value=name, allowed=allowed)
-        return tuple(groups.get(name, [name]))
+        """Return the parameters that a short name stands for: "m" for m1 … mn; else itself.
+
+        Raises:
+            RefusedError: There is no such parameter.
+        """
+        groups: dict[str, tuple[str, ...]] = {}
+        for pattern in (*SYMBOLS.values(), "zeta{}"):
+            if pattern.format(1) in self.parameters:
+                short = pattern.format("").replace("_", "")
+                groups[short] = tuple(pattern.format(z + 1) for z in range(self.floors))
+        if self.loads:
+            groups["F"] = self.force_names
+        require_choice("parameter", name, dict.fromkeys([*groups, *self.parameters]))
+        return groups.get(name, (name,))
 
     def springs(self, p: Mapping[str, Number]) -> Number:
-        """k_z of each storey (…, n), in N/m: as given, or 12 c E I / l³ of columns."""
+        """Return k_z of each storey, shape (…, n), in N/m: as given, or 12 c E I / l³ of columns.
+
+        Args:
+            p: All parameters by name, shape (…) each.
+        """
         if self.stiffness:
             return self._of_floors("k{}", p)
         inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
@@ -301,87 +332,109 @@ class StoreyFrame(LinearSystem):
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
     def yield_drifts(self, p: Mapping[str, Number]) -> Number:
-        """Drifts at which storeys yield, shape (…, n), in m."""
+        """Return the drifts at which storeys yield, shape (…, n), in m."""
         if self.yield_drift:
             return self._of_floors("dy{}", p)
         return self._of_floors("fy{}", p) * self.springs(p) ** -1
 
     def hardenings(self, p: Mapping[str, Number]) -> Number:
-        """Stiffness of yielding storeys over the initial one, shape (…, n)."""
+        """Return the stiffness of yielding storeys over the initial one, shape (…, n)."""
         return self._of_floors("hardening{}", p)
 
     def softening(self, p: Mapping[str, Number]) -> Number:
-        """P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
+        """Return P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
         return self._masses_over_heights(p) * self.gravity
 
     def _masses_over_heights(self, p: Mapping[str, Number]) -> Number:
-        """Mass of all floors above each storey over its height, shape (…, n), in kg/m."""
+        """Return the mass above each storey over its height, shape (…, n), in kg/m."""
         # row i of the lower triangle adds the mass of floor i to storeys 1 … i
         above = self._of_floors("m{}", p).contract(np.tri(self.floors))
         return above * self.heights(p) ** -1
 
     def heights(self, p: Mapping[str, Number]) -> Number:
-        """Heights l_z of storeys, shape (…, n), in m."""
+        """Return the heights l_z of storeys, shape (…, n), in m."""
         return self._of_floors("l{}", p)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
-        n, links, names = self.floors, self.springs(p), self.force_names
-        floors, storeys = diagonal(np.eye(n)), chain_matrix(np.eye(n))
-        dashpots, unity = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
-        shears = [z if kind == "shear" else None for kind, z in map(self.quantity, self.outputs)]
-        forces = np.array([np.eye(n)[int(force.at) - 1] for force in self.loads])
-        rows: Array | Number
-        rows, accelerated = np.split(self._rows, [2 * n], axis=1)
+        """Return matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
+        n = self.floors
+        identity: Array = np.eye(n)
+        by_floor, by_storey = diagonal(identity), chain_matrix(identity)
+        springs = self.springs(p)
+        damper_matrices = by_storey if self.damper_placement == "storey" else by_floor
+
+        coefficients = self._coefficients  # on displacements, velocities and accelerations
+        rows: Array | Number = coefficients[:, : 2 * n]
         if MOMENT in self.outputs:  # Σ_z l_z k_z (q_z − q_(z−1))
             drifts = np.zeros((n, len(self.outputs), 2 * n))
-            drifts[:, self.outputs.index(MOMENT), :n] = np.eye(n) - np.eye(n, k=-1)
-            rows = (links * self.heights(p)).contract(drifts) + rows
+            drifts[:, self.outputs.index(MOMENT), :n] = identity - np.eye(n, k=-1)
+            rows = (springs * self.heights(p)).contract(drifts) + rows
+        one = p["rayleigh_mass"] * 0.0 + 1.0
+        row_factors = [one] * len(self.outputs)
+        for row, (kind, z) in enumerate(map(self.quantity, self.outputs)):
+            if kind == "shear":
+                row_factors[row] = springs[..., z]
+
+        columns: Number | None = None
+        if self.loads:
+            amplitudes = stack([p[name] for name in self.force_names])
+            unit_forces = np.array([identity[int(force.at) - 1] for force in self.loads])
+            columns = amplitudes[..., None, :] * unit_forces.T
         return Assembly(
-            mass=self._of_floors("m{}", p).contract(floors),
-            springs=links.contract(storeys),
-            weights=self.softening(p).contract(storeys) if self.gravity else None,
-            dashpots=dashpots.contract(storeys if self.damper_placement == "storey" else floors),
+            mass=self._of_floors("m{}", p).contract(by_floor),
+            springs=springs.contract(by_storey),
+            weights=self.softening(p).contract(by_storey) if self.gravity else None,
+            dashpots=self._of_floors("d{}", p).contract(damper_matrices),
             rayleigh=(p["rayleigh_mass"], p["rayleigh_stiffness"]),
             ratios=[p[name] for name in self.ratios],
             q0=self._of_floors("q{}_0", p),
             v0=self._of_floors("v{}_0", p),
-            row_factors=stack([unity if z is None else links[..., z] for z in shears]),
+            row_factors=stack(row_factors),
             rows=rows,
-            accelerated=accelerated,
+            accelerated=coefficients[:, 2 * n :],
             pattern=np.ones(n),
             massive=np.arange(n),
             loads=self.loads,
-            columns=stack([p[x] for x in names])[..., None, :] * forces.T if names else None,
+            columns=columns,
         )
 
     @cached_property
-    def _rows(self) -> Array:
-        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n)."""
-        rows = np.zeros((len(self.outputs), 3 * self.floors))
-        for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
-            if kind == MOMENT:  # whose row has parameters
+    def _coefficients(self) -> Array:
+        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n).
+
+        Those of a shear are of the drift, without the stiffness; those of the overturning moment,
+        which depend on parameters, are 0.
+        """
+        coefficients = np.zeros((len(self.outputs), 3 * self.floors))
+        for row, (kind, z) in zip(coefficients, map(self.quantity, self.outputs), strict=True):
+            if kind == MOMENT:
                 continue
-            block = {"v": 1, "a": 2}.get(kind, 0)  # displacements, velocities, accelerations
+            block = {"v": 1, "a": 2}.get(kind, 0)
             row[z + self.floors * block] = 1.0
-            if kind in ("drift", "shear") and z:  # of shears the stiffness is a factor besides
+            if kind in ("drift", "shear") and z:
                 row[z - 1] = -1.0
-        return rows
+        return coefficients
 
     def quantity(self, name: str) -> tuple[str, int]:
-        """An output's kind, such as "drift", and its floor or storey, from 0; refuses others."""
+        """Return the kind of an output, such as "drift", and its floor or storey, counted from 0.
+
+        Raises:
+            RefusedError: A frame has no such output, or not without lengths or yielding columns.
+        """
         if name == MOMENT:
             allowed = "it beside lengths, the heights of the storeys"
             require(len(self.lengths) > 0, "output", value=name, allowed=allowed)
             return MOMENT, 0
-        kinds = "q|v|a|drift|shear" + "|residual|ductility|dissipated" * bool(self.hardening)
-        pattern = rf"({kinds})([1-9]\d*)"
+        kinds = ["q", "v", "a", "drift", "shear"]
+        if self.hardening:
+            kinds += ["residual", "ductility", "dissipated"]
+        pattern = rf"({'|'.join(kinds)})([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
-        kind, z = (match[1], int(match[2])) if match else ("", 0)
-        words = f"{', '.join(kinds.split('|')[:-1])} or {kinds.split('|')[-1]}"
+        kind, floor = (match[1], int(match[2])) if match else ("", 0)
+        words = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
         allowed = f"{words} with a floor from 1 to {self.floors}, base_shear, {MOMENT}"
-        require(0 < z <= self.floors, "output", value=name, allowed=allowed)
-        return kind, z - 1
+        require(0 < floor <= self.floors, "output", value=name, allowed=allowed)
+        return kind, floor - 1
 
     def stability_coefficients(self, ends: Mapping[str, tuple[float, float]]) -> Array:
         """Return the largest P_z / (k_z l_z) of each storey in a box, P_z the weight above.
@@ -399,10 +452,12 @@ class StoreyFrame(LinearSystem):
         return (self.gravity or STANDARD_GRAVITY) * worst.mass_over_height / worst.stiffness
 
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
-        """Refuse weights that buckle a storey somewhere in a box of parameters, by SI ends."""
+        """Refuse weights that buckle a storey somewhere in a box of parameters, by SI ends.
+
+        A storey stands if k_z is more than P_z / l_z.
+        """
         if not self.gravity:
             return
-        # k − P / l of all storeys must be positive
         worst = self._worst_storeys(ends)
         softening = self.gravity * worst.mass_over_height
         for z, (k, soft) in enumerate(zip(worst.stiffness, softening, strict=True), start=1):
@@ -412,21 +467,27 @@ class StoreyFrame(LinearSystem):
             require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
 
     def _worst_storeys(self, ends: Mapping[str, tuple[float, float]]) -> _Storeys:
-        """The storeys where k l / P is least in a box: stiffness low, mass high.
+        """Return the storeys where k l / P is smallest in a box: stiffness low, mass high.
 
-        The k of columns falls with the cube of the height, so that k l is least where it is high;
-        the k of springs does not depend on it.
+        The k of columns falls with the cube of the height, so that k l is smallest where it is
+        high; the k of springs does not depend on it.
+
+        Args:
+            ends: Lower and upper end of parameters in SI units, by name; others are nominal.
         """
         worst_when_high = "m" if self.stiffness else "ml"
-        worst = {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
-        p = {
-            name: Jet.constant(np.array([high if name[0] in worst_when_high else low]), 0)
-            for name, (low, high) in worst.items()
-        }
-        return _Storeys(self.springs(p).value[0], self._masses_over_heights(p).value[0])
+        p: dict[str, Jet] = {}
+        for name, nominal in self.parameters.items():
+            low, high = ends.get(name, (nominal, nominal))
+            worst = high if name[0] in worst_when_high else low
+            p[name] = Jet.constant(np.array([worst]), 0)
+        return _Storeys(
+            stiffness=self.springs(p).value[0],
+            mass_over_height=self._masses_over_heights(p).value[0],
+        )
 
     def _of_floors(self, pattern: str, p: Mapping[str, Number]) -> Number:
-        """Parameters of all floors, shape (…, n)."""
+        """Return the parameters of all floors of a pattern such as "m{}", shape (…, n)."""
         return stack([p[pattern.format(z + 1)] for z in range(self.floors)])
 
 
@@ -436,22 +497,37 @@ def yields(model: object) -> TypeGuard[StoreyFrame]:
 
 
 def chain_matrix(links: Array) -> Array:
-    """Matrices (…, n, n) of chains fixed at their lower end, from their links' coefficients."""
-    at, matrix = np.arange(links.shape[-1]), diagonal(links)
-    matrix[..., at[:-1], at[:-1]] += links[..., 1:]
-    matrix[..., at[:-1], at[1:]] = matrix[..., at[1:], at[:-1]] = -links[..., 1:]
+    """Return the matrices of chains that are fixed at their lower end.
+
+    Args:
+        links: Coefficients of the links of n masses, from below, shape (…, n): link z joins the
+            masses z − 1 and z, the first one the ground and mass 0.
+
+    Returns:
+        Tridiagonal matrices, shape (…, n, n).
+    """
+    place = np.arange(links.shape[-1])
+    below, above = place[:-1], place[1:]
+    matrix = diagonal(links)
+    matrix[..., below, below] += links[..., 1:]
+    matrix[..., below, above] = -links[..., 1:]
+    matrix[..., above, below] = -links[..., 1:]
     return matrix
 
 
 def diagonal(values: Array) -> Array:
-    """Diagonal matrices (…, n, n)."""
+    """Return the diagonal matrices of values (…, n), shape (…, n, n)."""
     return values[..., None] * np.eye(values.shape[-1])
 
 
 def _named(
     pattern: str, given: float | Sequence[float], *, single: bool = True
 ) -> dict[str, float]:
-    """Values by names with numbers from 1 on; without one where a single value is for all."""
+    """Return values by the names that a pattern such as "I{}" gives them, with numbers from 1 on.
+
+    With `single` one value alone has no number, since it holds for all floors.
+    """
     values = np.ravel(given).tolist()
-    numbers = [""] if single and len(values) == 1 else range(1, len(values) + 1)
-    return {pattern.format(z): value for z, value in zip(numbers, values, strict=True)}
+    if single and len(values) == 1:
+        return {pattern.format(""): values[0]}
+    return {pattern.format(z): value for z, value in enumerate(values, start=1)}
