@@ -35,7 +35,7 @@ from alphacut.rve.result.loss_factors import CONSTANTS, MAX_FIRST_ORDER, loss_fa
 from alphacut.rve.result.moduli import AVERAGES
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
-from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic import RadiusMap, ThetaDistribution
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ PHASE_PARAMETERS = ("modulus", "poisson", "loss")
 
 def fuzzy_stiffness(
     model: AnyModel,
-    radius: RadiusMap | ThetaLaw,
+    radius: RadiusMap | ThetaDistribution,
     phases: Phases,
     inputs: Mapping[str, FuzzyNumber | float],
     method: Plan | None = None,
@@ -288,7 +288,7 @@ class FuzzyCell:
         has_particle: Whether the phases are matrix and particle, as most models take them.
     """
 
-    radius: RadiusMap | ThetaLaw
+    radius: RadiusMap | ThetaDistribution
     phases: Mapping[str, AnyPhase]
     inputs: Mapping[str, FuzzyNumber]
     losses: tuple[FuzzyNumber, ...]
@@ -297,7 +297,7 @@ class FuzzyCell:
     @classmethod
     def of(
         cls,
-        radius: RadiusMap | ThetaLaw,
+        radius: RadiusMap | ThetaDistribution,
         phases: Phases,
         inputs: Mapping[str, FuzzyNumber | float],
     ) -> FuzzyCell:
@@ -331,11 +331,11 @@ class FuzzyCell:
             return None
         return phase_loss_cuts(self.losses, alpha)
 
-    def radius_at(self, values: Mapping[str, float]) -> RadiusMap | ThetaLaw:
+    def radius_at(self, values: Mapping[str, float]) -> RadiusMap | ThetaDistribution:
         """Return the radius map, or the law of θ, at values of the inputs."""
         names = _field_names(self.radius)
         changes = {name: x for name, x in values.items() if name in names}
-        changed: RadiusMap | ThetaLaw = replace(cast("Any", self.radius), **changes)
+        changed: RadiusMap | ThetaDistribution = replace(cast("Any", self.radius), **changes)
         return changed if changes else self.radius
 
     def phases_at(self, values: Mapping[str, float]) -> dict[str, AnyPhase]:

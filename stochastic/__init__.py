@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from alphacut.stochastic.radius_map import HermiteMap, RadiusMap, require_map
-from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal
+from alphacut.stochastic.theta.distribution import ThetaDistribution, TruncatedNormal
 from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from alphacut.stochastic.particles.measured import read_particles
     from alphacut.stochastic.particles.packings import Packings, pack
     from alphacut.stochastic.particles.particles import Particles
-    from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
+    from alphacut.stochastic.particles.radius_distributions import LogNormalRadii, MeasuredRadii
 
 __all__ = [
     "FittedRadiusMap",
@@ -24,7 +24,7 @@ __all__ = [
     "Packings",
     "Particles",
     "RadiusMap",
-    "ThetaLaw",
+    "ThetaDistribution",
     "ThetaRule",
     "TruncatedNormal",
     "fit_radius_map",
@@ -36,8 +36,8 @@ __all__ = [
 AT_FIRST_USE = {
     "FittedRadiusMap": "microstructure",
     "FractionMap": "fraction_map",
-    "LogNormalRadii": "particles.radius_laws",
-    "MeasuredRadii": "particles.radius_laws",
+    "LogNormalRadii": "particles.radius_distributions",
+    "MeasuredRadii": "particles.radius_distributions",
     "Packings": "particles.packings",
     "Particles": "particles.particles",
     "fit_radius_map": "microstructure",

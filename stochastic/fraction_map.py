@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
 from alphacut.stochastic.particles.shapes import DISCS, Shape
-from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal
+from alphacut.stochastic.theta.distribution import ThetaDistribution, TruncatedNormal
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class FractionMap:
 
     fraction: float
     shape: Shape = DISCS
-    distribution: ThetaLaw = field(default_factory=TruncatedNormal)
+    distribution: ThetaDistribution = field(default_factory=TruncatedNormal)
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Reduced radius at `theta`, any shape."""

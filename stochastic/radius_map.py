@@ -16,7 +16,12 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
-from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal, require_law, require_support
+from alphacut.stochastic.theta.distribution import (
+    ThetaDistribution,
+    TruncatedNormal,
+    require_distribution,
+    require_support,
+)
 
 RADII = "radii inside (0, 1), in halves of the cell's side"
 
@@ -33,7 +38,7 @@ class RadiusMap(Protocol):
     """
 
     @property
-    def distribution(self) -> ThetaLaw:
+    def distribution(self) -> ThetaDistribution:
         """Law of θ."""
 
     def __call__(self, theta: ArrayLike) -> Array:
@@ -43,7 +48,7 @@ class RadiusMap(Protocol):
 def require_map(radius_map: RadiusMap) -> None:
     """Refuse a radius map whose law of θ has no support or whose radii, at 65 θ, leave (0, 1)."""
     law = radius_map.distribution
-    require_law(law)
+    require_distribution(law)
     require_support(law.lower, law.upper)
     theta = np.linspace(law.lower, law.upper, 65)
     radii = np.asarray(radius_map(theta), float)
@@ -78,10 +83,10 @@ class HermiteMap:
     a2: float
     a3: float
     a4: float
-    distribution: ThetaLaw = field(default_factory=TruncatedNormal)
+    distribution: ThetaDistribution = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
-        require_law(self.distribution)
+        require_distribution(self.distribution)
         values = (self.a1, self.a2, self.a3, self.a4)
         plain = all(isinstance(value, Real) and np.isfinite(value) for value in values)
         low, high = self.extremes() if plain else (np.nan, np.nan)

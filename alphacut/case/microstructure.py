@@ -17,7 +17,7 @@ from alphacut.stochastic import (
     pack,
     read_particles,
 )
-from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.particles.radius_distributions import RadiusDistribution
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 Progress = Callable[[float], None]
@@ -41,7 +41,7 @@ class PackingSection(Section):
     """CSV file of radii or diameters, a column r [mm] or d [mm]"""
 
     @property
-    def radii(self) -> RadiusLaw:
+    def radii(self) -> RadiusDistribution:
         """The law of the radii."""
         ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both are there, or a file
         return MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)

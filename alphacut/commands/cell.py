@@ -34,7 +34,7 @@ from alphacut.stages.cell import (
     require_bounds,
     require_tolerance,
 )
-from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic import ThetaDistribution
 
 PLANE_INDICES = "126"
 """Of Voigt: 11, 22 and 12."""
@@ -77,7 +77,7 @@ def export(problem: CellProblem, path: Path) -> Document:
     mesh, cell = problem.mesh, problem.cell
     if isinstance(cell, MeshedCell):
         assert mesh.file is not None
-        law = cast("ThetaLaw", problem.nominal_radius)
+        law = cast("ThetaDistribution", problem.nominal_radius)
         fields = MeshModel(mesh.file).fields(law, cell.nominal_phases)
     else:
         nominal = problem.nominal

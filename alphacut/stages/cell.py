@@ -25,7 +25,7 @@ from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.moduli import AXES
 from alphacut.rve.result.reference_bounds import reference_bounds
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stochastic import FractionMap, RadiusMap, ThetaLaw, gauss_rule
+from alphacut.stochastic import FractionMap, RadiusMap, ThetaDistribution, gauss_rule
 
 GPA = 1e9
 BOUNDS_SLACK = 5e-3
@@ -97,7 +97,7 @@ class CellProblem:
         return fuzzy or next(({x: numbers[x]} for x in names if x in numbers), {})
 
     @property
-    def nominal_radius(self) -> RadiusMap | ThetaLaw:
+    def nominal_radius(self) -> RadiusMap | ThetaDistribution:
         """Radius map at the nominal values; of a mesh the law of θ."""
         if isinstance(self.radius, FractionMap):
             return self.radius

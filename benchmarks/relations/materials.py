@@ -19,7 +19,7 @@ from alphacut.stochastic.microstructure import RadiusLimits, fit_map
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
+from alphacut.stochastic.particles.radius_distributions import LogNormalRadii
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 from alphacut.stochastic.sections import reduced_radii, with_cells
 from benchmarks.relations.relation import ROUNDED, Chance, Kind, Problem, Relation

@@ -21,7 +21,7 @@ from alphacut.stochastic.fit.hermite_fit import HermiteFit
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
+from alphacut.stochastic.particles.radius_distributions import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.tessellation.apollonius import apollonius
 

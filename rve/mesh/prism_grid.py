@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, array_of_call
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
-from alphacut.stochastic import RadiusMap, ThetaLaw, require_map
+from alphacut.stochastic import RadiusMap, ThetaDistribution, require_map
 
 NAMES = "matrix", "inclusion"
 """Names of the phases in their order, where no file gives them."""
@@ -83,7 +83,7 @@ def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
 class FixedCell:
     """The law of θ where no radius follows from it."""
 
-    distribution: ThetaLaw
+    distribution: ThetaDistribution
 
     def __call__(self, theta: ArrayLike) -> Array:
         """No radius."""
@@ -197,7 +197,7 @@ class PrismGrid:
         """Number of nodes in all."""
         return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
 
-    def level_thetas(self, law: ThetaLaw) -> Array:
+    def level_thetas(self, law: ThetaDistribution) -> Array:
         """θ of all levels over the support of a law, shape (layers + 1,)."""
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 

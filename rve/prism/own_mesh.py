@@ -34,8 +34,8 @@ from alphacut.rve.result.checks import checks_within_limits
 from alphacut.rve.result.moduli import AVERAGES, AXES
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
 from alphacut.rve.solver.krylov import SolverOptions, require_petsc
-from alphacut.stochastic import ThetaLaw
-from alphacut.stochastic.theta.law import require_law
+from alphacut.stochastic import ThetaDistribution
+from alphacut.stochastic.theta.distribution import require_distribution
 
 ROUGH_MESH = 0.1
 """Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
@@ -78,7 +78,9 @@ class _NamedModel:
         """How the cell is assembled and solved."""
         return self.options.described("prisms")
 
-    def solve(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> list[HomogenisedStiffness]:
+    def solve(
+        self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
+    ) -> list[HomogenisedStiffness]:
         """Homogenised stiffness, one result in a list; energies in the order of `phases`.
 
         Args:
@@ -107,7 +109,7 @@ class _NamedModel:
             )
         ]
 
-    def fields(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
+    def fields(self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]) -> CellFields:
         """Displacements and stresses at the nodes under three unit strains, solved for them.
 
         Arguments and errors are those of `solve`.
@@ -137,7 +139,9 @@ class MeshModel(_NamedModel):
     parallel: bool = False
     refine: bool = False
 
-    def solve(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> list[HomogenisedStiffness]:
+    def solve(
+        self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
+    ) -> list[HomogenisedStiffness]:
         """As `_NamedModel.solve`, with declared errors if refined."""
         results = super().solve(law, phases)
         if not self.refine:
@@ -197,12 +201,12 @@ class LevelSetModel(_NamedModel):
 
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem on a cached mesh."""
-        require_law(law)
+        require_distribution(law)
         named = in_order_of(NAMES, phases)
         size, layers, parallel = self.mesh_size, self.layers, self.parallel
         grid = cached_grid(size=size, radius=0.0, layers=layers, parallel=parallel)
         problem = cached_problem(grid, parallel=self.parallel)
-        problem.move(LevelSet(cast("ThetaLaw", law), self.z))
+        problem.move(LevelSet(cast("ThetaDistribution", law), self.z))
         return problem, named
 
 
@@ -227,12 +231,12 @@ def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
     low, high = theta.min(), theta.max()
-    require_law(law)
-    lower, upper = cast("ThetaLaw", law).lower, cast("ThetaLaw", law).upper
+    require_distribution(law)
+    lower, upper = cast("ThetaDistribution", law).lower, cast("ThetaDistribution", law).upper
     tolerance = SAME_LEVEL * (high - low)
     is_same = abs(lower - low) <= tolerance and abs(upper - high) <= tolerance
     if not is_same:
         value = f"on {lower:g} … {upper:g}"
         allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
-    return FixedCell(cast("ThetaLaw", law))
+    return FixedCell(cast("ThetaDistribution", law))

@@ -26,7 +26,7 @@ from alphacut.rve.solver.form import CellForm, PointStrains, strain_products
 from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
 from alphacut.rve.solver.numbering import Elimination, LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, level_blocks
-from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic import RadiusMap, ThetaDistribution
 from alphacut.stochastic.theta.quadrature import ThetaRule, level_rule
 
 
@@ -100,7 +100,7 @@ class Solved(NamedTuple):
     residual: float
 
 
-def positive_density(law: ThetaLaw, theta: Array) -> Array:
+def positive_density(law: ThetaDistribution, theta: Array) -> Array:
     """Density of θ at quadrature points (n,), or a refusal where it is not positive."""
     density = np.asarray(law.pdf(theta))
     if not (density > 0).all():

@@ -21,7 +21,7 @@ from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
-from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic import RadiusMap, ThetaDistribution
 
 ASYMMETRY = 1e-8
 """Largest |(A − Aᵀ) x| over |A x| of a symmetric operator; round-off leaves some 1e-15."""
@@ -58,7 +58,7 @@ class ProductSpace:
         True
     """
 
-    def __init__(self, model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> None:
+    def __init__(self, model: PrismModel | MeshModel, law: RadiusMap | ThetaDistribution) -> None:
         self._petsc = model.petsc
         self._problem = _separate_problem(model, law)
         self.space: fem.FunctionSpace = self._problem.space
@@ -159,7 +159,9 @@ def require_form(form: object, *, space: fem.FunctionSpace, num_arguments: int) 
         raise RefusedError("form", "a form on another space or mesh", allowed, cure)
 
 
-def _separate_problem(model: PrismModel | MeshModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
+def _separate_problem(
+    model: PrismModel | MeshModel, law: RadiusMap | ThetaDistribution
+) -> PrismProblem:
     """New problem for a map or law; the cached ones of the model would move to its next map."""
     if isinstance(model, MeshModel):
         cached = model.cached_problem()

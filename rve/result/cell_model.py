@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol, Self
 from alphacut.rve.cell.cell import AnyPhase
 from alphacut.rve.cell.outline import Outline, circle
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.stochastic import RadiusMap, ThetaLaw
+from alphacut.stochastic import RadiusMap, ThetaDistribution
 
 
 @dataclass(frozen=True)
@@ -89,5 +89,7 @@ class CellModel(AnyModel, Protocol):
 class NamedPhasesModel(AnyModel, Protocol):
     """A model of a mesh or level set of the user's own, whose phases have names."""
 
-    def solve(self, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> list[HomogenisedStiffness]:
+    def solve(
+        self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
+    ) -> list[HomogenisedStiffness]:
         """Return the homogenised stiffness, one result in a list."""

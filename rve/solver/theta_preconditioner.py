@@ -37,7 +37,7 @@ import scipy.sparse as sp
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import MPI, PETSc, aij, cholesky, columns
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.stochastic import ThetaLaw
+from alphacut.stochastic import ThetaDistribution
 from alphacut.stochastic.theta.quadrature import level_rule
 
 Fields = tuple[Array, Array]  # hats and bubbles
@@ -63,7 +63,7 @@ class ThetaMass:
     projection: Array
 
 
-def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
+def theta_mass(law: ThetaDistribution, levels: Array) -> ThetaMass:
     """Masses along θ, weighted by the density, of hats at the levels and bubbles between them."""
     layers, points = len(levels) - 1, 3
     t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2  # the points of a layer
@@ -120,7 +120,9 @@ class ThetaPreconditioner:
         self._rank_levels = numbering.levels, numbering.mid_levels
         self._solvers: list[PlaneSolver] = []
 
-    def set_up(self, law: ThetaLaw, blocks: Iterable[sp.csr_matrix]) -> ThetaPreconditioner:
+    def set_up(
+        self, law: ThetaDistribution, blocks: Iterable[sp.csr_matrix]
+    ) -> ThetaPreconditioner:
         """Factorise the blocks of this rank's levels, then mid-levels; return the preconditioner.
 
         The blocks, in hats and bubbles and with sorted indices, keep their pattern from one call to

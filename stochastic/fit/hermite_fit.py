@@ -21,7 +21,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.radius_map import HermiteMap
-from alphacut.stochastic.theta.law import TruncatedNormal
+from alphacut.stochastic.theta.distribution import TruncatedNormal
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
 # h1 … h4 of eq. 12 in powers of ξ

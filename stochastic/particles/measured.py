@@ -20,7 +20,7 @@ from alphacut.base.errors import RefusedError, checked_number, require, require_
 from alphacut.base.pictures import opened_picture
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
-from alphacut.stochastic.particles.radius_laws import require_radii
+from alphacut.stochastic.particles.radius_distributions import require_radii
 
 SMOOTHING = 1.5  # standard deviation, in pixels
 SMALLEST = 4.0  # least radius of a particle, in pixels

@@ -23,7 +23,7 @@ from alphacut.stochastic.particles.particles import (
     points_in_balls,
     size_classes,
 )
-from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.particles.radius_distributions import RadiusDistribution
 from alphacut.stochastic.particles.shapes import DISCS, Shape
 
 MAX_PROPOSALS = 1000  # for a particle, before random sequential addition ends without a packing
@@ -46,7 +46,7 @@ class Packing:
 
     number: int
     fraction: float
-    radii: RadiusLaw
+    radii: RadiusDistribution
     shape: Shape = DISCS
 
     def __post_init__(self) -> None:

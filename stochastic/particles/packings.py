@@ -13,7 +13,11 @@ from alphacut.base.errors import checked_number, require, require_choice, requir
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
+from alphacut.stochastic.particles.radius_distributions import (
+    LogNormalRadii,
+    MeasuredRadii,
+    RadiusDistribution,
+)
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 SHAPES = {shape.particles: shape for shape in (DISCS, SPHERES)}
@@ -75,7 +79,7 @@ def pack(
     *,
     packings: int = 20,
     fraction: float,
-    radii: Sequence[float] | RadiusLaw,
+    radii: Sequence[float] | RadiusDistribution,
     shape: str = "discs",
     seed: int = 0,
     workers: int = 1,
@@ -107,7 +111,7 @@ def pack(
         checked_number(key, number, whole=True, positive=key != "seed")
     require_choice("shape", shape, SHAPES)
     if isinstance(radii, LogNormalRadii | MeasuredRadii):
-        law: RadiusLaw = radii
+        law: RadiusDistribution = radii
     else:
         require_numbers("radii", radii)
         require(len(radii) == 2, "radii", radii, allowed="the smallest and the largest, or a law")

@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require
-from alphacut.stochastic.theta.law import ThetaLaw
+from alphacut.stochastic.theta.distribution import ThetaDistribution
 
 MASS_GAP = 1e-8
 """Most by which the integral of a density may miss the difference of its distribution function."""
@@ -36,7 +36,7 @@ class ThetaRule:
         return np.asarray(np.tensordot(self.weights, values, axes=1), float)
 
 
-def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRule:
+def level_rule(distribution: ThetaDistribution, levels: Array, *, points: int) -> ThetaRule:
     """Return the rule with `points` Gauss–Legendre nodes in each interval of rising levels of θ.
 
     The weights contain the density f_Θ and are scaled to the sum 1. Where the density is smooth,
@@ -45,7 +45,7 @@ def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRu
     return _weighted(distribution, levels, np.polynomial.legendre.leggauss(points))
 
 
-def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
+def _weighted(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
     """Composite rule of `rule`, nodes and weights on [−1, 1], in panels, weighted by f_Θ."""
     x, w = rule
     half = np.diff(edges)[:, None] / 2
@@ -54,7 +54,7 @@ def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRu
     return ThetaRule(nodes, weights / weights.sum())
 
 
-def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
+def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
     """Return the Gauss rule of the density f_Θ, exact for polynomials of degree 2·points − 1.
 
     The recurrence of the orthogonal polynomials comes from the discretised Stieltjes procedure on a
@@ -78,7 +78,7 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     return _stieltjes_rule(distribution, points)
 
 
-def _stieltjes_rule(distribution: ThetaLaw, points: int) -> ThetaRule:
+def _stieltjes_rule(distribution: ThetaDistribution, points: int) -> ThetaRule:
     panels = min(math.ceil(distribution.upper - distribution.lower), _FIRST_PANELS)
     levels = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
     legendre = np.polynomial.legendre.leggauss(16 + 2 * points)
@@ -104,7 +104,7 @@ def _stieltjes_rule(distribution: ThetaLaw, points: int) -> ThetaRule:
 _cached_rule = lru_cache(maxsize=256)(_stieltjes_rule)
 
 
-def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
+def _panel_edges(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> Array:
     """Refine rising edges until a rule on [−1, 1] integrates the density of θ on each panel."""
     # a panel on which it misses the difference of the distribution function is halved, which
     # resolves corners, jumps and narrow peaks of the density
@@ -122,7 +122,7 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
     return edges
 
 
-def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
+def _mass_gaps(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> Array:
     """Error of a rule for the density f on each panel, (n,), by its distribution function F."""
     # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
     # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone

@@ -21,7 +21,7 @@ from alphacut.stochastic.particles.measured import circles_in, read_particles
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.packings import pack
 from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
+from alphacut.stochastic.particles.radius_distributions import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 from alphacut.stochastic.sections import reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours

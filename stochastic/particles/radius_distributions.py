@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require
 from alphacut.stochastic.particles.csv_columns import length_columns
-from alphacut.stochastic.theta.law import TruncatedNormal
+from alphacut.stochastic.theta.distribution import TruncatedNormal
 
 MIN_RADIUS, MAX_RADIUS = 1e-12, 1e6  # m; no particle of a material is smaller or larger
 
@@ -137,4 +137,4 @@ class MeasuredRadii:
         return np.asarray(np.interp(generator.random(number), self._grade, self.values), float)
 
 
-RadiusLaw = LogNormalRadii | MeasuredRadii
+RadiusDistribution = LogNormalRadii | MeasuredRadii

@@ -16,7 +16,7 @@ from alphacut.base.errors import is_number, require
 MIN_WIDTH = 1e-4  # of a support over its greater end, so that rounding is small beside it
 
 
-class ThetaLaw(Protocol):
+class ThetaDistribution(Protocol):
     """Law of θ on a bounded support, with a density.
 
     Laws that can be hashed (frozen dataclasses) have their quadrature rules kept.
@@ -40,8 +40,8 @@ class ThetaLaw(Protocol):
         """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
 
 
-def require_law(law: object) -> None:
-    """Refuse what is no `ThetaLaw`, as a name or a frozen law of SciPy."""
+def require_distribution(law: object) -> None:
+    """Refuse what is no `ThetaDistribution`, as a name or a frozen law of SciPy."""
     ends = getattr(law, "lower", None), getattr(law, "upper", None)
     is_law = all(map(is_number, ends)) and callable(getattr(law, "pdf", None))
     cure = "give the law itself, as TruncatedNormal(-3, 3)"
