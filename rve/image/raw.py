@@ -5,74 +5,69 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 from alphacut.rve.image.spacing import require_spacing
 
 HEADS = (".mhd", ".mha", ".nhdr", ".nrrd")
+"""Endings of files with such a head."""
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float": "f4", "double": "f8",
 }  # fmt: skip
-"""Of numbers in raw data, by the names of MetaImage and NRRD without "MET_" and spaces."""
-LONGEST_HEAD = 1 << 16
-"""Bytes in which a head ends; usual ones have less than a thousand."""
-MAX_VOXELS = 1 << 40
+"""NumPy's types by the names of MetaImage and NRRD without "MET_" and spaces."""
 YES = ("true", "t", "1", "yes")
-GZIP_OR_ZLIB = 47  # of zlib: the largest window, and either of both heads
-PERPENDICULAR = 1e-3
-"""Largest component of an axis's unit vector along the other axes."""
 
 
-Axes = tuple[int, int, int]
-Lookup = Callable[..., str]
-"""Value in a head by its keys, of which the first that is there counts; empty if none is."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RawHead:
     """What a head says of its volume.
 
+    The axes of the stored array are those of the file in reverse order, so that the last one is the
+    fastest.
+
     Args:
-        path: File of the head.
         data: File of the numbers, which may be that of the head.
         offset: Bytes before the numbers; −1 if they are the last bytes of the file.
         dtype: Type of a number, with its byte order.
-        sizes: Numbers along each axis of the file, the fastest first.
-        axes: Which of x, y, z each axis of the file runs along, as 0, 1, 2.
-        signs: −1 of an axis that runs backwards, else 1.
+        stored_shape: Numbers along each axis of the stored array.
+        order: Axes of the stored array along z, y and x, shape (3,).
+        reversed_axes: Axes of the stored array that run against z, y or x.
         is_compressed: Whether the numbers are compressed by zlib or gzip.
     """
 
-    path: Path
     data: Path
     offset: int
     dtype: np.dtype[np.generic]
-    sizes: Axes
-    axes: Axes
-    signs: Axes
+    stored_shape: tuple[int, ...]
+    order: Ints
+    reversed_axes: tuple[int, ...]
     is_compressed: bool
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Numbers along z, y, x."""
-        of_axis = dict(zip(self.axes, self.sizes, strict=True))
-        return of_axis[2], of_axis[1], of_axis[0]
+        return tuple(self.stored_shape[axis] for axis in self.order)
 
     def read(self) -> Array:
-        """Return the numbers along z, y, x; refuse a file of another size than the head says."""
-        expected = math.prod(self.sizes) * self.dtype.itemsize
+        """Return the numbers along z, y, x.
+
+        Raises:
+            RefusedError: The file has another size than the head says, or cannot be unpacked.
+        """
+        expected = math.prod(self.stored_shape) * self.dtype.itemsize
         found = self.data.stat().st_size
-        sizes = " × ".join(map(str, self.sizes))
-        name, allowed = self.data.name, f"{expected} for {sizes} of {self.dtype}"
+        sizes = " × ".join(map(str, self.stored_shape[::-1]))
+        name = self.data.name
+        allowed = f"{expected} for {sizes} of {self.dtype}"
         if self.is_compressed:
             content = self._decompressed(expected)
             require(len(content) == expected, name, f"{len(content)} bytes unpacked", allowed)
@@ -80,22 +75,20 @@ class RawHead:
         else:
             offset = found - expected if self.offset < 0 else self.offset
             allowed = f"{offset} + {allowed}" if offset > 0 else allowed
-            require(offset >= 0 and found == offset + expected, name, f"{found} bytes", allowed)
+            is_whole = offset >= 0 and found == offset + expected
+            require(is_whole, name, f"{found} bytes", allowed)
             values = np.fromfile(self.data, self.dtype, offset=offset)
-        values = values.reshape(self.sizes[::-1]).astype(self.dtype.newbyteorder("="))
-        # axis k of the array is axis 2 − k of the file; those of the world are wanted as z, y, x
-        place = {axis: 2 - k for k, axis in enumerate(self.axes)}
-        sign = dict(zip(self.axes, self.signs, strict=True))
-        ordered = values.transpose(place[2], place[1], place[0])
-        return np.asarray(ordered[:: sign[2], :: sign[1], :: sign[0]])
+        values = values.reshape(self.stored_shape).astype(self.dtype.newbyteorder("="))
+        return np.asarray(np.flip(values, self.reversed_axes).transpose(self.order))
 
     def _decompressed(self, expected: int) -> bytes:
-        """Up to one byte more than expected, so that a file that unpacks to gigabytes does not."""
+        """Return at most one byte more than expected, whatever the file would unpack to."""
         with self.data.open("rb") as file:
             file.seek(max(self.offset, 0))
             packed = file.read()
+        gzip_or_zlib = 47  # zlib's number for the largest window and either of both heads
         try:
-            return zlib.decompressobj(GZIP_OR_ZLIB).decompress(packed, expected + 1)
+            return zlib.decompressobj(gzip_or_zlib).decompress(packed, expected + 1)
         except zlib.error as error:
             raise RefusedError(self.data.name, f"damaged ({error})", "gzip or zlib") from None
 
@@ -110,76 +103,110 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     Raises:
         RefusedError: The head lacks something, or says what is not read.
     """
-    entries, size = _entries(path)
-
-    def value(*keys: str) -> str:
-        return next((entries[key] for key in keys if key in entries), "")
-
-    name, data = path.name, data_of_head(path)
-    type_name = value("elementtype", "type").lower().removeprefix("met_").removeprefix("signed ")
+    entries = _Entries.of_file(path)
+    name = path.name
+    data = data_of_head(path)
+    type_name = entries.value("elementtype", "type").lower()
+    type_name = type_name.removeprefix("met_").removeprefix("signed ")
     kind = TYPES.get(type_name.replace("unsigned ", "u").removesuffix("_t"))
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
-    sizes = value("dimsize", "sizes").split()
+
+    sizes = entries.value("dimsize", "sizes").split()
     require(len(sizes) == 3, name, f"{len(sizes)} sizes", "three, along x, y and z")
-    are_whole = all(re.fullmatch(r"\+?\d{1,9}", n) and int(n) > 0 for n in sizes)
-    are_whole = are_whole and math.prod(map(int, sizes)) <= MAX_VOXELS
+    are_whole = all(re.fullmatch(r"\+?\d{1,9}", size) and int(size) > 0 for size in sizes)
+    are_whole = are_whole and math.prod(map(int, sizes)) <= 1 << 40
     require(are_whole, name, f"sizes {' '.join(sizes)}", "whole numbers greater than 0")
     require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
-    encoding = value("encoding").lower() or "raw"
-    is_packed = value("compresseddata").lower() in YES or encoding in ("gzip", "gz")
-    is_text = value("binarydata").lower() not in ("", *YES)
-    is_read = encoding in ("raw", "gzip", "gz") and not is_text
+
+    encoding = entries.value("encoding").lower() or "raw"
+    is_gzip = encoding in ("gzip", "gz")
+    is_packed = entries.value("compresseddata").lower() in YES or is_gzip
+    is_text = entries.value("binarydata").lower() not in ("", *YES)
+    is_read = (encoding == "raw" or is_gzip) and not is_text
     cure = "save it without compression"
     require(is_read, name, f"data in encoding {encoding}", "raw or gzip", cure)
-    channels = value("elementnumberofchannels") or "1"
+    channels = entries.value("elementnumberofchannels") or "1"
     require(channels == "1", name, f"{channels} numbers a voxel", "one")
-    byte_order = value("binarydatabyteordermsb", "elementbyteordermsb", "endian").lower()
-    layout = _layout(name, value)
-    along = dict(zip(layout.axes, layout.spacing, strict=True))
-    require_spacing(name, (along[0], along[1], along[2]), sides)
-    first, second, third = map(int, sizes)
+
+    layout = _layout(name, entries)
+    lengths = layout.lengths[np.argsort(layout.axes)]  # along x, y, z
+    require_spacing(name, [float(length) for length in lengths], sides)
+    keys = "binarydatabyteordermsb", "elementbyteordermsb", "endian"
+    is_big = entries.value(*keys).lower() in (*YES, "big")
+    offset = entries.size
+    if data != path:
+        offset = _skipped(name, entries, is_packed=is_packed)
     return RawHead(
-        path,
-        data,
-        size if data == path else _skipped(name, value, is_packed=is_packed),
-        np.dtype((">" if byte_order in (*YES, "big") else "<") + str(kind)),
-        (first, second, third),
-        layout.axes,
-        layout.signs,
-        is_packed,
+        data=data,
+        offset=offset,
+        dtype=np.dtype(f"{'>' if is_big else '<'}{kind}"),
+        stored_shape=tuple(int(size) for size in reversed(sizes)),
+        order=np.argsort(2 - layout.axes[::-1]),
+        reversed_axes=tuple(k for k in range(3) if layout.signs[2 - k] < 0),
+        is_compressed=is_packed,
     )
 
 
 def data_of_head(path: Path) -> Path:
     """Return the file of the numbers, which may be that of the head."""
-    entries, _ = _entries(path)
-    keys = "elementdatafile", "data file", "datafile"
-    name = next((entries[key] for key in keys if key in entries), "LOCAL")
+    name = _Entries.of_file(path).value("elementdatafile", "data file", "datafile") or "LOCAL"
     return path if name == "LOCAL" else path.parent / name
 
 
-def _entries(path: Path) -> tuple[Mapping[str, str], int]:
-    """Values by small keys of a MetaImage (key = value) or NRRD head (key: value); its bytes."""
-    entries: dict[str, str] = {}
-    size = 0
-    with path.open("rb") as file:
-        start = file.read(LONGEST_HEAD)
-    for line in start.splitlines(keepends=True):
-        size += len(line)
-        key, *value = re.split(r":=|[=:]", line.decode("latin-1").strip(), maxsplit=1)
-        entries[key.strip().lower()] = "".join(value).strip()
-        if key == "" or key.strip() == "ElementDataFile":  # raw data may follow
-            return entries, size
-    is_whole = len(start) < LONGEST_HEAD
-    require(is_whole, path.name, "without an end of its head", f"{LONGEST_HEAD} bytes")
-    return entries, size
+@dataclass(frozen=True)
+class _Entries:
+    """Entries of a head.
+
+    Args:
+        values: Values by keys in small letters.
+        size: Bytes of the head, with the line that ends it.
+    """
+
+    values: dict[str, str]
+    size: int
+
+    @classmethod
+    def of_file(cls, path: Path) -> _Entries:
+        """Read the lines "key = value" of MetaImage, or "key: value" of NRRD, up to the last one.
+
+        Raises:
+            RefusedError: The file does not end its head within 64 KiB; usual heads are shorter than
+                1 KiB.
+        """
+        longest_head = 1 << 16
+        values: dict[str, str] = {}
+        size = 0
+        with path.open("rb") as file:
+            start = file.read(longest_head)
+        for line in start.splitlines(keepends=True):
+            size += len(line)
+            key, *value = re.split(r":=|[=:]", line.decode("latin-1").strip(), maxsplit=1)
+            values[key.strip().lower()] = "".join(value).strip()
+            if key.strip() in ("", "ElementDataFile"):  # raw data may follow
+                return cls(values, size)
+        is_whole = len(start) < longest_head
+        require(is_whole, path.name, "without an end of its head", f"{longest_head} bytes")
+        return cls(values, size)
+
+    def value(self, *keys: str) -> str:
+        """Return the value of the first of some keys that is there; empty where none is."""
+        return next((self.values[key] for key in keys if key in self.values), "")
 
 
-def _skipped(name: str, value: Lookup, *, is_packed: bool) -> int:
-    """Bytes before the numbers in a file beside the head; −1 if these are its last bytes."""
-    lines = value("line skip", "lineskip") or "0"
+def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:
+    """Return the bytes before the numbers in a file beside the head; −1 if they are its last bytes.
+
+    Args:
+        name: Name of the head, for messages.
+        entries: Its entries.
+        is_packed: Whether the numbers are compressed.
+
+    Raises:
+        RefusedError: The head states lines to skip, or no whole number of bytes.
+    """
+    lines = entries.value("line skip", "lineskip") or "0"
     require(lines == "0", name, f"a line skip of {lines}", "0", "give the bytes: byte skip")
-    text = value("headersize", "byte skip", "byteskip") or "0"
+    text = entries.value("headersize", "byte skip", "byteskip") or "0"
     is_count = re.fullmatch(r"\+?\d{1,15}", text) is not None
     is_end = text == "-1" and not is_packed
     allowed = "a whole number, or −1 of raw data"
@@ -188,49 +215,52 @@ def _skipped(name: str, value: Lookup, *, is_packed: bool) -> int:
 
 
 class _Layout(NamedTuple):
-    """Axes and signs as in `RawHead`, and the distance of voxels along each axis of the file.
+    """How the axes of a file lie, in the order of the file, the fastest first.
 
-    A distance is nan where the head does not state it.
+    Attributes:
+        axes: Which of x, y, z each axis runs along, as 0, 1, 2, shape (3,).
+        signs: −1 for an axis that runs backwards, else 1, shape (3,).
+        lengths: Distance of voxels along each axis, nan where the head does not state it, shape
+            (3,).
     """
 
-    axes: Axes
-    signs: Axes
-    spacing: tuple[float, float, float]
+    axes: Ints
+    signs: Array
+    lengths: Array
 
 
-def _layout(name: str, value: Lookup) -> _Layout:
-    """Return how the axes of the file lie; refuse axes that do not run along x, y and z."""
-    directions = value("space directions")
-    vectors = [_numbers(name, x) for x in re.findall(r"\(([^)]*)\)", directions)]
-    if matrix := _numbers(name, value("transformmatrix", "rotation", "orientation")):
-        require(len(matrix) == 9, name, f"a matrix of {len(matrix)} numbers", "nine")
-        vectors = [matrix[:3], matrix[3:6], matrix[6:]]
-    spacing = _numbers(name, value("elementspacing", "spacings", "elementsize"))
+def _layout(name: str, entries: _Entries) -> _Layout:
+    """Return how the axes of the file lie.
+
+    Raises:
+        RefusedError: The axes do not run along x, y and z, each once.
+    """
+    spacing = _numbers(name, entries.value("elementspacing", "spacings", "elementsize"))
     require(len(spacing) in (0, 3), name, f"{len(spacing)} spacings", "three")
-    if not vectors:
-        x, y, z = spacing or [math.nan] * 3
-        return _Layout((0, 1, 2), (1, 1, 1), (x, y, z))
-    are_three = [len(vector) for vector in vectors] == [3, 3, 3]
-    require(are_three, name, f"directions {vectors}", "three vectors of three numbers")
-    lengths = np.linalg.norm(vectors, axis=1)
+    lengths = np.array(spacing or [math.nan] * 3)
+    keys = "space directions", "transformmatrix", "rotation", "orientation"
+    directions = _numbers(name, re.sub("[()]", " ", entries.value(*keys)))
+    if not directions:
+        return _Layout(np.arange(3), np.ones(3), lengths)
+
+    require(len(directions) == 9, name, f"directions of {len(directions)} numbers", "nine")
+    vectors = np.reshape(directions, (3, 3))
+    norms = np.linalg.norm(vectors, axis=1)
+    with np.errstate(invalid="ignore"):  # a vector of zeros has no direction
+        units = vectors / norms[:, np.newaxis]
+    axes = np.nan_to_num(abs(units)).argmax(axis=1)
+    along = units[np.arange(3), axes]
+    # A unit vector with the component c along an axis has √(1 − c²) across it, at most 1e-3.
+    is_along = bool((1 - abs(along) <= 1e-3**2 / 2).all())
+    is_each_once = sorted(axes.tolist()) == [0, 1, 2]
     allowed = "directions along x, y and z, each once"
     cure = "resample the volume along the axes"
-    require(bool((lengths > 0).all()), name, f"directions {vectors}", allowed, cure)
-    units = np.array(vectors) / lengths[:, None]
-    axes = np.abs(units).argmax(axis=1)
-    along = units[np.arange(3), axes]
-    # of a unit vector with the component c along an axis, 1 − c is half the square of the rest
-    is_along = bool((1 - np.abs(along) <= PERPENDICULAR**2 / 2).all())
-    is_each_once = sorted(axes.tolist()) == [0, 1, 2]
-    require(is_along and is_each_once, name, f"directions {vectors}", allowed, cure)
-    first, second, third = (int(axis) for axis in axes)
-    signs = np.sign(along).astype(int).tolist()
-    x, y, z = spacing or lengths.tolist()
-    return _Layout((first, second, third), (signs[0], signs[1], signs[2]), (x, y, z))
+    require(is_along and is_each_once, name, f"directions {vectors.tolist()}", allowed, cure)
+    return _Layout(axes, np.sign(along), lengths if spacing else norms)
 
 
 def _numbers(name: str, text: str) -> list[float]:
-    """The finite numbers or nans of a text, between blanks or commas."""
+    """Return the finite numbers or nans of a text, between blanks or commas."""
     try:
         numbers = [float(word) for word in re.split(r"[\s,]+", text.strip()) if word]
     except ValueError:

@@ -6,17 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from alphacut.base.errors import RefusedError, require
-
-MAX_RATIO = 1.01
-"""Of two ratios of sides that count as equal: heads round to two or three digits."""
-OME_UNITS = {
-    "pm": 1e-6, "nm": 1e-3, "µm": 1.0, "um": 1.0, "μm": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6,
-    "Å": 1e-4, "&#181;m": 1.0, "&#xB5;m": 1.0,
-}  # fmt: skip
-"""Micrometres of the units of lengths in OME's heads."""
-OME_SIZE = r'\bPhysicalSize{0}\s*=\s*"([^"]*)"'
-OME_UNIT = r'\bPhysicalSize{0}Unit\s*=\s*"([^"]*)"'
+from alphacut.base.errors import require
 
 
 def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) -> None:
@@ -31,18 +21,17 @@ def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) 
     Raises:
         RefusedError: A stated distance is not above 0, or the ratios differ by more than 1 %.
     """
-    known = [not math.isnan(x) for x in stated]
-    shown = " × ".join(f"{x:g}" for x in stated)
-    are_lengths = all(
-        0 < x < math.inf for x, is_known in zip(stated, known, strict=True) if is_known
-    )
+    expected = list(reversed(sides))
+    pairs = zip(stated, expected, strict=True)
+    known = [(length, side) for length, side in pairs if not math.isnan(length)]
+    shown = " × ".join(f"{length:g}" for length in stated)
+    are_lengths = all(0 < length < math.inf for length, _ in known)
     require(are_lengths, name, f"voxels of {shown}", "spacings greater than 0, or none")
-    given = list(reversed(sides))
-    ratios = [x / side for x, side, is_known in zip(stated, given, known, strict=True) if is_known]
-    if ratios and max(ratios) > MAX_RATIO * min(ratios):
-        allowed = " : ".join(f"{side:g}" for side in given)
-        cure = "give cell.voxel = [x, y, z] as they are"
-        raise RefusedError(name, f"voxels of {shown} along x, y, z", allowed, cure)
+    ratios = [length / side for length, side in known] or [1.0]
+    is_alike = max(ratios) <= 1.01 * min(ratios)  # heads round to two or three digits
+    allowed = " : ".join(f"{side:g}" for side in expected)
+    cure = "give cell.voxel = [x, y, z] as they are"
+    require(is_alike, name, f"voxels of {shown} along x, y, z", allowed, cure)
 
 
 def ome_spacing(head: str) -> tuple[float, float, float]:
@@ -50,12 +39,17 @@ def ome_spacing(head: str) -> tuple[float, float, float]:
 
     They are in µm if all their units are known, else without a unit.
     """
-    lengths, factors = [], []
+    micrometres = {
+        "pm": 1e-6, "nm": 1e-3, "µm": 1.0, "um": 1.0, "μm": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6,
+        "Å": 1e-4, "&#181;m": 1.0, "&#xB5;m": 1.0,
+    }  # fmt: skip
+    lengths = []
+    factors = []
     for axis in "XYZ":
-        size = re.search(OME_SIZE.format(axis), head)
-        unit = re.search(OME_UNIT.format(axis), head)
+        size = re.search(rf'\bPhysicalSize{axis}\s*=\s*"([^"]*)"', head)
+        unit = re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head)
         lengths.append(_length(size[1] if size else ""))
-        factors.append(OME_UNITS.get(unit[1] if unit else "µm", math.nan))
+        factors.append(micrometres.get(unit[1] if unit else "µm", math.nan))
     if any(math.isnan(factor) for factor in factors):
         factors = [1.0] * 3
     x, y, z = (length * factor for length, factor in zip(lengths, factors, strict=True))
@@ -63,7 +57,7 @@ def ome_spacing(head: str) -> tuple[float, float, float]:
 
 
 def _length(text: str) -> float:
-    """The number in a text, nan where it is none."""
+    """Return the number in a text, nan where it is none."""
     try:
         return float(text)
     except ValueError:

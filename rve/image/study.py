@@ -25,8 +25,9 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.files import needed_memory, read_grid, require_memory
+from alphacut.rve.image.files import read_grid
 from alphacut.rve.image.losses import energy_fractions, loss_of_young, mean_loss
+from alphacut.rve.image.memory import needed_memory, require_memory
 from alphacut.rve.image.model import ImageCut, ImageModel, ImageSolution, usual_division
 from alphacut.rve.image.phases import (
     RIGID,

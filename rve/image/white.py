@@ -3,30 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 
-PHOTOMETRIC, WHITE_IS_ZERO = 262, 0
-"""Number of the tag of TIFF, and the value with which a stored zero is white."""
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+PHOTOMETRIC = 262
+"""Number of TIFF's tag PhotometricInterpretation."""
+WHITE_IS_ZERO = 0
+"""Its value where a stored zero is white."""
 
 
-def tags_of(picture: object) -> Mapping[int, object]:
+def tags_of(picture: Image) -> Mapping[int, object]:
     """Return the tags of a page of TIFF that Pillow has opened, by their numbers; {} of others."""
     tags: Mapping[int, object] = getattr(picture, "tag_v2", {})
     return tags
 
 
+def stored_values(picture: Image) -> Array:
+    """Return the values of a picture as its file stores them, shape (rows, columns).
+
+    Pillow inverts pictures of 8 bits, and no others, whose stored zeros are white.
+    """
+    values = np.asarray(picture)
+    if picture.mode == "L" and tags_of(picture).get(PHOTOMETRIC) == WHITE_IS_ZERO:
+        return np.asarray(np.uint8(255) - values)
+    return values
+
+
 def as_shown(name: str, values: Array, photometric: object) -> Array:
     """Return the stored values of a picture or a stack such that bright is large.
 
-    Readers differ: Pillow inverts such pictures of 8 bits and no others, tifffile none.
-
     Args:
         name: Name of the file.
-        values: Values as stored, any shape.
+        values: Values as stored, of any shape.
         photometric: The file's PhotometricInterpretation.
 
     Raises:

@@ -9,7 +9,8 @@ import pytest
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.image.bounds import Enclosure
-from alphacut.rve.image.files import needed_memory, read_grid
+from alphacut.rve.image.files import read_grid
+from alphacut.rve.image.memory import needed_memory
 from alphacut.rve.image.model import ImageModel, solve_image, usual_division
 from alphacut.rve.image.phases import (
     ModuliImages,

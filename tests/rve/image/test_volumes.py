@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 from alphacut.fuzzy import RefusedError
-from alphacut.rve.image.files import files_of, read_grid, require_memory
+from alphacut.rve.image.files import files_of, read_grid
+from alphacut.rve.image.memory import require_memory
 
 tifffile = pytest.importorskip("tifffile")
 SHAPE, CUBE = (12, 5, 7), (1, 1, 1)
