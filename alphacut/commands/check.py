@@ -182,7 +182,7 @@ def records_text(
     """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):
-        counts = f"{raw.step:g} s", f"{len(raw.samples)}", percent_text(raw.offset_share, 2)
+        counts = f"{raw.step:g} s", f"{len(raw.samples)}", percent_text(raw.mean_to_peak_ratio, 2)
         peaks = raw.peak, record.measures["PGA"], record.measures["Sa(T1)"]
         sizes = (f"{peak / STANDARD_GRAVITY:.3g} g" for peak in peaks)
         file_cells = raw.name, raw.file_format, raw.unit

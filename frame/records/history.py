@@ -52,94 +52,126 @@ class History:
         """Store step and samples as numbers; refuse values that are not allowed."""
         allowed = "two or more finite samples, a positive step"
         try:
-            samples, step = np.asarray(self.samples, float), float(self.step)
+            samples = np.asarray(self.samples, float)
+            step = float(self.step)
         except (TypeError, ValueError):
             what = f"{self.samples!r} every {self.step!r} s"
             raise RefusedError(self.key, what, allowed) from None
         is_series = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
         what = f"{samples.size} samples every {step:g} s"
         require(is_series and 0 < step < np.inf, self.key, value=what, allowed=allowed)
-        for name in ("start", "frequency"):
-            checked_number(name, getattr(self, name), least=0)
+        checked_number("start", self.start, least=0)
+        checked_number("frequency", self.frequency, least=0)
         checked_number("phase", self.phase)
         object.__setattr__(self, "step", step)
         object.__setattr__(self, "samples", samples)
 
     @classmethod
     def constant(cls, start: float = 0.0, *, is_static: bool = False) -> Self:
-        """1 from a time on."""
+        """Return the history that is 1 from the time `start` on, in s."""
         return cls(1.0, np.ones(2), start, is_held=True, is_static=is_static)
 
     @classmethod
     def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
-        """A sine of unit amplitude from the time `start` on, where it has the phase, in rad."""
+        """Return a sine of unit amplitude from the time `start` on, in s, where it has the phase.
+
+        Args:
+            hertz: Frequency in Hz, greater than 0.
+            phase: Phase at `start`, in rad.
+            start: Time at which it begins, in s.
+        """
         checked_number("frequency", hertz, positive=True)
         omega = 2 * np.pi * float(hertz)
         return cls(1.0, np.ones(2), start, is_held=True, frequency=omega, phase=phase)
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What tells it from other histories."""
-        flags = self.is_held, self.is_static
-        return (self.step, self.samples.tobytes(), self.start, self.frequency, self.phase, *flags)
+        """Hashable value that two histories have in common only if they are equal."""
+        samples = self.samples.tobytes()
+        wave = self.frequency, self.phase
+        return (self.step, samples, self.start, *wave, self.is_held, self.is_static)
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Bounds of ``|f|`` and of ``|f′|`` between jumps."""
-        size, rise = (float(np.abs(x).max()) for x in (self.samples, np.diff(self.samples)))
-        return size, rise / self.step + self.frequency * size
+        """Upper bounds of |f| and, between jumps, of |f′|.
+
+        With |g| ≤ G and |g′| ≤ S, |f| ≤ G and |f′| ≤ |g′| |sin| + |g| Ω |cos| ≤ S + G Ω.
+        """
+        magnitude = float(np.abs(self.samples).max())
+        slope = float(np.abs(np.diff(self.samples)).max()) / self.step
+        return magnitude, slope + self.frequency * magnitude
 
     def values(self, time: Array) -> Array:
-        """Values of f at times, the same shape."""
+        """Return f at times in s, in the same shape."""
         times = np.asarray(time, float)
         return self.envelope(times) * self.wave(times)
 
     def largest_in_steps(self, time: Array) -> Array:
-        """Bound of ``|f|`` within the step to each of rising times, shape (T,); 0 at the first."""
-        # |g| is largest at an end of the step or at a sample in it, and |sin| at most 1
+        """Return an upper bound of |f| in the step before each of rising times in s, shape (T,).
+
+        The first entry, before which there is no step, is 0.
+        """
+        # In a step |g| is largest at an end or at a sample inside, and the sine is at most 1. The
+        # interval behind each of these times is left by the value before a jump.
         samples = self.start + np.arange(len(self.samples)) * self.step
         inside = samples[(samples > time[0]) & (samples < time[-1])]
         times = np.union1d(time, inside)
-        size = np.maximum(np.abs(self.envelope(times)[:-1]), np.abs(self.envelope(times, -1.0)[1:]))
+        at_start = np.abs(self.envelope(times)[:-1])
+        at_end = np.abs(self.envelope(times, -1.0)[1:])
         largest = np.zeros(len(time))
-        largest[1:] = np.maximum.reduceat(size, np.searchsorted(times, time[:-1]))
+        first_intervals = np.searchsorted(times, time[:-1])
+        largest[1:] = np.maximum.reduceat(np.maximum(at_start, at_end), first_intervals)
         return largest
 
     def before(self, time: Array) -> Array:
-        """Values of f at times, before what jumps there, the same shape."""
+        """Return f at times in s, in the same shape; where it jumps, its value before the jump."""
         return self.envelope(time, -1.0) * self.wave(time)
 
     def jumps_at(self, time: Array) -> Mask:
-        """Whether f jumps at each of the times, (T,)."""
+        """Return whether f may jump at each of the times, in the same shape."""
         return np.asarray(self.envelope(time, -1.0) != self.envelope(time))
 
     def jumps_in_steps(self, time: Array) -> Mask:
-        """Whether f may jump within the step to each of the rising times, or at its end, (T,)."""
+        """Return whether f may jump in the step before each of rising times, or at its end.
+
+        Args:
+            time: Times in s, shape (T,).
+
+        Returns:
+            Mask of shape (T,), whose first entry is False.
+        """
+        jumps = np.zeros(len(time) + 1, bool)
         ends = [(self.start, self.samples[0])]
         if not self.is_held:
             ends.append((self.start + (len(self.samples) - 1) * self.step, self.samples[-1]))
-        jumps = np.zeros(len(time) + 1, bool)
-        # a node next to a jump has the value after it
-        jumps[
-            [np.searchsorted(time, at - SAME_TIME * self.step) for at, value in ends if value]
-        ] = True
+        for end, value in ends:
+            if value:
+                # A time next to a jump counts as at the jump, and has the value after it.
+                jumps[np.searchsorted(time, end - SAME_TIME * self.step)] = True
         jumps[0] = False
         return jumps[:-1]
 
     def wave(self, time: Array) -> Array:
-        """The sine that g is multiplied by; ones where there is none."""
+        """Return the sine by which g is multiplied, or ones without one, in the shape of `time`."""
         if not self.frequency:
             return np.ones_like(time)
         return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
-        """Values of g at times, same shape: after jumps (`side` 1) or before them (−1)."""
-        n, position = len(self.samples), (time - self.start) / self.step
+        """Return g at times in s, in the same shape.
+
+        Args:
+            time: The times.
+            side: 1 for values after jumps, -1 for values before them.
+        """
+        n = len(self.samples)
+        position = (time - self.start) / self.step  # in steps
         is_sample = np.abs(position - np.round(position)) < SAME_TIME
         position = np.where(is_sample, np.round(position), position)
         inside: Array = np.interp(position, np.arange(n), self.samples)
         after = np.greater_equal if side > 0 else np.greater
-        has_started, has_ended = after(position, 0), after(position, n - 1) & (not self.is_held)
+        has_started = after(position, 0)
+        has_ended = after(position, n - 1) & (not self.is_held)
         return np.asarray(np.where(has_started & ~has_ended, inside, 0.0))
 
 

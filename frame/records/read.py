@@ -22,17 +22,18 @@ from alphacut.frame.records.uff import is_universal, read_uff_record
 from alphacut.frame.records.units import acceleration_factor
 
 READ = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
-MINISEED = re.compile(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03")
-SAC_HEAD, SAC_VERSION, SAC_COUNT = 632, 76, 79
-"""Bytes of the head of a SAC file; words in it with its version (6 or 7) and number of samples."""
 
 
 def read_recording(
     path: Path, channel: str = "", step: float | None = None, unit: str = ""
 ) -> Recording:
-    """Reads a recording, or one channel of several, from a file of one of the formats in `READ`.
+    """Read a recording, or one channel of several, from a file of one of the formats in `READ`.
 
-    Step in s and unit are for files that do not say them.
+    Args:
+        path: The file.
+        channel: Name of the channel; empty where there is only one.
+        step: Time between samples in s, for files that do not state it.
+        unit: Unit of the samples, for files that state none.
 
     Raises:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
@@ -40,7 +41,7 @@ def read_recording(
     """
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged numbers, which are refused
-            recording = _read_by_marks(path, channel, step, unit)
+            recording = _read_by_marks(path, channel, step, unit=unit)
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
@@ -51,20 +52,21 @@ def read_recording(
     return recording
 
 
-def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> Recording:
+def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -> Recording:
+    """Read a file by the format whose marks it has; arguments and errors as of `read_recording`."""
     content = read_bytes(path)
     require(bool(content.strip()), path.name, "empty", "a file with a record", "load it anew")
     if is_universal(content):
         return read_uff_record(path.name, content, channel, unit)
-    if _waveform_format(content):
-        return _read_waveform(path, content, channel, unit)
+    if file_format := _waveform_format(content):
+        return _read_waveform(path.name, content, file_format, channel=channel, unit=unit)
     file = TextFile.from_bytes(path.name, content)
     if is_geonet(file):
         return read_geonet(file, channel)
     if is_cosmos(file):
         return read_cosmos(file, channel, unit)
     for mark, n_lines, read in FORMATS:
-        if any(map(mark.match, file.lines[:n_lines])):
+        if any(mark.match(line) for line in file.lines[:n_lines]):
             return read(file, unit)
     if is_table(file, is_described=bool(channel or (step and unit))):
         return read_table(file, step, unit, channel)
@@ -73,48 +75,63 @@ def _read_by_marks(path: Path, channel: str, step: float | None, unit: str) -> R
 
 
 def _waveform_format(content: bytes) -> str:
-    """ObsPy's name of the format of a content that is SAC or miniSEED; empty of others."""
-    for order in ("<i4", ">i4") if len(content) > SAC_HEAD else ():
-        head = np.frombuffer(content[:SAC_HEAD], order)
-        version, count = int(head[SAC_VERSION]), int(head[SAC_COUNT])
-        if version in (6, 7) and 0 < 4 * count <= len(content) - SAC_HEAD:
-            return "SAC"
-    return "MSEED" if MINISEED.match(content) else ""
+    """Return ObsPy's name of the format of a content in bytes, SAC or MSEED; empty of others."""
+    head_bytes = 632
+    if len(content) > head_bytes:
+        for order in ("<i4", ">i4"):
+            words = np.frombuffer(content[:head_bytes], order)
+            version, count = int(words[76]), int(words[79])
+            if version in (6, 7) and 0 < 4 * count <= len(content) - head_bytes:
+                return "SAC"
+    return "MSEED" if re.match(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03", content) else ""
 
 
-def _read_waveform(path: Path, content: bytes, channel: str, unit: str) -> Recording:
-    """Recording of a file of miniSEED or SAC, which have no unit: the case says it."""
+def _read_waveform(
+    name: str, content: bytes, file_format: str, *, channel: str, unit: str
+) -> Recording:
+    """Return the recording in a file of miniSEED or SAC, which have no unit.
+
+    Args:
+        name: Name of the file, for messages.
+        content: The file.
+        file_format: ObsPy's name of the format.
+        channel: Name of the channel; empty where there is only one.
+        unit: Unit that the case states.
+
+    Raises:
+        RefusedError: ObsPy is not installed or cannot read the file, there is no such channel or it
+            has gaps, the unit is missing, or the samples do not fit the peak in the head.
+    """
     try:
         import obspy
     except ImportError:
         cure = "pip install 'alphacut[obspy]'"
-        raise RefusedError(path.name, "miniSEED or SAC", "with obspy", cure) from None
-    file_format = _waveform_format(content)
+        raise RefusedError(name, "miniSEED or SAC", "with obspy", cure) from None
     try:
-        # ObsPy is told the format, since to find one it loads pickles, which are programs; it is
-        # handed the content, since of names it unpacks archives and follows patterns
+        # ObsPy is told the format, since to find one it loads pickles, which are programs. It is
+        # handed the content, since of names it unpacks archives and follows patterns.
         traces = list(obspy.read(BytesIO(content), format=file_format))
     except Exception as error:  # readers of damaged files raise errors of many kinds
         reason = " ".join(str(error).split())[:80] or type(error).__name__
-        raise RefusedError(path.name, reason, "miniSEED or SAC that obspy reads") from None
+        raise RefusedError(name, reason, "miniSEED or SAC that obspy reads") from None
     names = [(str(trace.stats.channel).lower(),) for trace in traces]
-    trace = traces[choose_channel(f"{path.name} without gaps", channel, names)]
-    require(bool(unit), path.name, "without a unit", 'records.unit = "m/s^2"')
-    samples, step = np.asarray(trace.data, float), float(trace.stats.delta)
-    channel = str(trace.stats.channel)
+    trace = traces[choose_channel(f"{name} without gaps", channel, names)]
+    require(bool(unit), name, "without a unit", 'records.unit = "m/s^2"')
     return recording_in_si(
-        path.name,
+        name,
         file_format,
         unit,
-        step,
-        samples,
-        channel,
+        float(trace.stats.delta),
+        np.asarray(trace.data, float),
+        str(trace.stats.channel),
         stated=_sac_peak(trace.stats.get("sac", {}), unit),
     )
 
 
 def _sac_peak(head: Mapping[str, Any], unit: str) -> list[StatedPeak]:
-    """The peak that the head of a SAC file states in the unit of its samples; none in others."""
-    extremes = [abs(float(head[key])) for key in ("depmin", "depmax") if key in head]
+    """Return the peak that the head of a SAC file states in a unit; none of another format."""
     to_si = acceleration_factor(unit)
-    return [StatedPeak(to_si * max(extremes))] if len(extremes) == 2 and to_si else []
+    if to_si is None or not {"depmin", "depmax"} <= head.keys():
+        return []
+    magnitude = max(abs(float(head["depmin"])), abs(float(head["depmax"])))
+    return [StatedPeak(to_si * magnitude)]

@@ -14,23 +14,20 @@ from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.records.history import Accelerogram
 
 Baseline = Literal["none", "mean", "linear"]
-LARGEST_PEAK = 5.0
-"""In g; the largest that instruments have recorded on the ground is about 4."""
-USUAL_STEPS = 1e-4, 0.1
-"""In s: instruments sample 50 to 1000 times a second, and simulations at least ten times."""
-VERTICAL = re.compile(
-    r"(?:.*\W)?(?:up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z)(?:\W.*)?", re.I
-)
-"""Names of vertical channels: as a word, or SEED codes such as HNZ."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Samples of one channel, shape (n,), in m/s², before any processing; their step is in s.
+    """Samples of one channel before any processing.
 
-    `unit` is the file's, `channel` its own name of the channel or empty. `remarks` are clauses on
-    what reading left out or took for granted. `name` is that of its results: of the file without
-    ending, and of a channel asked for.
+    Args:
+        file_format: Name of the format of the file.
+        unit: Unit of the samples in the file.
+        step: Time between samples, in s.
+        samples: The samples, in m/s², shape (n,).
+        channel: The file's own name of the channel; empty if it has none.
+        remarks: Clauses on what reading left out or took for granted.
+        name: Name of its results: that of the file without ending, and of a channel asked for.
     """
 
     file_format: str
@@ -47,7 +44,7 @@ class Recording:
         return float(np.abs(self.samples).max())
 
     @property
-    def offset_share(self) -> float:
+    def mean_to_peak_ratio(self) -> float:
         """Mean acceleration over the peak; 0 of a recording of zeros."""
         return float(self.samples.mean()) / self.peak if self.peak > 0 else 0.0
 
@@ -55,29 +52,44 @@ class Recording:
         """Yield clauses on what a user should look at: unusual values, a vertical channel."""
         yield from self.remarks
         peak_in_g = self.peak / STANDARD_GRAVITY
-        if peak_in_g > LARGEST_PEAK:
+        if peak_in_g > 5:  # the largest that instruments have recorded on the ground is about 4
             yield f"its peak is {peak_in_g:.3g} g: check the unit {self.unit}"
-        if not USUAL_STEPS[0] <= self.step <= USUAL_STEPS[1]:
+        # Instruments sample 50 to 1000 times a second, and simulations at least ten times.
+        if not 1e-4 <= self.step <= 0.1:
             yield f"its step is {self.step:g} s: check it"
-        if VERTICAL.fullmatch(self.channel):
+        # Vertical channels have one of these words, or a SEED code such as HNZ.
+        words = "up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z"
+        if re.fullmatch(rf"(?:.*\W)?(?:{words})(?:\W.*)?", self.channel, re.IGNORECASE):
             yield f"its channel {self.channel} is vertical"
 
     def accelerogram(self, baseline: Baseline = "none") -> Accelerogram:
-        """Record of these samples, without their mean or their straight line of least squares."""
+        """Return the record of these samples, without their baseline.
+
+        Args:
+            baseline: What is subtracted: "none", the "mean" of the samples, or their straight line
+                of least squares ("linear").
+        """
         samples = self.samples
         if baseline != "none":
             samples = samples - samples.mean()
         if baseline == "linear":
-            time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps, of mean 0
+            # With times of mean 0 the slope is Σ t a / Σ t², and the line passes through the mean.
+            time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps
             samples = samples - time * (time @ samples) / max(float(time @ time), 1.0)
         return Accelerogram(self.step, samples, name=self.name, remarks=tuple(self.doubts()))
 
 
 def arias_fractions(samples: Array, step: float) -> Array:
-    """Arias intensity up to each sample over that of the whole record, shape (n,).
+    """Return the Arias intensity up to each sample over that of the whole record, shape (n,).
 
-    The integral of the squared piecewise linear acceleration is exact; of zeros it is zeros.
+    The Arias intensity is proportional to ∫ a² dt. For a piecewise linear acceleration the integral
+    over a step h from a to b is exactly h (a² + a b + b²) / 3.
+
+    Args:
+        samples: Accelerations at even times, shape (n,). Of zeros the fractions are zeros.
+        step: Time between samples.
     """
     left, right = samples[:-1], samples[1:]
-    intensity = np.append(0.0, np.cumsum(left**2 + left * right + right**2)) * step / 3
+    squares = left**2 + left * right + right**2
+    intensity = np.append(0.0, np.cumsum(squares)) * step / 3
     return np.asarray(intensity / intensity[-1] if intensity[-1] > 0 else intensity)

@@ -13,18 +13,6 @@ from alphacut.base.errors import require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.frame.records.units import acceleration_factor
 
-STATED = re.compile(
-    r"\b(?:PGA|(?:peak|pk|max(?:imum)?)\b\.?(?:\s*(?:ground\s+)?acc\w*\.?)?(?:\s*value)?)\s*"
-    r"(?:[(\[]([^)\]]+)[)\]]\s*[=:]?|[=:])\s*"
-    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[(\[]?([^\s,;)\]]*)",
-    re.IGNORECASE,
-)
-"""A peak in a line of a head, as "MAX = 0.030 G" or "Max. Acc. (gal) 632.2": unit, number, unit."""
-TOLERANCE = 0.05
-"""Relative difference of both peaks that is not remarked, since networks filter and interpolate."""
-MAX_RATIO = 2.0
-"""Ratio of both peaks beyond which a file is refused: its unit or its samples are wrong."""
-
 
 @dataclass(frozen=True)
 class StatedPeak:
@@ -35,22 +23,32 @@ class StatedPeak:
 
 
 def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
-    """Yield the peak accelerations that lines of a head state; `unit` is for those without one.
+    """Yield the peak accelerations that lines of a head state, as "MAX = 0.030 G".
 
-    Peaks in units of another quantity, as of velocities, and zeros are left out.
+    The unit may stand before the number as well, as in "Max. Acc. (gal) 632.2". Peaks in units of
+    another quantity, as of velocities, and zeros are left out.
+
+    Args:
+        lines: Lines of the head.
+        unit: Unit of peaks that are stated without one.
     """
+    name = r"(?:PGA|(?:peak|pk|max(?:imum)?)\b\.?(?:\s*(?:ground\s+)?acc\w*\.?)?(?:\s*value)?)"
+    unit_before = r"(?:[(\[](?P<before>[^)\]]+)[)\]]\s*[=:]?|[=:])"
+    number = r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+    unit_behind = r"[(\[]?(?P<behind>[^\s,;)\]]*)"
+    pattern = rf"\b{name}\s*{unit_before}\s*{number}\s*{unit_behind}"
     for line in lines:
-        for match in STATED.finditer(line):
-            before, number, behind = match.groups()
-            own_unit = before or behind
-            is_without = own_unit is None or own_unit.lower() in ("", "at")
+        for match in re.finditer(pattern, line, re.IGNORECASE):
+            own_unit = match["before"] or match["behind"]
+            is_without = own_unit.lower() in ("", "at")
             to_si = acceleration_factor(unit if is_without else own_unit)
-            if to_si is None or float(number) == 0:
+            magnitude = abs(float(match["number"]))
+            if to_si is None or magnitude == 0:
                 continue
-            digits = number.lower().partition("e")[0].partition(".")[2]
-            exponent = int(number.lower().partition("e")[2] or 0)
-            half_digit = 0.5 * 10.0 ** (exponent - len(digits))
-            yield StatedPeak(to_si * abs(float(number)), to_si * half_digit)
+            mantissa, _, exponent = match["number"].lower().partition("e")
+            decimals = len(mantissa.partition(".")[2])
+            rounding = 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+            yield StatedPeak(to_si * magnitude, to_si * rounding)
 
 
 def remarks_on_peak(
@@ -59,7 +57,8 @@ def remarks_on_peak(
     """Return a clause if the peak of the samples is none of those that the head states.
 
     A peak may be that of the samples or of the samples without their mean: networks state the peak
-    of a record before or after they remove the offset of its sensor.
+    of a record before or after they remove the offset of its sensor. Differences up to 5 % are not
+    remarked, since networks filter and interpolate.
 
     Args:
         location: File and line, for the message.
@@ -68,24 +67,24 @@ def remarks_on_peak(
         unit: Unit in which the samples were read, for the message.
 
     Raises:
-        RefusedError: The nearest stated peak is more than `MAX_RATIO` times larger or smaller.
+        RefusedError: The nearest stated peak is more than twice as large or small as that of the
+            samples, so that the unit or the samples are wrong.
     """
     peaks = [peak for peak in stated if 0 < peak.magnitude < np.inf]
     if not peaks or len(samples) == 0:
         return ()
-    found = [float(np.abs(samples).max()), float(np.abs(samples - samples.mean()).max())]
-    ratios = []
+    with_mean = float(np.abs(samples).max())
+    without_mean = float(np.abs(samples - samples.mean()).max())
+    differences = []  # logarithms of the ratios
     for peak in peaks:
-        for magnitude in found:
-            difference = abs(magnitude - peak.magnitude)
-            if difference <= peak.rounding + TOLERANCE * peak.magnitude:
+        for magnitude in (with_mean, without_mean):
+            if abs(magnitude - peak.magnitude) <= peak.rounding + 0.05 * peak.magnitude:
                 return ()
-            ratios.append(max(magnitude, 1e-300) / peak.magnitude)
-    ratio = min(ratios, key=lambda ratio: abs(np.log(ratio)))
-    in_g = f"{found[0] / STANDARD_GRAVITY:.3g} g"
+            differences.append(abs(np.log(max(magnitude, 1e-300) / peak.magnitude)))
+    in_g = f"{with_mean / STANDARD_GRAVITY:.3g} g"
     stated_in_g = f"{peaks[-1].magnitude / STANDARD_GRAVITY:.3g} g"
     what = f"a peak of {in_g}, where its head states {stated_in_g}"
     cure = f"look at the unit, {unit}, and mend the head"
-    is_near = 1 / MAX_RATIO <= ratio <= MAX_RATIO
-    require(is_near, location, what, "samples whose peak is that of the head", cure)
+    allowed = "samples whose peak is that of the head"
+    require(min(differences) <= np.log(2), location, what, allowed, cure)
     return (f"its peak is {in_g}, and its head states {stated_in_g}: check the unit {unit}",)

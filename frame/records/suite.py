@@ -20,9 +20,7 @@ from alphacut.frame.records.text_file import ACCELERATION_UNITS
 from alphacut.frame.records.units import acceleration_factor
 
 MAX_RECORDS = 500
-"""Files of a suite; more are a slip in the pattern."""
-NO_NAME = re.compile(r"[^A-Za-z0-9_+-]+")
-"""Characters of a file's name that the name of its results does not have."""
+"""Files of a suite; more are a mistake in the pattern."""
 
 
 def read_record(
@@ -97,10 +95,14 @@ def read_suite(
     if isinstance(files, Sequence) and not isinstance(files, str):
         patterns = files
     for pattern in patterns:
-        path, is_file = path_of("files", pattern), False
+        path = path_of("files", pattern)
+        is_file = False
         with suppress(OSError):  # of a name that is too long
             is_file = path.is_file()
-        paths += [path] if is_file else map(Path, sorted(glob(str(pattern))))
+        if is_file:
+            paths.append(path)
+        else:
+            paths += [Path(name) for name in sorted(glob(str(pattern)))]
     recordings = read_recordings(paths, channel=channel, step=step, unit=unit, shown=files)
     require_distinct("files", recordings)
     return tuple(recording.accelerogram(baseline) for recording in recordings)
@@ -116,8 +118,12 @@ def read_recordings(
 ) -> tuple[Recording, ...]:
     """Read a channel of each file, in their order.
 
-    `channel`, `step` in s and `unit` are those of `read_record`; `shown` are the files as the
-    caller gave them, for the message that there is none.
+    Args:
+        paths: The files.
+        channel: Channel of every file, as of `read_record`.
+        step: Time between samples, in s, of files that do not state it.
+        unit: Unit of files that state none.
+        shown: The files as the caller gave them, for the message that there is none.
 
     Raises:
         RefusedError: There is no file, or more than `MAX_RECORDS`; or some cannot be read: all of
@@ -133,16 +139,19 @@ def read_recordings(
         except RefusedError as error:
             errors.append(error)
             continue
-        remarks = (*recording.remarks, *_own_values(recording, step, unit))
-        name = NO_NAME.sub("_", path.stem) + (f"_{channel}" if channel else "")
+        remarks = (*recording.remarks, *_contradictions(recording, step, unit))
+        # Names of results are those of files and variables as well, and have their alphabet.
+        name = re.sub(r"[^A-Za-z0-9_+-]+", "_", path.stem)
+        if channel:
+            name += f"_{channel}"
         recordings.append(replace(recording, name=name, remarks=remarks))
     if errors:
         first, *others = errors
-        cures = [first.cure] if first.cure else []
-        if others:  # in the cure, which is never cut off
+        cure = first.cure
+        if others:  # named in the cure, which is never cut off
             names = ", ".join(error.key.partition(",")[0] for error in others)
-            cures.insert(0, f"bad as well: {names}")
-        raise RefusedError(first.key, first.value, first.allowed, "; ".join(cures))
+            cure = "; ".join(filter(None, (f"bad as well: {names}", cure)))
+        raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(recordings)
 
 
@@ -154,6 +163,7 @@ def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
 
 
 def _require_arguments(channel: str, step: float | None, *, unit: str, baseline: str) -> None:
+    """Refuse arguments of `read_record` of another type, or unknown units and baselines."""
     require(isinstance(channel, str), "channel", repr(channel), 'a name in quotes, as "2"')
     if step is not None:
         checked_number("step", step, positive=True)
@@ -162,7 +172,7 @@ def _require_arguments(channel: str, step: float | None, *, unit: str, baseline:
     require_choice("baseline", baseline, get_args(Baseline))
 
 
-def _own_values(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
+def _contradictions(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
     """Yield a clause on a step and on a unit that the file states otherwise than the caller."""
     if step and not isclose(step, recording.step, rel_tol=1e-6):
         yield f"its own step, {recording.step:g} s, is taken, not {step:g} s"

@@ -19,30 +19,6 @@ NEWTONS = {
     "N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
     "kip": 4448.2216152605,
 }  # fmt: skip
-GRAVITY_UNIT = re.compile(
-    r"(10\s*\*?|milli|m|%|‰)?\s*g(?:'s|s)?\s*(/\s*10|\*\s*10)?", re.IGNORECASE
-)
-GRAVITY_PREFIXES = {"": 1.0, "10": 10.0, "milli": 1e-3, "m": 1e-3, "%": 1e-2, "‰": 1e-3}
-GALS = {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5}
-_SECOND = r"s(?:ec)?"
-PER_SECOND_SQUARED = re.compile(
-    rf"([a-zµμ]+?)\s*(?:/\s*{_SECOND}\s*/\s*{_SECOND}"
-    rf"|(?:/\s*{_SECOND}|[\s*·]\s*s)\s*(?:\^|\*\*)?\s*[-−]?[2²])",
-    re.IGNORECASE,
-)
-"""A length over a second squared, as cm/s^2, CM/SEC**2, cm/s/s or cm s-2."""
-PER_SECOND = re.compile(rf"([a-zµμ]+?)\s*(?:/\s*{_SECOND}|[\s*·]\s*s\s*(?:\^|\*\*)?\s*[-−]1)", re.I)
-OTHER_UNITS = {
-    "a number of counts, which the sensor's sensitivity turns into an acceleration": re.compile(
-        r"counts?|cnts?|digits?|bits?|lsb", re.I
-    ),
-    "a voltage, which the sensor's sensitivity turns into an acceleration": re.compile(
-        r"[kmµμ]?v|volts?", re.I
-    ),
-    "a pressure": re.compile(r"[kmgh]?pa|m?bar|psi|ksi", re.I),
-    "an angle": re.compile(r"m?rad|deg|degrees?|°", re.I),
-}
-"""Units of other quantities that instruments record, by what the quantity is called."""
 
 
 def seconds_of(unit: str) -> float:
@@ -51,24 +27,47 @@ def seconds_of(unit: str) -> float:
 
 
 def acceleration_factor(unit: str) -> float | None:
-    """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
-    text = unit.strip().strip("()[]").strip().rstrip(".")
-    if match := GRAVITY_UNIT.fullmatch(text):
+    """Return the factor to m/s² of a unit of acceleration as files of records write it.
+
+    Multiples of g are "mg", "%g", "g/10" and "10*g"; a length over a second squared may be
+    "cm/s^2", "CM/SEC**2", "cm/s/s" or "cm s-2". Other units give None.
+    """
+    text = _without_brackets(unit)
+    multiple = r"(10\s*\*?|milli|m|%|‰)?\s*g(?:'s|s)?\s*(/\s*10|\*\s*10)?"
+    if match := re.fullmatch(multiple, text, re.IGNORECASE):
+        prefixes = {"": 1.0, "10": 10.0, "milli": 1e-3, "m": 1e-3, "%": 1e-2, "‰": 1e-3}
         prefix = (match[1] or "").rstrip(" *").lower()
         tenfold = {"": 1.0, "/": 0.1, "*": 10.0}[(match[2] or "")[:1]]
-        return STANDARD_GRAVITY * GRAVITY_PREFIXES[prefix] * tenfold
-    if match := PER_SECOND_SQUARED.fullmatch(text):
+        return STANDARD_GRAVITY * prefixes[prefix] * tenfold
+    second = r"s(?:ec)?"
+    twice = rf"/\s*{second}\s*/\s*{second}"
+    squared = rf"(?:/\s*{second}|[\s*·]\s*s)\s*(?:\^|\*\*)?\s*[-−]?[2²]"
+    if match := re.fullmatch(rf"([a-zµμ]+?)\s*(?:{twice}|{squared})", text, re.IGNORECASE):
         return METRES.get(match[1].lower())
-    return GALS.get(text.lower())
+    return {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5}.get(text.lower())
 
 
 def other_quantity(unit: str) -> str:
-    """Name of the quantity, not an acceleration, that a unit is of; empty if it is not known."""
-    text = unit.strip().strip("()[]").strip().rstrip(".")
-    if text.lower() in METRES:
-        return "a displacement"
-    if (match := PER_SECOND.fullmatch(text)) and match[1].lower() in METRES:
-        return "a velocity"
+    """Return the name of the quantity, not an acceleration, of a unit; empty if it is not known."""
+    text = _without_brackets(unit)
     if text in NEWTONS:
         return "a force"
-    return next((name for name, pattern in OTHER_UNITS.items() if pattern.fullmatch(text)), "")
+    length = "|".join(METRES)
+    patterns = {
+        "a displacement": length,
+        "a velocity": rf"(?:{length})\s*(?:/\s*s(?:ec)?|[\s*·]\s*s\s*(?:\^|\*\*)?\s*[-−]1)",
+        "a number of counts, which the sensor's sensitivity turns into an acceleration": (
+            r"counts?|cnts?|digits?|bits?|lsb"
+        ),
+        "a voltage, which the sensor's sensitivity turns into an acceleration": r"[kmµμ]?v|volts?",
+        "a pressure": r"[kmgh]?pa|m?bar|psi|ksi",
+        "an angle": r"m?rad|deg|degrees?|°",
+    }
+    for name, pattern in patterns.items():
+        if re.fullmatch(pattern, text, re.IGNORECASE):
+            return name
+    return ""
+
+
+def _without_brackets(unit: str) -> str:
+    return unit.strip().strip("()[]").strip().rstrip(".")

@@ -17,7 +17,7 @@ def test_a_mean_or_a_straight_line_is_taken_away():
     assert recording(wave + 3).accelerogram("mean").samples == pytest.approx(wave, abs=1e-12)
     line = recording(5 - 2 * TIME).accelerogram("linear").samples
     assert line == pytest.approx(np.zeros(1001), abs=1e-12)
-    assert recording(wave + 3).offset_share == pytest.approx(0.75)
+    assert recording(wave + 3).mean_to_peak_ratio == pytest.approx(0.75)
 
 
 def test_arias_fractions_are_those_of_the_piecewise_linear_record(rng):
