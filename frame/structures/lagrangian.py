@@ -70,28 +70,33 @@ class LagrangianSystem(StructureModel):
             require_names(f"name in {name}", mapping)
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
+
         eq = self.symbols
-        fits = not eq.mass.free_symbols & set(eq.v)
-        require(fits, "lagrangian", value=eq.mass.tolist(), allowed="functions quadratic in v")
+        is_quadratic = not eq.mass.free_symbols & set(eq.v)
+        allowed = "functions quadratic in v"
+        require(is_quadratic, "lagrangian", value=eq.mass.tolist(), allowed=allowed)
         for name in self.observed:
             self.output(name, eq.v)
-        start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
+        q0, v0 = self.start()
+        at_start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
         nominal = {eq.p[name]: value for name, value in self.parameters.items()}
-        has_inertia = abs(eq.mass.subs(start).subs(nominal).evalf().det()) >= 1e-300
+        has_inertia = abs(eq.mass.subs(at_start).subs(nominal).evalf().det()) >= 1e-300
         key, allowed = "mass of the lagrangian", "inertia of each coordinate"
         require(has_inertia, key, value="singular", allowed=allowed)
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
-        """The initial state (q0, v0) in symbols."""
+        """Return the initial state (q0, v0) as expressions in the parameters, n of each."""
         p, n = self.symbols.p, self.coordinates
         q0 = _expressions("initial", lambda: self.initial(p)[0], p, n)
-        return q0, _expressions("initial", lambda: self.initial(p)[1], p, n)
+        v0 = _expressions("initial", lambda: self.initial(p)[1], p, n)
+        return q0, v0
 
     def output(self, name: str, velocity: Symbols) -> Expr:
-        """An output as an expression in coordinates, given velocities and parameters."""
-        q, p, expression = list(self.symbols.q), self.symbols.p, self.observed[name]
-        value = _expressions(f"observed: {name}", lambda: [expression(q, list(velocity), p)], p)
-        return value[0]
+        """Return an output as an expression in coordinates, the given velocities and parameters."""
+        q, p = list(self.symbols.q), self.symbols.p
+        function = self.observed[name]
+        values = _expressions(f"observed: {name}", lambda: [function(q, list(velocity), p)], p)
+        return values[0]
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -110,16 +115,23 @@ class LagrangianSystem(StructureModel):
 
 
 class Equations:
-    """Symbols and expressions of a system, from its Lagrangian.
+    """Symbols of a system, and the terms of its equations of motion d/dt(∂L/∂v) = ∂L/∂q + F.
 
-    They are q, v, parameters p by name, momentum ∂L/∂v, push ∂L/∂q + F and mass ∂²L/∂v².
+    Attributes:
+        q: Symbols of the coordinates, a column of n.
+        v: Symbols of the velocities, a column of n.
+        p: Symbols of the parameters by name.
+        momentum: ∂L/∂v, a column of n.
+        push: ∂L/∂q + F, a column of n.
+        mass: ∂²L/∂v², n × n.
     """
 
     def __init__(self, system: LagrangianSystem) -> None:
         import sympy
 
         n = system.coordinates
-        q, v = (sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("q", "v"))
+        q = sympy.Matrix(sympy.symbols(f"q:{n}", real=True))
+        v = sympy.Matrix(sympy.symbols(f"v:{n}", real=True))
         p = {name: sympy.Symbol(f"p_{name}", real=True) for name in system.parameters}
         state = (list(q), list(v), p)
         (L,) = _expressions("lagrangian", lambda: [system.lagrangian(*state)], p)
@@ -127,18 +139,30 @@ class Equations:
         push = sympy.Matrix([L.diff(x) for x in q])
         if force := system.force:
             push += sympy.Matrix(_expressions("force", lambda: force(*state), p, n))
-        self.q, self.v, self.p, self.momentum, self.push = q, v, p, momentum, push
+        self.q, self.v, self.p = q, v, p
+        self.momentum, self.push = momentum, push
         self.mass = momentum.jacobian(v)
 
     def velocity(self, momentum: Matrix) -> Matrix:
-        """Velocities from momenta."""
-        return self.mass.LUsolve(momentum - self.momentum.subs({x: 0 for x in self.v}))
+        """Return the velocities that give a column of momenta, which are linear in them."""
+        at_rest = self.momentum.subs({x: 0 for x in self.v})
+        return self.mass.LUsolve(momentum - at_rest)
 
 
 def _expressions(
     name: str, values: Callable[[], Any], parameters: Named, count: int = 1
 ) -> list[Expr]:
-    """The `count` SymPy expressions of a user's function; refused where it gives no such."""
+    """Return the SymPy expressions that a function of the user gives.
+
+    Args:
+        name: What the function is of, for the message.
+        values: Calls the function with symbols.
+        parameters: Symbols of the parameters by name.
+        count: Number of expressions that it must give.
+
+    Raises:
+        RefusedError: It gives others, or asks for a name or an operation that is not there.
+    """
     import sympy
 
     allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
@@ -160,7 +184,7 @@ def pendulum(
     phi0: float = 1.5,
     omega0: float = 0.0,
 ) -> LagrangianSystem:
-    """A damped pendulum as a system: L = m l² φ̇²/2 + m g l cos φ, moment −d φ̇.
+    """Return a damped pendulum, L = m l² φ̇²/2 + m g l cos φ, with the moment −d φ̇.
 
     Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
     cos φ, and the angle "phi". Mass, length and gravity must be positive, damping not negative.

@@ -31,10 +31,9 @@ class Force:
 
 
 def distinct_histories(forces: Sequence[Force]) -> list[History]:
-    """Histories of forces, each once."""
-    return list(
-        {force.history.identity: force.history for force in forces if force.history}.values()
-    )
+    """Return the histories of forces, each once, in the order of their first use."""
+    histories = {force.history.identity: force.history for force in forces if force.history}
+    return list(histories.values())
 
 
 def require_loads(ground: object, forces: Sequence[object]) -> None:

@@ -13,22 +13,20 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 
-ALLOWED = (
-    "%%MatrixMarket matrix coordinate or array, real, integer or pattern, general or symmetric"
-)
+EXPECTED = "%%MatrixMarket matrix coordinate or array, real or integer, general or symmetric"
 HEAD = re.compile(
-    rb"%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(real|double|integer|pattern)\s+"
-    rb"(general|symmetric|skew-symmetric)\s*",
+    rb"%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
+    rb"(general|symmetric)\s*",
     re.IGNORECASE,
 )
 NO_NUMBER = re.compile(rb"[^-+.0-9eE\s]")
 """A letter that numbers and blanks do not have."""
-MIRRORED = {"general": 0.0, "symmetric": 1.0, "skew-symmetric": -1.0}
-"""Factor of an entry below the diagonal that the entry across the diagonal is."""
 
 
 def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     """Return the matrix in the text of a Matrix Market file, dense, shape (rows, columns).
+
+    Patterns and skew-symmetric matrices are refused: no mass, damping or stiffness is of these.
 
     Args:
         name: Name of the file, for messages.
@@ -44,60 +42,52 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
         cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
-        raise RefusedError(name, first, ALLOWED, cure)
-    layout, kind, symmetry = (word.decode().lower() for word in match.groups())
+        raise RefusedError(name, first, EXPECTED, cure)
+    is_sparse = match[1].lower() == b"coordinate"
+    is_symmetric = match[2].lower() == b"symmetric"
     body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
-    text = b"\n".join(body)
-    if found := NO_NUMBER.search(text):
-        row = text[: found.start()].count(b"\n")
-        value = f"with {body[row][:40].decode('latin-1')!r}"
-        cures = {b",": "write decimal points", b"d": "write 1e3 in place of 1D3"}
-        cure = cures.get(found[0].lower(), "mend this line, or load the file anew")
-        raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", cure)
+    _require_numbers_alone(name, body)
+
     sizes = _numbers(name, body[0]) if body else np.empty(0)
-    entries = _numbers(name, b" ".join(body[1:]))
-    is_sparse = layout == "coordinate"
     n_sizes = 3 if is_sparse else 2
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
     cure = "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
     if not is_sparse:
         cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
-    require_size(name, (int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))), max_rows)
-    shape = int(sizes[0]), int(sizes[1])
-    mirrored = MIRRORED[symmetry]
-    is_square = shape[0] == shape[1] or not mirrored
-    value = f"{symmetry}, {shape[0]} × {shape[1]}"
+    shape = int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))
+    require_size(name, shape, max_rows)
+    value = f"symmetric, {shape[0]} × {shape[1]}"
+    is_square = shape[0] == shape[1] or not is_symmetric
     require(is_square, name, value, "a square matrix", "mend the line of sizes, as 18 18 42")
+
+    entries = _numbers(name, b" ".join(body[1:]))
     if not is_sparse:
-        require(kind != "pattern", name, "an array of a pattern", ALLOWED)
-        return _dense(name, entries, shape, symmetry=symmetry)
-    columns = 2 if kind == "pattern" else 3
-    value = f"of {len(entries) / columns:g} entries, where its line of sizes states {sizes[2]:.0f}"
+        return _by_columns(name, entries, shape, is_symmetric=is_symmetric)
+    value = f"of {len(entries) / 3:g} entries, where its line of sizes states {sizes[2]:.0f}"
     cure = "mend the last number of the line of sizes, or load the file anew"
-    is_complete = len(entries) == columns * sizes[2]
-    require(is_complete, name, value, f"entries of {columns} numbers, as many as stated", cure)
-    table = entries.reshape(-1, columns)
-    values = table[:, 2] if columns == 3 else np.ones(len(table))
-    rows, cols = table[:, 0] - 1, table[:, 1] - 1
-    matrix = dense_of_entries(name, shape, rows=rows, columns=cols, values=values)
-    if mirrored:
-        is_beside = rows != cols
-        both = np.intersect1d(
-            rows[is_beside] * shape[0] + cols[is_beside],
-            cols[is_beside] * shape[0] + rows[is_beside],
-        )
-        value = f"{symmetry}, with entries on both sides of the diagonal"
+    is_complete = len(entries) == 3 * sizes[2]
+    require(is_complete, name, value, "entries of 3 numbers, as many as stated", cure)
+    rows, columns, values = entries.reshape(-1, 3).T
+    matrix = dense_of_entries(name, shape, rows=rows - 1, columns=columns - 1, values=values)
+    if is_symmetric:
+        lower, upper = np.tril(matrix, -1), np.triu(matrix, 1)
+        has_both = bool(((lower != 0) & (upper.T != 0)).any())
         cure = "write general in the first line, or leave one triangle out"
-        require(both.size == 0, name, value, "one triangle of a symmetric matrix", cure)
-        matrix += dense_of_entries(
-            name,
-            shape,
-            rows=cols[is_beside],
-            columns=rows[is_beside],
-            values=mirrored * values[is_beside],
-        )
+        value = "symmetric, with entries on both sides of the diagonal"
+        require(not has_both, name, value, "one triangle of a symmetric matrix", cure)
+        matrix += lower.T + upper.T
     return matrix
+
+
+def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
+    """Refuse lines with a letter that numbers and blanks do not have."""
+    for line in lines:
+        if found := NO_NUMBER.search(line):
+            value = f"with {line[:40].decode('latin-1')!r}"
+            cures = {b",": "write decimal points", b"d": "write 1e3 in place of 1D3"}
+            cure = cures.get(found[0].lower(), "mend this line, or load the file anew")
+            raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", cure)
 
 
 def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:
@@ -138,25 +128,33 @@ def dense_of_entries(
 
 
 def _numbers(name: str, text: bytes) -> Array:
-    """The numbers in a text whose letters are those of numbers; refuses words such as 1e or 1-2."""
+    """Return the numbers in a text whose letters are those of numbers.
+
+    Raises:
+        RefusedError: A word is no number, such as 1e or 1-2.
+    """
     try:
         return np.array(text.split(), float)
     except ValueError as error:
         raise RefusedError(name, f"with {error}", "numbers such as 1.25 or 1e-3") from None
 
 
-def _dense(name: str, entries: Array, shape: tuple[int, int], *, symmetry: str) -> Array:
-    """The matrix whose entries follow one another by columns, of one triangle if symmetric."""
+def _by_columns(name: str, entries: Array, shape: tuple[int, int], *, is_symmetric: bool) -> Array:
+    """Return the matrix of entries that follow one another column by column.
+
+    Those of a symmetric matrix are of its lower triangle alone.
+
+    Raises:
+        RefusedError: There are more or fewer entries than the shape has.
+    """
     n_rows, n_columns = shape
-    if symmetry == "general":
-        value = f"{len(entries)} numbers"
-        require(len(entries) == n_rows * n_columns, name, value, f"{n_rows * n_columns}")
+    expected = n_rows * (n_rows + 1) // 2 if is_symmetric else n_rows * n_columns
+    require(len(entries) == expected, name, f"{len(entries)} numbers", f"{expected}")
+    if not is_symmetric:
         return entries.reshape(n_columns, n_rows).T.copy()
-    diagonal = 0 if symmetry == "symmetric" else 1
     # the lower triangle by columns is the upper one by rows
-    columns, rows = np.triu_indices(n_rows, diagonal)
-    require(len(entries) == len(rows), name, f"{len(entries)} numbers", f"{len(rows)}")
+    columns, rows = np.triu_indices(n_rows)
     matrix = np.zeros(shape)
-    matrix[columns, rows] = MIRRORED[symmetry] * entries
+    matrix[columns, rows] = entries
     matrix[rows, columns] = entries
     return matrix

@@ -20,7 +20,9 @@ OUTPUTS = {  # unit and words, by names without the floor
     "ductility": ("", "ductility of storey"),
     "dissipated": ("J", "energy dissipated in storey"),
     "overturning_moment": ("N*m", ""),
-    **{"base_shear": ("N", ""), "force": ("N", ""), "phi": ("rad", "")},
+    "base_shear": ("N", ""),
+    "force": ("N", ""),
+    "phi": ("rad", ""),
 }
 NAME = re.compile(r"[^\W\d]\w{0,63}")
 """A name that texts of limits and peaks ("max roof"), files and tables can have."""
@@ -49,18 +51,19 @@ class Output(str):
     unit: str
 
     def __new__(cls, name: str, unit: str = "") -> Output:
-        """The name with a unit; without one with that of its kind, such as "m" of "q3"."""
+        """Return the name with a unit; without one, that of its kind, such as "m" of "q3"."""
         output = super().__new__(cls, name)
         of_kind, _ = OUTPUTS.get(output._parts[0], ("SI", ""))
         output.unit = unit or (name.unit if isinstance(name, Output) else of_kind)
         return output
 
     def __reduce__(self) -> tuple[type[Output], tuple[str, str]]:
-        """How a copy is made, in another process, too."""
+        """Say how a copy is made, in another process, too."""
         return Output, (str(self), self.unit)
 
     @property
     def _parts(self) -> tuple[str, str]:
+        """The kind of the output, and its floor as text: "q" and "3" of "max q3"."""
         name = output_of(self)
         kind = name.rstrip("0123456789")
         return kind, name[len(kind) :]
@@ -89,7 +92,7 @@ def require_names(key: str, names: Iterable[str]) -> None:
 
 
 def output_of(peak: str) -> str:
-    """The output of a peak: "q3" of "max q3"."""
+    """Return the output of a peak: "q3" of "max q3"."""
     return peak.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
 
 
@@ -108,10 +111,14 @@ class Parameter:
     range: str = ""
 
     def admits(self, low: float, high: float) -> bool:
-        """True if all values from `low` to `high` are finite and within the range."""
-        above = {POSITIVE: low > 0, NOT_NEGATIVE: low >= 0, RATIO: low >= 0 and high < 1}
-        above[UP_TO_ONE] = low >= 0 and high <= 1
-        return bool(np.isfinite([low, high]).all() and above.get(self.range, True))
+        """Return whether all values from `low` to `high` are finite and within the range."""
+        is_within = {
+            POSITIVE: low > 0,
+            NOT_NEGATIVE: low >= 0,
+            RATIO: low >= 0 and high < 1,
+            UP_TO_ONE: low >= 0 and high <= 1,
+        }
+        return bool(np.isfinite([low, high]).all() and is_within.get(self.range, True))
 
 
 OF_STOREY_FRAME = {  # units and ranges of a storey frame's parameters, by names without the floor
@@ -136,5 +143,5 @@ OF_STOREY_FRAME = {  # units and ranges of a storey frame's parameters, by names
 
 
 def of_storey_frame(name: str) -> Parameter:
-    """A parameter of a storey frame by its name; without unit and range where it is no such."""
+    """Return a parameter of a storey frame; without unit and range if the frame has no such."""
     return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_\d+)?$", "", name), ()))

@@ -72,20 +72,17 @@ def random_sparse(rng, *, is_square):
     return scipy.sparse.coo_matrix(values)
 
 
-@pytest.mark.parametrize("symmetry", ["general", "symmetric", "skew-symmetric"])
-@pytest.mark.parametrize("field", ["real", "integer", "pattern"])
+@pytest.mark.parametrize("symmetry", ["general", "symmetric"])
+@pytest.mark.parametrize("field", ["real", "integer"])
 @pytest.mark.parametrize("is_dense", [False, True])
 def test_files_of_scipy_give_the_matrices_that_it_reads(
     tmp_path, monkeypatch, rng, symmetry, field, is_dense
 ):
-    if is_dense and field == "pattern":
-        return
     matrix = random_sparse(rng, is_square=symmetry != "general")
     if field == "integer":
         matrix = scipy.sparse.coo_matrix(np.rint(5 * matrix.toarray()).astype(int))
     if symmetry != "general":
-        sign = 1 if symmetry == "symmetric" else -1
-        matrix = scipy.sparse.coo_matrix(matrix + sign * matrix.T)
+        matrix = scipy.sparse.coo_matrix(matrix + matrix.T)
     path = tmp_path / "k.mtx"
     written = matrix.toarray() if is_dense else matrix
     scipy.io.mmwrite(path, written, field=field, symmetry=symmetry, comment="one\ntwo")
@@ -93,8 +90,6 @@ def test_files_of_scipy_give_the_matrices_that_it_reads(
     expected = scipy.io.mmread(path)
     if scipy.sparse.issparse(expected):
         expected = expected.toarray()
-    if field == "pattern" and symmetry == "skew-symmetric":
-        expected = np.sign(expected)
     assert np.array_equal(read_matrix(path), expected)
 
 
