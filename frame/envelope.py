@@ -1,4 +1,4 @@
-"""Envelopes: α-cut bounds of the outputs over time (eq. 20)."""
+"""Envelopes: α-cut bounds of the outputs of a structure over time (eq. 20)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.fuzzy.result import Bounds, Ends
+from alphacut.fuzzy.result import Bounds, Ends, Extremes
 
 if TYPE_CHECKING:
     import xarray
@@ -19,27 +19,29 @@ __all__ = ["Ends", "Envelope"]
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Envelope(Bounds):
-    """Discrete fuzzy mapping of the outputs: `Bounds` at the nodes, with what lies between them.
+    """Discrete fuzzy mapping of the outputs: `Bounds` at time nodes, and what lies between them.
 
     Args:
-        between: What an output may exceed the bounds at both ends of the step to a node by, within
-            the step, shape (T, m), in the units of the outputs: proved where the bounds are
-            guaranteed, else estimated from some trajectories. None where none was made.
-        attained_error: What the exact motion at `lower_at` and `upper_at` may exceed the attained
-            bounds `inner` by, shape (T, m); None for rounding alone.
-        least_peaks: Proved lower bound of the smallest peak of the output in each cut, and the
-            smallest that some motion does not exceed, between nodes too, each (A, m); None for what
-            the bounds say.
-        searched_peaks: Bounds of the largest magnitude of each output, (A, m), where peaks were
-            searched for themselves; None for what the bounds say.
-        facts: Further numbers by name. A length is that of the first displacement, of the first
-            output where none is one, and a share of each peak where the tolerance was relative.
-            `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
-            `model_error`, `degree`: of the polynomials of the modes; `gap`, `boxes`, `parts`: of a
-            proof; `estimated_error`: the largest error, not of attained bounds, of which it is not
-            known how far other motions go; `between_nodes`: the largest value of `between`;
-            `motions_tested`: exact motions that were compared with proved bounds.
-        tested_structures: Their structures as arrays with axes, for `alphacut verify`.
+        between: By how much an output may exceed the bounds at both ends of the step before each
+            node within the step, shape (times, outputs), in the units of the outputs. It is
+            guaranteed if the bounds are, and otherwise estimated from some responses; None if it
+            was not determined.
+        attained_error: By how much the exact response at `lower_at` and `upper_at` may exceed the
+            attained bounds `inner`, shape (times, outputs); None for rounding alone.
+        least_peaks: Guaranteed lower bound of the smallest peak of each output over each cut, and a
+            peak that some response does not exceed, at all times, shape (levels, outputs) each;
+            None if nothing more is known than the bounds say.
+        searched_peaks: Bounds of the largest magnitude of each output, shape (levels, outputs), if
+            the peaks themselves were searched; None if nothing more is known than the bounds say.
+        facts: Further numbers by name. A length is that of the first displacement (of the first
+            output if there is none), or a fraction of each peak if the tolerance is relative.
+            `step_error`: what time stepping adds; `gain`: predicted gain that is worth a
+            trajectory; `model_error`, `degree`: of the polynomials of the modes; `gap`, `boxes`,
+            `parts`: of a proof; `estimated_error`: the largest error, not for attained bounds, for
+            which it is not known how far other responses go; `between_nodes`: the largest value of
+            `between`; `motions_tested`: exact responses that were compared with guaranteed bounds.
+        tested_structures: The structures of these responses as arrays with axes, for `alphacut
+            verify`.
     """
 
     time: Array
@@ -50,66 +52,87 @@ class Envelope(Bounds):
     facts: Mapping[str, float] = field(default_factory=dict)
     tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
 
-    def _extremes(self, column: int) -> tuple[Array, Array, Array]:
-        """Return bounds of an output over time, and their error, (A,) each."""
-        between = None if self.between is None else self.between[:, column]
-        lower = -within_steps(-self.lower[..., column], between).max(axis=1)
-        upper = within_steps(self.upper[..., column], between).max(axis=1)
-        # of those at the nodes, and what the steps between them add
-        error, added = (
-            self.error[..., column].max(axis=1),
-            0.0 if between is None else between.max(),
+    def extremes_over_time(self, column: int) -> Extremes:
+        """Return bounds of the output with an index at all times, and their largest error.
+
+        The error is that at the nodes, and what the steps between them add.
+        """
+        error = self.error[..., column].max(axis=1)
+        between = None
+        if self.between is not None:
+            between = self.between[:, column]
+            error = error + between.max()
+        return Extremes(
+            lower=-within_steps(-self.lower[..., column], between).max(axis=1),
+            upper=within_steps(self.upper[..., column], between).max(axis=1),
+            error=error,
         )
-        return lower, upper, error + added
 
     def without_attained(self) -> Self:
-        """As of `Bounds`; nor is it known which motions of the enclosed set have small peaks."""
-        found, least, searched = super().without_attained(), self.least_peaks, self.searched_peaks
-        return replace(
-            found,
-            attained_error=None,
-            least_peaks=least and Ends(least.lower, np.full_like(least.upper, np.inf)),
-            searched_peaks=searched and searched.without_attained(),
-        )
+        """Return the bounds without attained values, as `Bounds.without_attained` does.
+
+        Nor is it known which responses of the enclosed set have small peaks.
+        """
+        found = replace(super().without_attained(), attained_error=None)
+        if self.least_peaks is not None:
+            unknown = np.full_like(self.least_peaks.upper, np.inf)
+            found = replace(found, least_peaks=Ends(self.least_peaks.lower, unknown))
+        if self.searched_peaks is not None:
+            found = replace(found, searched_peaks=self.searched_peaks.without_attained())
+        return found
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the envelope as an xarray dataset with units, ready for NetCDF.
 
-        To the variables of `Bounds` it adds inner and proved bounds, deviations between nodes,
-        smallest peaks and the structures of the self-test, where there are any.
+        To the variables of `Bounds` it adds attained and guaranteed bounds, deviations between the
+        nodes, smallest peaks and the structures of the self-test, as far as they are known.
         """
         dataset = super().to_dataset()
         band = ("alpha", "time", "output")
-        for kind, pair in (("inner", self.inner), ("proved", self.outer)):
-            for end, values in zip(Ends._fields, pair or (), strict=False):
-                dataset[f"{kind}_{end}"] = (band, values)
+        peaks = ("alpha", "output")
+        deviation = ("time", "output")
+        if self.inner is not None:
+            dataset["inner_lower"] = (band, self.inner.lower)
+            dataset["inner_upper"] = (band, self.inner.upper)
+        if self.outer is not None:
+            dataset["proved_lower"] = (band, self.outer.lower)
+            dataset["proved_upper"] = (band, self.outer.upper)
         if self.between is not None:
-            dataset["between"] = (("time", "output"), self.between)
+            dataset["between"] = (deviation, self.between)
         if self.least_peaks is not None:
-            for end, values in zip(("proved", "reached"), self.least_peaks, strict=True):
-                dataset[f"least_peak_{end}"] = (("alpha", "output"), values)
+            dataset["least_peak_proved"] = (peaks, self.least_peaks.lower)
+            dataset["least_peak_reached"] = (peaks, self.least_peaks.upper)
         if self.attained_error is not None:
-            dataset["attained_error"] = (("time", "output"), self.attained_error)
-        dataset["time"].attrs["units"] = "s"
+            dataset["attained_error"] = (deviation, self.attained_error)
+
         units = sorted(set(self.units)) or ["SI"]
-        for name in set(dataset.data_vars) - {"lower_at", "upper_at", "nature", "label"}:
-            dataset[name].attrs["units"] = units[0] if len(units) == 1 else "SI, by output"
-        for name in ("lower_at", "upper_at"):
-            dataset[name].attrs["units"] = "SI, by parameter"
+        unit = units[0] if len(units) == 1 else "SI, by output"
+        for name in set(dataset.data_vars) - {"nature", "label"}:
+            is_input = name in ("lower_at", "upper_at")
+            dataset[name].attrs["units"] = "SI, by parameter" if is_input else unit
+        dataset["time"].attrs["units"] = "s"
         if self.tested_structures:
-            ends = [[number.cut(float(a)) for number in self.inputs.values()] for a in self.alpha]
-            dataset["cut"] = (("alpha", "parameter", "end"), np.array(ends, float))
+            cuts = [[number.cut(float(a)) for number in self.inputs.values()] for a in self.alpha]
+            dataset["cut"] = (("alpha", "parameter", "end"), np.array(cuts, float))
             dataset = dataset.assign(self.tested_structures)
-        notes: dict[str, str | int] = {"nature": str(self.nature), "notes": "; ".join(self.notes)}
-        notes["trajectories"] = self.evaluations
-        return dataset.assign_attrs(notes | dict(self.facts))
+        return dataset.assign_attrs(
+            nature=str(self.nature),
+            notes="; ".join(self.notes),
+            trajectories=self.evaluations,
+            **self.facts,
+        )
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
-    """Return upper bounds of a function over the step before each node, shape (…, T).
+    """Return upper bounds of a function over the time step before each node.
 
-    `size` is an upper bound at nodes, shape (…, T), and `between` what it may exceed both ends of
-    each step by, the same shape; None for nothing.
+    Args:
+        size: Upper bound of the function at the nodes, shape (…, times).
+        between: By how much the function may exceed both ends of each step, shape (times,) or that
+            of `size`; None for nothing.
+
+    Returns:
+        Upper bounds, shape (…, times). The first one is that at the first node.
     """
     if between is None:
         return size

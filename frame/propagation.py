@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from time import perf_counter
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -32,20 +32,10 @@ from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
 
-FIRST_STEPS = 3
-"""Steps of the motions that show whether they exist."""
-MAX_INPUTS = 4
-"""Most inputs of a follower's envelope that a proof is made beside."""
-OTHER_UNITS = 500
-"""Factor between a support and the structure's own value from which on units must differ."""
-
-
 Method = Auto | Proof | DualProof | GraphFollower | ImprovedFollower | Sampled
-"""How an envelope is found, with its options as fields."""
-METHODS: dict[str, type[Method]] = {x.name: x for x in get_args(Method)}
+"""How an envelope is computed, with its options as fields."""
+METHODS: dict[str, type[Method]] = {method.name: method for method in get_args(Method)}
 """The methods by the words that a case file has for them."""
-REMOVED_METHODS = {"search": "take auto, or improved-graph-follower with the integrator exact"}
-"""Cures by the words of methods that were removed."""
 
 
 @on_one_blas_thread
@@ -62,32 +52,33 @@ def envelope(
     progress: Progress | bool | None = None,
     **options: Any,
 ) -> Envelope:
-    """Return lower and upper envelopes of a structure's outputs over time, on every level.
+    """Return lower and upper envelopes of the outputs of a structure over time, on every level.
 
     Args:
         model: A linear structure or a general Lagrangian system.
         inputs: Fuzzy parameters by name, in SI units; a plain number is a crisp one.
-        method: A method such as `Proof()`, or its name, see `METHODS`; unless given `Auto()` for
-            linear structures, and `ImprovedFollower()` for others.
+        method: A method such as `Proof()`, or its name, see `METHODS`; by default `Auto()` for
+            linear structures and `ImprovedFollower()` for others.
         duration: Length of the simulation, in s.
-        step: Distance of the nodes and step of the integrator, in s.
+        step: Distance of the time nodes and step of the integrator, in s.
         alpha: Levels, rising within [0, 1].
-        integrator: Time stepping of linear structures, an integrator or its name: exact (of auto
-            and proofs unless given), midpoint (of all others). Of general Lagrangian systems
-            it is midpoint.
-        relative: Whether the method's tolerance is a fraction of each output's peak at the nominal
-            parameters and some corners, instead of a number in SI units.
-        progress: Called with the completed fraction; a bar on a terminal if not given, False for
+        integrator: Time stepping of linear structures, an integrator or its name: "exact" (the
+            default of `Auto` and of proofs) or "midpoint" (the default of all others). General
+            Lagrangian systems always use the midpoint rule.
+        relative: Whether the tolerance of the method is a fraction of the peak of each output at
+            the nominal parameters and some corners, instead of a number in SI units.
+        progress: Called with the completed fraction; by default a bar on a terminal; False for
             none.
-        options: Options of a method that is named, or of auto.
+        options: Options of a method that is given by its name, or of `Auto`.
 
     Returns:
-        Bounds at the nodes with their nature, error, deviations between nodes, and the inputs that
-        reach them; without these where the inputs' cuts are a box around a learned set.
+        Bounds at the time nodes with their guarantee, their error, deviations between the nodes,
+        and the inputs that attain them. Attained values and inputs are missing if the cuts of the
+        inputs are a box around a learned set.
 
     Raises:
-        RefusedError: An unknown name or option, a value outside its range, a support that reaches
-            values that are not allowed, or a motion that does not exist.
+        RefusedError: A name or an option is unknown, a value is out of range, a support contains
+            inadmissible values, or a response does not exist.
         FailedError: A step is too long, or a method finds no bounds.
 
     Example:
@@ -99,13 +90,14 @@ def envelope(
         'guaranteed'
     """
     start = perf_counter()
-    chosen, flow, levels, rows = _build_problem(
-        model, inputs, method, duration, step, alpha, integrator, **options
-    )
-    flow = replace(flow, relative=relative)
+    problem = _build_problem(model, inputs, method, duration, step, alpha, integrator, **options)
+    chosen = problem.method
+    flow = replace(problem.flow, relative=relative)
     steps = step_error(flow)
-    is_cheap = isinstance(flow.flow, LinearFlow) and len(flow.boxes.names) <= MAX_INPUTS
-    proof: Proof | None = None  # of the motion that a follower has followed
+    # A follower's envelope is compared with a proof if that is cheap: for linear structures with up
+    # to four inputs (tuned).
+    proof: Proof | None = None
+    is_cheap = isinstance(flow.flow, LinearFlow) and len(flow.boxes.names) <= 4
     if is_cheap and isinstance(chosen, GraphFollower | ImprovedFollower):
         proof = Proof(gap=chosen.tolerance / 4, boxes=1000)
     with progress_reporter(progress) as tick:
@@ -118,10 +110,26 @@ def envelope(
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)
-    bounds = _on_levels(bounds, levels, rows)
+    bounds = _on_levels(bounds, problem.alpha, problem.rows)
     if bounds.encloses:
         bounds = bounds.without_attained()
     return replace(bounds, seconds=perf_counter() - start)
+
+
+class Problem(NamedTuple):
+    """An envelope to be computed.
+
+    Args:
+        method: The method.
+        flow: The response over the cuts that differ from each other.
+        alpha: All levels, shape (levels,).
+        rows: Row of the cut of each level in `flow`, shape (levels,).
+    """
+
+    method: Method
+    flow: UnitFlow
+    alpha: Array
+    rows: Ints
 
 
 def _build_problem(
@@ -133,29 +141,21 @@ def _build_problem(
     alpha: Sequence[float] = ALPHA,
     integrator: str | Integrator | None = None,
     **options: Any,
-) -> tuple[Method, UnitFlow, Array, Ints]:
-    """Return the method, the motion over distinct cuts, the levels, and the cut of each level."""
+) -> Problem:
+    """Check the arguments of `envelope` and return the problem that they state.
+
+    Raises:
+        RefusedError: As `envelope`.
+    """
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     is_structure = isinstance(model, StructureModel)
     require(is_structure, "model", value=type(model).__name__, allowed=allowed)
     if method is None:
         method = "auto" if has_matrices(model) else "improved-graph-follower"
-    if isinstance(method, str):
-        cure = REMOVED_METHODS.get(method, "")
-        require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
-        names = [field.name for field in fields(METHODS[method])]
-        for option in options:
-            require_choice(f"option of {method}", option, names)
-        chosen: Method = METHODS[method](**options)
-    else:
-        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
-        allowed = "none beside a method that is no name"
-        require(not options, "options", value=[*options], allowed=allowed)
-        chosen = method
+    chosen = _chosen_method(method, options)
     needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
-    allowed = "auto or quasi-monte-carlo where columns yield"
     is_possible = not (yields(model) and needs_derivatives)
+    allowed = "auto or quasi-monte-carlo where columns yield"
     require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
         is_exact = yields(model) or isinstance(chosen, Auto | Proof | DualProof)
@@ -164,7 +164,29 @@ def _build_problem(
     flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
     distinct_cuts, rows = cuts.without_repetitions()
-    return chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows
+    return Problem(chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)
+
+
+def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
+    """Return a method that is given by its name and options, or as an object.
+
+    Raises:
+        RefusedError: The name or an option is unknown, or options are given beside an object.
+    """
+    if not isinstance(method, str):
+        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
+        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
+        allowed = "none beside a method that is no name"
+        require(not options, "options", value=[*options], allowed=allowed)
+        return method
+    cure = ""
+    if method == "search":  # removed
+        cure = "take auto, or improved-graph-follower with the integrator exact"
+    require(method in METHODS, "method", value=method, allowed=", ".join(METHODS), cure=cure)
+    for option in options:
+        known = [field.name for field in fields(METHODS[method])]
+        require_choice(f"option of {method}", option, known)
+    return METHODS[method](**options)
 
 
 def require_envelope(
@@ -173,88 +195,123 @@ def require_envelope(
     method: Method | str | None = None,
     **arguments: Any,
 ) -> None:
-    """Refuse arguments that `envelope` refuses, from the first steps of a few trajectories.
+    """Check the arguments of `envelope` by the first steps of a few responses.
 
     Raises:
         RefusedError: As `envelope`.
-        UnprovedError: A proof is asked for, and there is none of such a structure.
+        UnprovedError: A proof is asked for, and there is none for such a structure.
     """
-    chosen, flow, _, _ = _build_problem(model, inputs, method, **arguments)
-    duration = min(FIRST_STEPS * flow.flow.step, flow.flow.duration)
-    first_steps = replace(flow.flow, duration=duration)
+    problem = _build_problem(model, inputs, method, **arguments)
+    flow = problem.flow.flow
+    first_steps = replace(flow, duration=min(3 * flow.step, flow.duration))
     if isinstance(first_steps, LinearFlow):
         first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
-    first_steps.values(flow.boxes.probes)
-    if isinstance(chosen, Proof | DualProof):
+    first_steps.values(problem.flow.boxes.probes)
+    if isinstance(problem.method, Proof | DualProof):
         with refusing():
-            chosen.forecast(exact_flow(flow.flow), flow.boxes)
+            problem.method.forecast(exact_flow(flow), problem.flow.boxes)
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Return a follower's envelope with proved outer bounds of the exact motion, if there are."""
+    """Return the envelope of a follower with guaranteed bounds of the exact response beside it.
+
+    If there is no proof, the envelope is returned as it is.
+
+    Args:
+        followed: The envelope.
+        over: The problem.
+        proof: The method of the proof.
+        tick: Called with the completed fraction.
+    """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
         proved = proof.run(exact, tick)
     except UnprovedError:
         return followed
-    # the true bounds lie between these: the error is the larger distance
-    both = np.array([proved.proved, proved.attained])  # (2, lower or upper, A, T, m)
-    error = np.abs(np.stack([followed.lower, followed.upper]) - both).max((0, 1))
+    # The true bounds lie between the guaranteed bounds and the attained values. The error is the
+    # larger one of the distances from both.
+    ends = np.stack([followed.lower, followed.upper])  # (lower or upper, levels, times, outputs)
+    distances = [np.abs(ends - np.stack(known)) for known in (proved.proved, proved.attained)]
+    error = np.max(distances, axis=(0, 1))
     largest = float((error / over.scale).max())
     facts = {**followed.facts, "gap": proved.facts["gap"], "estimated_error": largest}
     return replace(followed, outer=proved.proved, between=proved.between, error=error, facts=facts)
 
 
 def require_admissible(system: StructureModel, cuts: Boxes) -> None:
-    """Refuse supports with values that are not allowed for their parameters.
+    """Check that the supports of parameters contain admissible values only.
 
     Raises:
-        RefusedError: A support leaves the range of its parameter or is in another unit than the
-            structure's own value; the weight may buckle a storey, or a mass matrix is not positive
-            definite; modes of unequal damping ratio may change places; or nothing moves.
+        RefusedError: A support leaves the range of its parameter or seems to be in another unit
+            than the own value of the structure; the weight may buckle a storey; a mass matrix is
+            not positive definite; modes of unequal damping ratio may change places; or nothing
+            moves the structure.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
-        parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
-        require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
-        nominal, sizes = abs(system.parameters.get(name, 0.0)), (abs(low), abs(high))
-        is_same_unit = min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
-        is_right = is_same_unit or nominal == 0 or not any(sizes)
-        allowed = f"values of the size of {nominal:g}, the structure's own"
-        require(is_right, key, value=shown, allowed=allowed, cure="give both in SI units")
+        _require_range(system, name, low, high)
     if not has_matrices(system):
         return
     ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
     system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     is_moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
-        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         try:
-            matrices = evaluate(system, cuts.names, point[None], derivatives=False)[0]
+            matrices = evaluate(system, cuts.names, point[np.newaxis], derivatives=False)[0]
             is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
             is_positive = False
+        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         value = f"not positive definite at {at}"
         require(is_positive, "mass", value=value, allowed="a mass for every unknown")
         has_forces = matrices.forces is not None and matrices.forces.value.any()
         is_moved = is_moved or has_forces or matrices.start.value.any()
-    key, allowed = "q0, v0, ground and loads", "a start, a record or a force that moves something"
+    key = "q0, v0, ground and loads"
+    allowed = "a start, a record or a force that moves something"
     require(is_moved, key, value="zero", allowed=allowed)
-    if len(system.ratios) > 1:  # modes of unequal damping ratio must keep their order
-        values = [system.parameters[x] if isinstance(x, str) else x for x in system.ratios]
+    if len(system.ratios) > 1:
+        # Damping ratios are given by the order of the modes, which must be the same everywhere.
+        ratios = [system.parameters[x] if isinstance(x, str) else x for x in system.ratios]
         points = np.vstack([cuts.nominal, cuts.probes])
         matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
-        require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(values))
+        require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(ratios))
 
 
-def _on_levels(bounds: Envelope, alpha: Array, which: Ints) -> Envelope:
-    """Return the envelope on levels `alpha` (A,), the bounds of each copied from row `which`."""
+def _require_range(system: StructureModel, name: str, low: float, high: float) -> None:
+    """Check that the support of a parameter is in its range and in the unit of the structure.
+
+    Raises:
+        RefusedError: It is not.
+    """
+    key, shown = f"support of {name}", f"[{low:g}, {high:g}]"
+    parameter = system.parameter(name)
+    require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
+    # A support whose values all are 500 times larger or smaller than the own value of the
+    # structure is taken to be in another unit: units differ by factors of 1000.
+    nominal = abs(system.parameters.get(name, 0.0))
+    smallest, largest = sorted((abs(low), abs(high)))
+    is_same_unit = smallest < 500 * nominal and nominal < 500 * largest
+    is_admissible = is_same_unit or nominal == 0 or largest == 0
+    allowed = f"values of the size of {nominal:g}, the structure's own"
+    require(is_admissible, key, value=shown, allowed=allowed, cure="give both in SI units")
+
+
+def _on_levels(bounds: Envelope, alpha: Array, rows: Ints) -> Envelope:
+    """Return an envelope on more levels, with the bounds of each level copied from a row.
+
+    Args:
+        bounds: The envelope.
+        alpha: The levels, shape (levels,).
+        rows: Row of `bounds` for each level, shape (levels,).
+    """
     names = ("lower", "upper", "lower_at", "upper_at", "error")
-    changes: dict[str, Any] = {name: getattr(bounds, name)[which] for name in names}
-    if (peaks := bounds.searched_peaks) is not None:
-        ends = {name: getattr(peaks, name)[which] for name in names}
-        changes["searched_peaks"] = replace(peaks, alpha=alpha, **ends)
+    changes: dict[str, Any] = {name: getattr(bounds, name)[rows] for name in names}
+    peaks = bounds.searched_peaks
+    if peaks is not None:
+        of_peaks = {name: getattr(peaks, name)[rows] for name in names}
+        changes["searched_peaks"] = replace(peaks, alpha=alpha, **of_peaks)
     for name in ("inner", "outer", "least_peaks"):
-        pair = getattr(bounds, name)
-        changes[name] = pair and Ends(*(x[which] for x in pair))
+        ends = getattr(bounds, name)
+        if ends is not None:
+            changes[name] = Ends(ends.lower[rows], ends.upper[rows])
     return replace(bounds, alpha=alpha, **changes)

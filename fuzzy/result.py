@@ -41,6 +41,14 @@ class Ends(NamedTuple):
     upper: Array
 
 
+class Extremes(NamedTuple):
+    """Lower and upper bounds of an output over time, and their error, shape (levels,) each."""
+
+    lower: Array
+    upper: Array
+    error: Array
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Bounds:
     """Ranges of the outputs of a function of fuzzy inputs: an α-cut on each level, or at each time.
@@ -275,11 +283,8 @@ class Bounds:
         """Yield a line of text for each level of an output, with its extremes over time."""
         column = self.column(output)
         nature = self.nature_of(output)
-        over_time = tuple(range(1, self.lower.ndim - 1))
-        lowers = self.lower[..., column].min(axis=over_time)
-        uppers = self.upper[..., column].max(axis=over_time)
-        errors = self.error[..., column].max(axis=over_time)
-        for alpha, lower, upper, error in zip(self.alpha, lowers, uppers, errors, strict=True):
+        extremes = self.extremes_over_time(column)
+        for alpha, lower, upper, error in zip(self.alpha, *extremes, strict=True):
             low = rounded(lower, "lower", nature, 6)
             high = rounded(upper, "upper", nature, 6)
             if low > high:  # attained ends of nearly one value were rounded inwards
@@ -295,6 +300,15 @@ class Bounds:
             elif not self.encloses:
                 line += f", gap to attained {_digits(error)}"
             yield line if nature == self.nature else f"{line}, {nature}"
+
+    def extremes_over_time(self, column: int) -> Extremes:
+        """Return bounds of the output with an index over all times, and their largest error."""
+        over_time = tuple(range(1, self.lower.ndim - 1))
+        return Extremes(
+            lower=self.lower[..., column].min(axis=over_time),
+            upper=self.upper[..., column].max(axis=over_time),
+            error=self.error[..., column].max(axis=over_time),
+        )
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
         """Draw an output, the first by default: its membership function, or α-cuts over time.

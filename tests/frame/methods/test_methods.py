@@ -250,3 +250,13 @@ def test_blas_threads_do_not_change_a_bit():
             bounds.append(envelope(building, inputs, Proof(), **given))
     assert (bounds[0].upper == bounds[1].upper).all()
     assert (bounds[0].lower == bounds[1].lower).all()
+
+
+def test_the_text_of_an_envelope_has_its_bounds_at_all_times(proofs):
+    """What an output may add within a step is part of the extremes that are printed."""
+    found = proofs["matrices"]
+    wide = replace(found, between=np.full_like(found.between, 0.25))
+    line = next(x for x in str(wide).splitlines() if x.startswith("top"))
+    low, high = line.partition(": ")[2].partition(",")[0].replace("−", "-").split(" … ")
+    assert float(low) == pytest.approx(found.lower[0, :, 0].min() - 0.25, rel=1e-4)
+    assert float(high) == pytest.approx(found.upper[0, :, 0].max() + 0.25, rel=1e-4)
