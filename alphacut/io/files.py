@@ -18,36 +18,42 @@ from pydantic_core import to_json
 from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.kept_files import is_special
 
-RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
-SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
-OUTPUTS = ("out", "json", "export", "csv", "tables")
-"""Options that name what is written."""
+OPTIONS_OF_OUTPUT = ("out", "json", "export", "csv", "tables")
+"""Options of commands that name what is written."""
 INSIDE = "ALPHACUT_INSIDE"
 """Variable that ./enter sets."""
-ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")
-EXTRAS = {"skimage": "particles", **dict.fromkeys(ELEMENTS, "cell")}
-"""Extras of the installation by the libraries that they bring."""
 Document = dict[str, Any]
 """A JSON document: numbers, texts, lists and documents by name; its reader knows their types."""
 
 
 def rank() -> int:
-    """This process's MPI rank as mpirun tells it, without starting MPI; 0 where there is none."""
-    return next((int(os.environ[name]) for name in RANKS if name in os.environ), 0)
+    """Return this process's MPI rank as mpirun tells it, without starting MPI; else 0."""
+    names = "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID"
+    return _first_variable(names, default=0)
 
 
 def ranks() -> int:
-    """The number of MPI ranks as mpirun tells it; 1 where there is none."""
-    return next((int(os.environ[name]) for name in SIZES if name in os.environ), 1)
+    """Return the number of MPI ranks as mpirun tells it; 1 where there is none."""
+    names = "OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"
+    return _first_variable(names, default=1)
+
+
+def _first_variable(names: Iterable[str], *, default: int) -> int:
+    """Return the whole number in the first environment variable that is set."""
+    for name in names:
+        if name in os.environ:
+            return int(os.environ[name])
+    return default
 
 
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
-    """One JSON object, ending in a line feed; what is not finite becomes null."""
-    options: dict[str, Any] = {"indent": indent, "inf_nan_mode": "null", "fallback": _plain}
-    return to_json(document, **options).decode() + "\n"
+    """Return a document as JSON, ending in a line feed; numbers that are not finite become null."""
+    content = to_json(document, indent=indent, inf_nan_mode="null", fallback=_plain)
+    return content.decode() + "\n"
 
 
 def _plain(value: object) -> object:
+    """Return what stands in JSON for a value that `to_json` does not know."""
     if isinstance(value, Mapping):
         return dict(value)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
@@ -55,9 +61,10 @@ def _plain(value: object) -> object:
 
 @contextmanager
 def standard_output(*, alone: bool) -> Iterator[TextIO]:
-    """Yields the stream for answers: standard output of the first MPI rank, nothing of others.
+    """Yield the stream for answers: standard output of the first MPI rank, nothing of others.
 
-    `alone`: all else that is printed, by C libraries too, goes to standard error.
+    Args:
+        alone: Whether all else that is printed, by C libraries too, goes to standard error.
     """
     if not alone and rank() == 0:
         yield sys.stdout
@@ -76,7 +83,7 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
 
 
 def say(message: str) -> None:
-    """One line to people, on standard error; the first rank alone speaks."""
+    """Print one line for people on standard error; only the first MPI rank does."""
     if rank() == 0:
         bar_end = "\r\x1b[K" if sys.stderr.isatty() else ""  # over a progress bar
         with suppress(OSError):
@@ -84,27 +91,39 @@ def say(message: str) -> None:
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuses options of a command that name files or folders where nothing can be written."""
+    """Refuse options of a command that name files or folders where nothing can be written."""
     for action in parser._actions:
         value = getattr(options, action.dest, None)
-        if action.dest in OUTPUTS and isinstance(value, str) and value != "-":
+        if action.dest in OPTIONS_OF_OUTPUT and isinstance(value, str) and value != "-":
             folder = action.metavar == "FOLDER"
             require_writable(action.option_strings[-1], value, folder=folder)
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:
-    """Refuses the path of a file or folder, given by an option, where nothing can be written."""
-    path, kind, reason = Path(value), "a folder" if folder else "a file", ""
-    fits = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
+    """Refuse the path of a file or folder where nothing can be written.
+
+    Args:
+        option: Option that gives the path, for the message.
+        value: The path.
+        folder: Whether it is of a folder, which need not be there.
+
+    Raises:
+        RefusedError: The path is empty, something of the other kind is there, or the nearest folder
+            that exists takes no files.
+    """
+    path = Path(value)
+    is_free = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
     existing = path if folder else path.parent
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
+    reason = ""
     try:
         tempfile.TemporaryFile(dir=existing).close()
     except OSError as error:
-        fits, reason = False, f"nothing can be written in {existing}: {error.strerror or error}"
-    allowed, fits = f"the name of {kind} where you may write", fits or is_special(path)
-    require(fits, option, value or "empty", allowed, cure=reason.lower())
+        is_free = False
+        reason = f"nothing can be written in {existing}: {error.strerror or error}".lower()
+    allowed = f"the name of {'a folder' if folder else 'a file'} where you may write"
+    require(is_free or is_special(path), option, value or "empty", allowed, cure=reason)
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit
@@ -112,23 +131,31 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
 
     def __init__(self, problems: Iterable[RefusedError]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(map(str, self.problems)))
+        super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The known name that comes nearest to `name`; empty if none comes near."""
-    folded = {option.lower(): option for option in names}
-    close = get_close_matches(name.lower().replace("-", "_"), folded, n=1, cutoff=0.6)
-    return folded[close[0]] if close else ""
+    """Return the known name that is most like `name`, whatever its capitals; empty if none is."""
+    by_small_letters = {option.lower(): option for option in names}
+    small = name.lower().replace("-", "_")
+    close = get_close_matches(small, by_small_letters, n=1, cutoff=0.6)
+    return by_small_letters[close[0]] if close else ""
 
 
 def suggestion(name: str, names: Iterable[str]) -> str:
-    """Words on the known name that comes nearest; empty if none comes near."""
-    return f"did you mean {close}?" if (close := nearest(name, names)) else ""
+    """Return a question after the known name that was probably meant; empty if there is none."""
+    close = nearest(name, names)
+    return f"did you mean {close}?" if close else ""
 
 
 def missing(error: ImportError) -> str:
-    """Message for an import that failed, with its cure."""
+    """Return the message about an import that failed, with the extra that brings the library."""
+    of_cell = "dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py"
+    extras = {"skimage": "particles", **dict.fromkeys(of_cell, "cell")}
     library = (error.name or "").partition(".")[0]
-    cure = f"pip install '.[{EXTRAS[library]}]'" if library in EXTRAS else f"install {library}"
-    return f"{error}; {cure}" + ("" if os.environ.get(INSIDE) else ", or run inside ./enter")
+    cure = f"install {library}"
+    if library in extras:
+        cure = f"pip install '.[{extras[library]}]'"
+    if not os.environ.get(INSIDE):
+        cure += ", or run inside ./enter"
+    return f"{error}; {cure}"

@@ -26,12 +26,9 @@ if TYPE_CHECKING:
     import xarray
 
 MANIFEST = "manifest.json"
-PLAIN = re.compile(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}")
-"""Names of files in a folder of results or its folder of figures, which lead to no other."""
-RUN = command_to_paste("run", "CASE.toml")
 COMPLETE = "whole results of a run"
 """Allowed state of a folder of results."""
-RUN_AGAIN = f"make it anew by {RUN}"
+RUN_AGAIN = f"make it anew by {command_to_paste('run', 'CASE.toml')}"
 """Cure of files that were changed."""
 
 
@@ -41,7 +38,7 @@ def plain_name(name: str) -> str:
     Raises:
         ValueError: The name leads elsewhere.
     """
-    if PLAIN.fullmatch(name) is None:
+    if re.fullmatch(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}", name) is None:
         raise ValueError("no plain name")
     return name
 
@@ -51,19 +48,26 @@ PlainName = Annotated[str, plain_name]
 
 
 class Listed(NamedTuple):
-    """What is known of a file: digests of its content, and of everything that it was made from."""
+    """What the list knows of a file.
+
+    Args:
+        digest: SHA-256 of its content; empty for a store of samples, whose rows have checksums.
+        source: Digest of everything that it was made from; empty for a text of the run itself.
+    """
 
     digest: str
-    """SHA-256; "" of a store of samples, whose rows have checksums"""
     source: str
-    """"" of a text of the run itself"""
 
 
 @dataclass
 class ResultsFolder:
-    """A folder of results, which may be a link itself, and what is known of its files by name.
+    """A folder of results and its list of files.
 
-    Where its list is damaged a run replaces files although none lists them.
+    Args:
+        path: The folder, which may be a link itself.
+        files: What is known of each listed file, by its name; it changes with the list.
+        is_damaged: Whether the list cannot be understood. Then a run may replace files that no list
+            names.
     """
 
     path: Path
@@ -72,7 +76,7 @@ class ResultsFolder:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Return the folder with what manifest.json lists; nothing where it is missing or damaged.
+        """Return the folder with what manifest.json lists, nothing if it is missing or damaged.
 
         Raises:
             RefusedError: The list is of another format or program, or is no regular file.
@@ -102,20 +106,29 @@ class ResultsFolder:
         return cls(path, {name: Listed(*pair) for name, pair in pairs.items()})
 
     def require_own_files(self, option: str) -> None:
-        """Refuses a folder of other files, in which no run has written its list."""
+        """Refuse a folder of other files, in which no run has written its list.
+
+        Args:
+            option: Option that names the folder, for the message.
+        """
         is_own = os.path.lexists(self.path / MANIFEST) or not any(self.path.glob("[!.]*"))
         allowed, cure = "an empty folder, or one of results", "name another folder"
         require(is_own, option, f"{self.path}, with other files", allowed, cure)
 
     def made_from(self, source: str) -> tuple[str, ...]:
-        """Names of the files that were made from what has this digest."""
+        """Return the names of the files that were made from what has this digest."""
         return tuple(name for name, entry in self.files.items() if entry.source == source)
 
     def content(self, name: str) -> bytes:
-        """The content of a listed file; RefusedError of one that is missing, changed or a link."""
+        """Return the content of a listed file.
+
+        Raises:
+            RefusedError: The file is not listed, missing, changed or a link.
+        """
         what = f"without {name} in its manifest"
         require(name in self.files, str(self.path), what, COMPLETE, RUN_AGAIN)
-        file, digest = self.path / name, self.files[name].digest
+        file = self.path / name
+        digest = self.files[name].digest
         try:
             self._require_real_parents(name)
             content = read_regular(file)
@@ -127,7 +140,7 @@ class ResultsFolder:
         return content
 
     def dataset(self, name: str) -> xarray.Dataset:
-        """The dataset in a listed NetCDF file."""
+        """Return the dataset in a listed NetCDF file; raises RefusedError as `content` does."""
         import netCDF4
         import xarray
 
@@ -136,11 +149,15 @@ class ResultsFolder:
         return xarray.load_dataset(backends.NetCDF4DataStore(file))
 
     def require_free(self, name: str) -> None:
-        """Refuses a name that an unlisted file, a pipe or a folder has, so that none is lost.
+        """Refuse a name that an unlisted file, a pipe or a folder has, so that none is lost.
 
         A link with a listed name is free: the file will replace it, not its target.
+
+        Raises:
+            RefusedError: Something else has the name, or a folder that leads to it is a link.
         """
-        file, allowed = self.path / name, "a place for a file of this run"
+        file = self.path / name
+        allowed = "a place for a file of this run"
         cure = "move it away, or name another folder"
         try:
             self._require_real_parents(name)
@@ -155,10 +172,16 @@ class ResultsFolder:
         require(is_free, str(file), kind, allowed, cure=cure)
 
     def put_files(self, source: str, folder: Path, before: str = "") -> None:
-        """Copies all files below a folder here and lists them as made from `source`.
+        """Copy all files below a folder here, and list them.
 
-        Other files that were made from `before` are removed. Something else in the place of a file
-        is refused.
+        Args:
+            source: Digest of what they were made from.
+            folder: The folder.
+            before: Digest of what an earlier result was made from, whose other files are removed;
+                empty for none.
+
+        Raises:
+            RefusedError: Something else is in the place of a file.
         """
         paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
         contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
@@ -168,13 +191,22 @@ class ResultsFolder:
             self._remove(name, made_before[name].digest)
 
     def put_text(self, name: str, text: str) -> None:
-        """Writes a text of the run itself, such as summary.json, and lists it."""
+        """Write a text of the run itself, such as summary.json, and list it."""
         self._write("", {name: text.encode()})
 
     def _write(
         self, source: str, contents: Mapping[str, bytes], forget: Iterable[str] = ()
     ) -> None:
-        """Lists files as made from `source` in place of others, then writes them."""
+        """List files in place of others, and then write them.
+
+        Args:
+            source: Digest of what they were made from.
+            contents: Their contents by name.
+            forget: Names that leave the list.
+
+        Raises:
+            RefusedError: Something else is in the place of a file.
+        """
         for name in contents:
             self.require_free(name)
         for name in forget:
@@ -185,7 +217,7 @@ class ResultsFolder:
                 partial.write_bytes(content)
 
     def add_to_list(self, files: Mapping[str, Listed]) -> None:
-        """Writes the list with further files, and with a checksum of its own."""
+        """Add files to the list, and write it with a checksum of its own."""
         self.files |= files
         document = {
             "format_version": FORMAT,
@@ -197,14 +229,18 @@ class ResultsFolder:
             partial.write_text(as_json(document, indent=1), encoding="utf-8")
 
     def clear(self) -> None:
-        """Removes every file that is listed, and the list; links are removed, not followed."""
+        """Remove every listed file, and empty the list; links are removed, not followed."""
         for name in self.files:
             self._remove(name)
-        self.files, self.is_damaged = {}, False
+        self.files = {}
+        self.is_damaged = False
         self.add_to_list({})
 
     def _remove(self, name: str, digest: str = "") -> None:
-        """Removes a link, or a regular file with this digest ("": any); leaves everything else."""
+        """Remove a link, or a regular file with this digest, or with any if it is empty.
+
+        Everything else stays.
+        """
         file = self.path / name
         try:
             self._require_real_parents(name)
@@ -214,7 +250,12 @@ class ResultsFolder:
             return
 
     def _require_real_parents(self, name: str) -> None:
-        """Raises NotADirectoryError if a folder between this one and a file is a link."""
+        """Require that the folders between this one and a file are real ones.
+
+        Raises:
+            NotADirectoryError: One is a link or no folder.
+            FileNotFoundError: One is missing.
+        """
         for parent in PurePosixPath(name).parents[:-1]:
             folder = self.path / parent
             os.lstat(folder)  # FileNotFoundError where there is nothing

@@ -9,8 +9,8 @@ written and not read.
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from typing import (
@@ -70,9 +70,29 @@ def from_document(kind: type[T], document: object, path: str = "") -> T:
 
 
 def _read(kind: Any, document: Any, path: str) -> Any:
-    origin, arguments = get_origin(kind), get_args(kind)
+    """Return the value of a kind that a document holds; arguments and errors of `from_document`."""
+    if get_origin(kind) is not None:
+        return _read_parametrised(kind, document, path)
     if kind is Any or kind is object:
         return document
+    is_bool = isinstance(document, bool)  # which Python takes for a number
+    if kind is float:
+        if document is None:
+            return np.nan
+        _require(isinstance(document, int | float) and not is_bool, document, path)
+        return float(document)
+    if is_dataclass(kind) or is_typeddict(kind) or hasattr(kind, "_field_defaults"):
+        return _read_fields(kind, document, path)
+    if issubclass(kind, Enum):
+        return _checked(kind, document, path)
+    # What remains are texts, whole numbers, truth values, None, and plain lists and dicts.
+    _require(isinstance(document, kind) and not (kind is int and is_bool), document, path)
+    return document
+
+
+def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
+    """Return the value of a kind with arguments, such as ``dict[str, float]`` or a union."""
+    origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         value = _read(arguments[0], document, path)
         for check in arguments[1:]:
@@ -81,38 +101,32 @@ def _read(kind: Any, document: Any, path: str) -> Any:
     if origin in (Union, types.UnionType):
         return _read_union(arguments, document, path)
     if origin is Literal:
-        return _required(document in arguments, document, path)
+        _require(document in arguments, document, path)
+        return document
     if origin is np.ndarray:
-        return _read_array(document, path)
-    if origin is tuple:
-        _required(isinstance(document, list), document, path)
-        kinds = arguments[:1] * len(document) if arguments[-1:] == (...,) else arguments
-        _required(len(kinds) == len(document), document, path)
-        pairs = enumerate(zip(kinds, document, strict=True))
-        return tuple(_read(item, entry, f"{path}.{k}") for k, (item, entry) in pairs)
-    if origin is list:
-        _required(isinstance(document, list), document, path)
-        return [_read(arguments[0], entry, f"{path}.{k}") for k, entry in enumerate(document)]
-    if origin is not None and issubclass(origin, Mapping):
-        _required(isinstance(document, dict), document, path)
-        read = {_read(arguments[0], key, path): entry for key, entry in document.items()}
-        return {key: _read(arguments[1], entry, _below(path, key)) for key, entry in read.items()}
-    if kind is float:
-        if document is None:
-            return np.nan
-        is_number = isinstance(document, int | float) and not isinstance(document, bool)
-        return float(_required(is_number, document, path))
-    if is_dataclass(kind) or hasattr(kind, "_field_defaults") or is_typeddict(kind):
-        return _read_fields(kind, document, path)
-    if issubclass(kind, Enum):
-        return _checked(kind, document, path)
-    # texts, whole numbers, truth values, None, and documents of which nothing more is known
-    is_bool_for_int = kind is int and isinstance(document, bool)
-    return _required(isinstance(document, kind) and not is_bool_for_int, document, path)
+        return _checked(lambda rows: np.array(rows, float), document, path)  # null becomes nan
+    if issubclass(origin, Mapping):
+        _require(isinstance(document, dict), document, path)
+        values = {}
+        for name, entry in document.items():
+            key = _read(arguments[0], name, path)
+            values[key] = _read(arguments[1], entry, _below(path, key))
+        return values
+    _require(isinstance(document, list), document, path)
+    kinds = arguments
+    if origin is list or arguments[-1] is ...:
+        kinds = arguments[:1] * len(document)
+    _require(len(kinds) == len(document), document, path)
+    entries = enumerate(zip(kinds, document, strict=True))
+    return origin(_read(item, entry, f"{path}.{k}") for k, (item, entry) in entries)
 
 
 def _read_union(kinds: tuple[Any, ...], document: Any, path: str) -> Any:
-    """Return what the first kind that fits the document makes of it."""
+    """Return what the first kind that fits the document makes of it.
+
+    Raises:
+        ValueError: No kind fits; the message is of the first that is not None.
+    """
     if document is None and type(None) in kinds:
         return None
     reasons: list[ValueError] = []
@@ -126,59 +140,59 @@ def _read_union(kinds: tuple[Any, ...], document: Any, path: str) -> Any:
     raise reasons[0]
 
 
-def _read_array(document: Any, path: str) -> Any:
-    try:
-        return np.array(document, float)  # null becomes nan
-    except (TypeError, ValueError):
-        raise ValueError(f"{path}: no array of numbers") from None
-
-
 def _read_fields(kind: Any, document: Any, path: str) -> Any:
-    """Return a dataclass or a named tuple from the values of its fields by name."""
-    _required(isinstance(document, dict), document, path)
-    hints, required = _field_types(kind)
-    document = {key: entry for key, entry in document.items() if key not in _derived(kind)}
-    for key in document:
-        _required(key in hints, key, _below(path, key))
-    for name in required:
-        _required(name in document, None, _below(path, name))
-    values = {x: _read(hints[x], document[x], _below(path, x)) for x in document}
+    """Return a dataclass, typed dict or named tuple from the values of its fields by name."""
+    _require(isinstance(document, dict), document, path)
+    known = _known_fields(kind)
+    for name in document:
+        is_known = name in known.types or name in known.derived
+        _require(is_known, name, _below(path, name))
+    for name in known.required:
+        _require(name in document, None, _below(path, name))
+    values = {}
+    for name, entry in document.items():
+        if name not in known.derived:
+            values[name] = _read(known.types[name], entry, _below(path, name))
     return kind(**values)
 
 
+@dataclass(frozen=True)
+class _KnownFields:
+    """Fields of a kind: types by name, those without default, and those that follow from others."""
+
+    types: Mapping[str, Any]
+    required: tuple[str, ...]
+    derived: tuple[str, ...] = ()
+
+
 @cache
-def _field_types(kind: Any) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return the types of the fields of a dataclass or named tuple, and those without default."""
+def _known_fields(kind: Any) -> _KnownFields:
+    """Return the fields of a dataclass, typed dict or named tuple."""
     hints = get_type_hints(kind, include_extras=True)
     if is_typeddict(kind):
-        return hints, tuple(kind.__required_keys__)
+        return _KnownFields(hints, tuple(kind.__required_keys__))
     if not is_dataclass(kind):
-        return hints, tuple(x for x in kind._fields if x not in kind._field_defaults)
+        return _KnownFields(hints, tuple(x for x in kind._fields if x not in kind._field_defaults))
     own = [x for x in fields(kind) if x.init]
     required = [x.name for x in own if x.default is MISSING and x.default_factory is MISSING]
-    return {x.name: hints[x.name] for x in own}, tuple(required)
+    derived = [x.name for x in fields(kind) if not x.init]
+    return _KnownFields({x.name: hints[x.name] for x in own}, tuple(required), tuple(derived))
 
 
-@cache
-def _derived(kind: Any) -> frozenset[str]:
-    """Return the names of the fields of a dataclass that follow from others."""
-    own = fields(kind) if is_dataclass(kind) else ()
-    return frozenset(x.name for x in own if not x.init)
-
-
-def _required(condition: bool, document: Any, path: str) -> Any:
-    """Return the document, or raise ValueError with its path where the condition fails."""
+def _require(condition: bool, document: Any, path: str) -> None:
+    """Raise ValueError with the path of a document unless a condition about it holds."""
     if not condition:
         raise ValueError(f"{path or 'the document'}: {document!r:.40}")
-    return document
 
 
-def _checked(check: Any, value: Any, path: str) -> Any:
+def _checked(check: Callable[[Any], Any], value: Any, path: str) -> Any:
+    """Return what a function makes of a value; an error of it becomes ValueError with the path."""
     try:
         return check(value)
-    except ValueError:
+    except (TypeError, ValueError):
         raise ValueError(f"{path}: {value!r:.40}") from None
 
 
 def _below(path: str, key: object) -> str:
+    """Return the path of the entry with a key in the document of a path."""
     return f"{path}.{key}".lstrip(".")
