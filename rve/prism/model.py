@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from time import perf_counter
 from typing import ClassVar, Self, TypeVar
 
@@ -41,30 +41,27 @@ from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.rve.mesh.square import REFINEMENTS
 from alphacut.rve.prism.cell_fields import CellFields
 from alphacut.rve.prism.fields import solved_fields
-from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
-from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, Solved
-from alphacut.rve.prism.slices import SliceProblem
-from alphacut.rve.result.cell_model import Resolution
+from alphacut.rve.prism.modulus_basis import ModulusBasis, modulus_basis
+from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, Solved, solve_over_prisms
+from alphacut.rve.prism.slices import solve_sample
+from alphacut.rve.result.cell_model import CellModel, Resolution
 from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.form import energies_by_phase, total_energy
-from alphacut.rve.solver.krylov import SolverOptions, require_petsc, solve
+from alphacut.rve.solver.krylov import SolverOptions, require_petsc
 from alphacut.stochastic import RadiusMap
 
-AnyProblem = TypeVar("AnyProblem", PrismProblem, SliceProblem)
+T = TypeVar("T")
 
-SERIES_ACCURACY = 1e-9  # relative, of a reference by the series
-SLICES_POINTS = 14  # nodes in θ of a reference by slices
-
-
-cached_grid = lru_cache(maxsize=2)(extrude)  # prisms for any map with one reference radius
+cached_grid = lru_cache(maxsize=2)(extrude)
+"""Prisms for all maps with one reference radius; those of the last two calls are kept."""
 
 
 @dataclass(frozen=True)
-class PrismModel:
+class PrismModel(CellModel):
     """Product-space finite elements: quadratic serendipity prisms around the cone of a radius map.
 
     Args:
@@ -74,7 +71,7 @@ class PrismModel:
         parallel: Whether all MPI ranks work on one cell together; if not each works on its own.
         stiffness: Whether to solve a third load, for the whole planar stiffness.
         estimate: Whether to declare the errors.
-        modulus_range: Least and greatest Young's modulus of the particle, in Pa, between which
+        modulus_range: Smallest and largest Young's modulus of the particle, in Pa, between which
             samples of a map are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
     """
@@ -89,7 +86,6 @@ class PrismModel:
     outline: Outline = circle
     name: ClassVar[str] = "prism"
     convention: ClassVar[str] = AVERAGES[AXES]
-    is_exact: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_prisms(self.mesh_size, self.layers)
@@ -102,7 +98,7 @@ class PrismModel:
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
-        """The prisms of a resolution; see `CellModel`."""
+        """Return the prisms of a resolution; see `CellModel`."""
         return cls(
             resolution.mesh_size,
             resolution.layers,
@@ -115,21 +111,21 @@ class PrismModel:
 
     @property
     def errors_by_reference(self) -> bool:
-        """Whether errors are declared; see `CellModel`."""
+        """Whether errors are declared; see `AnyModel`."""
         return self.estimate
 
     def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
-        """Prisms without declared errors, whose samples share solutions; see `CellModel`."""
+        """Return prisms without declared errors, whose samples share solutions; see `AnyModel`."""
         return replace(self, estimate=False, modulus_range=moduli)
 
     def coarser(self) -> Self:
-        """Prisms on triangles twice as large."""
+        """Return prisms on triangles twice as large."""
         return replace(self, mesh_size=min(2 * self.mesh_size, 1.0))
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """Homogenised stiffness for each of `inclusions`, in their order, on one mesh.
+        """Return the homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -139,22 +135,33 @@ class PrismModel:
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
+        cells = [Cell(matrix, inclusion, radius_map, self.outline) for inclusion in inclusions]
+        return self._on_valid_grid(radius_map, lambda grid: self._solve_on(grid, cells))
+
+    def _solve_on(self, grid: PrismGrid, cells: Sequence[Cell]) -> list[HomogenisedStiffness]:
+        """Return the checked results of cells that differ in the inclusion, on one grid."""
         started = perf_counter()
-        problem = self._moved_slices(radius_map) if self.by_slices else self.problem(radius_map)
-        basis = self._basis(problem, matrix, inclusions)  # serves all inclusions
+        basis = self._basis(grid, cells)
         results = []
-        for inclusion in inclusions:
-            cell = Cell(matrix, inclusion, radius_map, self.outline)
+        for cell in cells:
             loads = self.loads(cell)
-            if basis is not None and isinstance(inclusion, Phase):
-                solved = basis.project(inclusion.modulus)
+            if basis is not None:
+                assert isinstance(cell.inclusion, Phase)
+                solved = basis.project(cell.inclusion.modulus)
+            elif self.by_slices:
+                solved = solve_sample(
+                    grid, cell.radius_map, cell.stiffness, loads, options=self.options
+                )
             else:
-                solved = solve_sample(problem, cell.stiffness, loads, options=self.options)
-            result = prism_result(solved, problem.numbering.size, cell.phases, loads, self.options)
+                problem = self._moved_prisms(grid, cell.radius_map)
+                solved = solve_over_prisms(problem, cell.stiffness, loads, options=self.options)
+            result = prism_result(solved, cell.phases, loads, self.options)
             result = replace(result, cell=cell, seconds=perf_counter() - started)
             if self.estimate:
                 result = with_distance(result, _reference_result(cell))
-            # of a mesh of triangles of order 2 where no error is declared
+
+            # Bounds of the stiffness may be violated by the error of the mesh. Where no error is
+            # declared, the order of triangles of degree 2 with a margin stands for it.
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
             checks = checks_within_limits(result.checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))
@@ -164,7 +171,7 @@ class PrismModel:
     def fields(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> CellFields:
-        """Displacements and stresses at the nodes, of one inclusion; the cell is solved for them.
+        """Return displacements and stresses at the nodes, for one inclusion; the cell is solved.
 
         Raises:
             As `solve`, and RefusedError of several inclusions.
@@ -176,17 +183,19 @@ class PrismModel:
         return solved_fields(problem, cell.stiffness, self.loads(cell), self.options)
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
-        """DOLFINx's mesh and form for a map; cached, so that the next map moves the same mesh.
+        """Return DOLFINx's mesh and form over prisms for a map.
+
+        It is cached: the next map of the same reference radius moves its mesh.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A radius does not fit into the cell.
         """
-        return self._moved(radius_map, partial(cached_problem, parallel=self.parallel))
+        return self._on_valid_grid(radius_map, lambda grid: self._moved_prisms(grid, radius_map))
 
     @property
     def by_slices(self) -> bool:
-        """Whether the form is assembled over slices, on one rank, or over prisms.
+        """Whether the form is assembled over slices, on one rank, and not over prisms.
 
         Over slices the stiffness is an operator without entries, which the preconditioner along θ
         takes and others of PETSc do not.
@@ -195,20 +204,25 @@ class PrismModel:
 
     @property
     def solver_text(self) -> str:
-        """How the cell is assembled and solved."""
+        """How the cell is assembled and solved; see `AnyModel`."""
         return self.options.described("slices" if self.by_slices else "prisms")
 
-    def _moved_slices(self, radius_map: RadiusMap) -> SliceProblem:
-        return self._moved(radius_map, cached_slices)
+    def _moved_prisms(self, grid: PrismGrid, radius_map: RadiusMap) -> PrismProblem:
+        """Return the cached problem over the prisms of a grid, moved to a map."""
+        problem = cached_problem(grid, parallel=self.parallel)
+        problem.move(radius_map)
+        return problem
 
-    def _moved(
-        self, radius_map: RadiusMap, cached: Callable[[PrismGrid], AnyProblem]
-    ) -> AnyProblem:
-        """Problem on the mesh of a map's reference radius, with its nodes moved to the map."""
+    def _on_valid_grid(self, radius_map: RadiusMap, function: Callable[[PrismGrid], T]) -> T:
+        """Return the value of a function of the grid of a map's reference radius.
+
+        Elements at the bends of an outline may fold where the grid is moved to the map, which
+        raises FoldedMeshError in the function: it is then called with shorter edges there.
+        """
         radius = reference_radius(radius_map, self.outline)
 
-        def on_mesh(refinement: float) -> AnyProblem:
-            grid = cached_grid(
+        def grid(refinement: float) -> PrismGrid:
+            return cached_grid(
                 size=self.mesh_size,
                 radius=radius,
                 layers=self.layers,
@@ -216,16 +230,13 @@ class PrismModel:
                 refinement=refinement,
                 parallel=self.parallel,
             )
-            problem = cached(grid)
-            problem.move(radius_map)
-            return problem
 
         if is_round(self.outline):
-            return on_mesh(REFINEMENTS[0])
-        for refinement in REFINEMENTS[:-1]:  # shorter edges where elements at bends fold
+            return function(grid(REFINEMENTS[0]))
+        for refinement in REFINEMENTS[:-1]:
             with suppress(FoldedMeshError):
-                return on_mesh(refinement)
-        return on_mesh(REFINEMENTS[-1])
+                return function(grid(refinement))
+        return function(grid(REFINEMENTS[-1]))
 
     @property
     def options(self) -> SolverOptions:
@@ -233,35 +244,40 @@ class PrismModel:
         return SolverOptions(self.petsc)
 
     def loads(self, cell: Cell) -> Array:
-        """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15): two or three.
+        """Return the macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15): 2 or 3.
 
         Two give E and ν of a cell with the symmetry of the square; others need three.
         """
         return LOADS if cell.square and not self.stiffness else THREE_LOADS
 
-    def _basis(
-        self, problem: object, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
-    ) -> ModulusBasis | None:
-        """Reduced basis for samples that differ only in the modulus of isotropic inclusions."""
-        if not (isinstance(problem, SliceProblem) and self.modulus_range):
+    def _basis(self, grid: PrismGrid, cells: Sequence[Cell]) -> ModulusBasis | None:
+        """Return a reduced basis for cells that differ in the inclusion's modulus alone.
+
+        None where they differ in more, a modulus lies outside `modulus_range`, or the energy that
+        projection on the basis leaves out is too large.
+        """
+        if self.modulus_range is None or not self.by_slices:
             return None
-        (low, high), phases = self.modulus_range, [x for x in inclusions if isinstance(x, Phase)]
-        are_alike = len(phases) == len(inclusions) and len({x.poisson for x in phases}) == 1
-        within = low * (1 - ROUND_OFF), high * (1 + ROUND_OFF)
+        low, high = self.modulus_range
+        inclusions = [x.inclusion for x in cells if isinstance(x.inclusion, Phase)]
+        are_alike = len(inclusions) == len(cells) and len({x.poisson for x in inclusions}) == 1
         if low == high or not are_alike:
             return None
-        if not all(within[0] <= phase.modulus <= within[1] for phase in phases):
+        moduli = [x.modulus for x in inclusions]
+        if min(moduli) < low * (1 - ROUND_OFF) or max(moduli) > high * (1 + ROUND_OFF):
             return None
-        loads = self.loads(Cell(matrix, inclusions[0], problem.map, self.outline))
         basis = modulus_basis(
-            problem,
-            matrix,
-            poisson=phases[0].poisson,
+            grid,
+            cells[0].radius_map,
+            cells[0].matrix,
+            poisson=inclusions[0].poisson,
             ends=self.modulus_range,
-            strains=loads,
+            strains=self.loads(cells[0]),
             options=self.options,
         )
-        return basis if basis.error <= TOLERANCE else None
+        # Of the energy. The error of E is at most half of it.
+        tolerance = 2e-10
+        return basis if basis.error <= tolerance else None
 
 
 def require_prisms(mesh_size: float, layers: int) -> None:
@@ -272,81 +288,76 @@ def require_prisms(mesh_size: float, layers: int) -> None:
         raise RefusedError("the number of layers", repr(layers), allowed)
 
 
-def solve_sample(
-    problem: PrismProblem | SliceProblem,
-    stiffness: Sequence[Array],
-    strains: Array,
-    *,
-    options: SolverOptions,
-) -> Solved:
-    """Solve eq. 7 for the phases' stiffness in Pa, at the map to which the problem was moved.
-
-    The problem holds what comes before: mesh, constraint and form.
+def prism_result(
+    solved: Solved, phases: Sequence[AnyPhase], loads: Array, options: SolverOptions
+) -> HomogenisedStiffness:
+    """Return stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
 
     Args:
-        problem: Over prisms or over slices.
-        stiffness: Of each phase, (3, 3), in Pa.
-        strains: Macroscopic strains ε̄, shape (loads, 3).
-        options: PETSc's, with the default solver's.
-
-    Raises:
-        ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
-    """
-    matrix = problem.assemble(stiffness)  # K of a(u, v) = ∫ f_Θ C ε(u) : ε(v)
-    loads = problem.loads(strains)  # F = −∫ f_Θ C ε̄ : ε(v)
-    solver = problem.solver(options, matrix, loads=len(loads))
-    solutions = solve(solver, loads)  # K U = F
-    means = problem.slice_strains(strains, solutions.vectors)  # of ε̄ + ε(u), over each slice
-    return Solved(means, solutions.iterations, solutions.residual)
-
-
-def prism_result(
-    solved: Solved, unknowns: int, phases: Sequence[AnyPhase], loads: Array, options: SolverOptions
-) -> HomogenisedStiffness:
-    """Stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
-
-    `loads` are macroscopic strains, (2 or 3, 3); three give the whole plane stiffness.
+        solved: Mean strains of the slices.
+        phases: Materials, in the order of those of `solved`.
+        loads: Macroscopic strains, shape (2 or 3, 3); three give the whole plane stiffness.
+        options: Options of the linear solver, for the name of it.
     """
     strains = solved.strains
     stiffness = [phase.stiffness for phase in phases]
-    stress, energy = strains.stress(stiffness), total_energy(strains.products, stiffness)
-    by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
+    stress = strains.stress(stiffness)
+    stiffness_by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
+    curve = StressCurve(
+        strains.theta,
+        strains.weights,
+        s11=stress[:, 0, 0],
+        s12=stress[:, 2, 1],
+        stiffness=stiffness_by_theta,
+        error=solved.curve_error,
+    )
+
+    # By Hill and Mandel's lemma the work of mean stress in mean strain is the mean energy.
     work = loads @ mean(strains.weights, stress)
+    energy = total_energy(strains.products, stiffness)
+    checks = {"hill_mandel": float(abs(work.T - energy).max() / abs(energy).max())}
+    checks |= stress_checks(stress, loads, strains.fractions, strains.weights, phases)
+    checks["residual"] = solved.residual
+
     energies = energies_by_phase(strains.products, phases, loads)
     return HomogenisedStiffness(
-        StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], by_theta),
-        PrismModel.name,
-        str(options),
-        unknowns,
-        solved.iterations,
+        curve=curve,
+        method=PrismModel.name,
+        solver=str(options),
+        unknowns=solved.unknowns,
+        iterations=solved.iterations,
         energies=PhaseEnergies(energies, np.full(energies.shape, np.nan)),
-        checks={
-            "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
-            **stress_checks(stress, loads, strains.fractions, strains.weights, phases),
-            "residual": solved.residual,
-        },
+        checks=checks,
     )
 
 
 def _reference_result(cell: Cell) -> HomogenisedStiffness:
-    """Result of the series, or of slices where it has no formula; more accurate than prisms."""
+    """Return the result of the series, or of slices where it has no formula.
+
+    Both are more accurate than prisms. The accuracy of the series and the nodes in θ of the slices
+    are chosen so that the reference's own error, which is added, hardly counts.
+    """
     matrix, inclusion = cell.matrix, cell.inclusion
     if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
-        series = SeriesModel(accuracy=SERIES_ACCURACY, energies=True)
+        series = SeriesModel(accuracy=1e-9, energies=True)
         return series.solve(cell.radius_map, matrix, [inclusion])[0]
-    slices = SlicesModel(points=SLICES_POINTS, outline=cell.outline)
+    slices = SlicesModel(points=14, outline=cell.outline)
     return slices.solve(cell.radius_map, matrix, [inclusion])[0]
 
 
 def with_distance(
-    result: HomogenisedStiffness, reference: HomogenisedStiffness, safety: float = 1.0
+    result: HomogenisedStiffness, reference: HomogenisedStiffness, *, safety: float = 1.0
 ) -> HomogenisedStiffness:
-    """Copy of a result with declared errors: `safety` times its distance from a reference.
+    """Return a copy of a result with declared errors: its distance from a reference.
 
-    The declared error of the reference, if there is one, is added.
+    Args:
+        result: Result with two or three loads.
+        reference: More accurate result. Its declared error, if there is one, is added.
+        safety: Factor of the distance.
     """
-    moduli, reference_moduli = _mean_moduli(result.curve), _mean_moduli(reference.curve)
-    if len(moduli) == 1:  # two loads: s11 is along x1
+    moduli = _mean_moduli(result.curve)
+    reference_moduli = _mean_moduli(reference.curve)
+    if len(moduli) == 1:  # with two loads s11 is along x1
         reference_moduli = reference_moduli[1:2]
     ratios = moduli / reference_moduli
     distance = (np.maximum(ratios, 1 / ratios) - 1).max(axis=0)  # nan where not computed
@@ -354,9 +365,11 @@ def with_distance(
     error = np.asarray((1 + safety * distance) * (1 + reference_errors) - 1)
     energies = result.energies
     if energies is not None and reference.energies is not None:
-        # what one part gains another loses, so that the distance of one can be small by chance
-        distances = abs(energies.values - reference.energies.values).max(axis=(0, 1), keepdims=True)
-        energy_errors = safety * np.broadcast_to(distances, energies.values.shape)
+        # What one phase gains of the energy another loses, so that the distance of one of them can
+        # be small by chance: the largest distance counts for all.
+        distances = abs(energies.values - reference.energies.values)
+        largest = distances.max(axis=(0, 1), keepdims=True)
+        energy_errors = safety * np.broadcast_to(largest, energies.values.shape)
         if reference.errors:
             energy_errors = energy_errors + reference.energies.errors
         energies = PhaseEnergies(energies.values, energy_errors)
@@ -364,17 +377,17 @@ def with_distance(
 
 
 def _mean_moduli(curve: StressCurve) -> Array:
-    """Mean C11 + C12, C11 − C12 and C33 over θ by `axial_moduli`; of two loads with C11 alone."""
-    s11, s12 = curve.mean
+    """Return the mean C11 + C12, C11 − C12 and C33 over θ, shape (rows, 3), in Pa.
+
+    Of three loads they are those of `axial_moduli`, of two loads one row by C11.
+    """
     if curve.stiffness is None:
+        s11, s12 = curve.mean
         return np.array([[s11 / STRAIN, np.nan, s12 / (2 * STRAIN)]])
     return axial_moduli(mean(curve.weights, curve.stiffness), square=False)
 
 
 @lru_cache(maxsize=2)
 def cached_problem(grid: PrismGrid, *, parallel: bool) -> PrismProblem:
-    """Mesh, form and numbering on a grid of `cached_grid`."""
+    """Return mesh, form and numbering over the prisms of a grid of `cached_grid`."""
     return PrismProblem(grid, MPI.COMM_WORLD if parallel else MPI.COMM_SELF)
-
-
-cached_slices = lru_cache(maxsize=2)(SliceProblem)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from time import perf_counter
-from typing import ClassVar, Self, cast
+from typing import ClassVar, cast
 
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
@@ -26,10 +26,10 @@ from alphacut.rve.prism.model import (
     cached_problem,
     prism_result,
     require_prisms,
-    solve_sample,
     with_distance,
 )
-from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.prism.problem import PrismProblem, solve_over_prisms
+from alphacut.rve.result.cell_model import NamedPhasesModel
 from alphacut.rve.result.checks import checks_within_limits
 from alphacut.rve.result.moduli import AVERAGES, AXES
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
@@ -47,22 +47,12 @@ SAME_LEVEL = 1e-6
 """Distance of an end of the law from the mesh's that is none, over the support."""
 
 
-class _NamedModel:
+class _NamedModel(NamedPhasesModel):
     """A model whose materials have names."""
 
     petsc: Mapping[str, str]
     name: ClassVar[str] = "prism"
     convention: ClassVar[str] = AVERAGES[AXES]
-    errors_by_reference: ClassVar[bool] = False
-    is_exact: ClassVar[bool] = False
-
-    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
-        """This model; see `CellModel`."""
-        return self
-
-    def coarser(self) -> Self:
-        """This model, which proves nothing that is to be tested."""
-        return self
 
     def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
         """Problem moved to the law, and the materials in the mesh's order, both checked."""
@@ -75,7 +65,7 @@ class _NamedModel:
 
     @property
     def solver_text(self) -> str:
-        """How the cell is assembled and solved."""
+        """How the cell is assembled and solved; see `AnyModel`."""
         return self.options.described("prisms")
 
     def solve(
@@ -95,9 +85,8 @@ class _NamedModel:
         started = perf_counter()
         problem, named = self.problem_of(law, phases)
         stiffness = [phase.stiffness for phase in named.values()]
-        solved = solve_sample(problem, stiffness, THREE_LOADS, options=self.options)
-        unknowns, materials = problem.numbering.size, list(named.values())
-        result = prism_result(solved, unknowns, materials, THREE_LOADS, self.options)
+        solved = solve_over_prisms(problem, stiffness, THREE_LOADS, options=self.options)
+        result = prism_result(solved, list(named.values()), THREE_LOADS, self.options)
         energies = cast("PhaseEnergies", result.energies)
         order = [list(named).index(name) for name in phases]
         return [
@@ -147,7 +136,7 @@ class MeshModel(_NamedModel):
         if not self.refine:
             return results
         [coarse] = replace(self, refine=False).solve(law, phases)
-        return [with_distance(result, coarse, REFINEMENT_SAFETY) for result in results]
+        return [with_distance(result, coarse, safety=REFINEMENT_SAFETY) for result in results]
 
     def __post_init__(self) -> None:
         require_petsc(self.petsc)

@@ -23,7 +23,7 @@ from alphacut.rve.mesh.wedge import (
     wedge,
 )
 from alphacut.rve.solver.form import CellForm, PointStrains, strain_products
-from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
+from alphacut.rve.solver.krylov import SolverOptions, krylov_solver, solve
 from alphacut.rve.solver.numbering import Elimination, LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, level_blocks
 from alphacut.stochastic import RadiusMap, ThetaDistribution
@@ -70,16 +70,17 @@ class SliceStrains:
                 triangles, points).
             slices: Number of each triangle's slice, shape (triangles,).
         """
-        fields = strain.shape[-1]
-        for number in np.unique(slices):
-            for phase in range(len(areas)):
-                chosen = (slices == number) & areas[phase].any(axis=1)
-                weights = areas[phase, chosen].ravel()
-                points = strain[chosen].reshape(len(weights), 3, fields)
-                self.strain[phase, number] += np.tensordot(weights, points, axes=1)
-                self.fractions[phase, number] += weights.sum()
-                of_theta = (self.weights[number] * weights)[None]
-                self.products[phase] += strain_products(points, of_theta)[0]
+        for phase, phase_areas in enumerate(areas):
+            has_phase = phase_areas.any(axis=1)
+            points = strain[has_phase]
+            weights = phase_areas[has_phase]
+            number = slices[has_phase]
+            of_triangles = np.einsum("tp,tpif->tif", weights, points)
+            np.add.at(self.strain[phase], number, of_triangles)
+            np.add.at(self.fractions[phase], number, weights.sum(axis=1))
+            theta_weights = self.weights[number, np.newaxis] * weights
+            all_points = points.reshape(-1, *points.shape[2:])
+            self.products[phase] += strain_products(all_points, theta_weights.reshape(1, -1))[0]
 
     def combined(self, coefficients: Array) -> SliceStrains:
         """Those of sums of the fields, coefficients (fields, loads)."""
@@ -93,11 +94,21 @@ class SliceStrains:
 
 
 class Solved(NamedTuple):
-    """Mean strains under each load, iterations of each, and the largest relative residual."""
+    """Solutions of a cell under some loads, as mean strains.
+
+    Args:
+        strains: Mean strains under each load.
+        iterations: Iterations of the linear solver for each load.
+        residual: Largest relative residual.
+        unknowns: Number of unknowns of the linear system.
+        curve_error: Declared relative error of stresses at a single θ, beside that of their means.
+    """
 
     strains: SliceStrains
     iterations: tuple[int, ...]
     residual: float
+    unknowns: int
+    curve_error: float = 0.0
 
 
 def positive_density(law: ThetaDistribution, theta: Array) -> Array:
@@ -236,8 +247,8 @@ class PrismProblem:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         return [self.elimination.forces(self._elastic.load(strain)) for strain in strains]
 
-    def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int = 1) -> PETSc.KSP:
-        """PETSc solver of a reduced symmetric operator, for any number of loads in turn."""
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
+        """Return PETSc's solver of a reduced symmetric operator, for loads one after another."""
         return krylov_solver(matrix, options, lambda: self.preconditioner(matrix))
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
@@ -271,3 +282,27 @@ class PrismProblem:
         for part in (integrals.strain, integrals.fractions, integrals.products):
             self.comm.Allreduce(MPI.IN_PLACE, part)
         return integrals
+
+
+def solve_over_prisms(
+    problem: PrismProblem, stiffness: Sequence[Array], strains: Array, *, options: SolverOptions
+) -> Solved:
+    """Solve eq. 7 over prisms under some macroscopic strains, and average over slices.
+
+    It is for several MPI ranks, meshes from files, level sets and preconditioners that need a
+    matrix with entries; `slices.solve_sample` is the default, and shows the whole way.
+
+    Args:
+        problem: Mesh, constraint and form, moved to the map.
+        stiffness: Stiffness of each phase, (3, 3) each, in Pa.
+        strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
+        options: PETSc's options, with those of the default solver.
+
+    Raises:
+        ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
+    """
+    matrix = problem.assemble(stiffness)
+    loads = problem.loads(strains)
+    solutions = solve(problem.solver(options, matrix), loads)
+    means = problem.slice_strains(strains, solutions.vectors)
+    return Solved(means, solutions.iterations, solutions.residual, problem.numbering.size)

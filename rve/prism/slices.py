@@ -5,19 +5,23 @@ The form has no derivative along θ, so that eq. 7 is a sum over slices s at θ_
     a(u, v) = Σ_s ∫ w_s C ε(u) : ε(v) dx,    w_s = f_Θ(θ_s) dθ,
 
 which DOLFINx assembles on plane triangles. Its mesh is the slices of one layer and moves from layer
-to layer; `LayerConstraint` says what displacements of the prisms are there.
+to layer; `LayerConstraint` says which displacements of the prisms are possible there.
+
+`solve_sample` is the whole way from the mesh to the mean strains.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, ufl
-from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.prism_grid import NAMES, PrismGrid
 from alphacut.rve.mesh.wedge import (
     POINTS_PER_SLICE,
     SLICES_PER_LAYER,
@@ -26,159 +30,309 @@ from alphacut.rve.mesh.wedge import (
 )
 from alphacut.rve.prism.problem import (
     SliceStrains,
+    Solved,
     positive_density,
     require_valid_elements,
 )
 from alphacut.rve.solver.form import CellForm, PointStrains
-from alphacut.rve.solver.krylov import SolverOptions, krylov_solver
-from alphacut.rve.solver.layers import LayerConstraint, LayerMatrix, layer_interpolation
+from alphacut.rve.solver.krylov import SolverOptions, krylov_solver, solve
+from alphacut.rve.solver.layers import (
+    LayerConstraint,
+    LayerMatrix,
+    LayerPattern,
+    layer_interpolation,
+)
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
 
-BASIX_ORDER = [0, 1, 2, 5, 4, 3]
-"""Nodes of `Triangulation.triangles` in Basix's order, whose edge k lies opposite vertex k."""
+QUADRATURE_DEGREE = 4
+"""Of the rule on triangles, exact for products of two strains of straight six-node triangles."""
+INCLUSION = NAMES.index("inclusion")
+"""Index of the inclusion among the phases."""
 
 
-class SliceProblem:
-    """The product-space problem of one mesh on one rank, moved to one map after another.
+def solve_sample(
+    grid: PrismGrid,
+    radius_map: RadiusMap,
+    stiffness: Sequence[Array],
+    strains: Array,
+    *,
+    options: SolverOptions,
+) -> Solved:
+    """Homogenise one cell: solve eq. 7 under some macroscopic strains, and average over slices.
+
+    Mesh, constraint and form depend on the grid alone and are kept for the next sample.
+
+    Args:
+        grid: Prisms whose nodes follow the interface.
+        radius_map: Radius of the particle over θ, with the distribution of θ.
+        stiffness: Stiffness C of each phase in Voigt order, (3, 3) each, in Pa.
+        strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
+        options: PETSc's options, with those of the default solver.
+
+    Returns:
+        Mean strains of each phase on each slice, and the iterations and the residual of the solver.
+
+    Raises:
+        FoldedMeshError: An element is inverted where the mesh follows the map.
+        RefusedError: The density of θ is not positive, or PETSc does not use an option.
+        ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
+    """
+    mesh = slice_mesh(grid)
+    mesh.move(radius_map)
+    constraint = layer_constraint(mesh)  # u = Q x: periodic, zero at one corner
+    form = slice_form(mesh)  # a(u, v) = Σ_s ∫ w_s C ε(u) : ε(v) dx
+    problem = SliceProblem(mesh, constraint, form)
+
+    matrix = problem.matrix(problem.blocks(form, stiffness))  # K = Qᵀ A Q of a(u, v)
+    loads = problem.loads(form, strains)  # F = Qᵀ f of −Σ_s ∫ w_s C ε̄ : ε(v) dx
+
+    solver = problem.solver(options, matrix, loads=len(loads))
+    solutions = solve(solver, loads)  # K x = F
+
+    means = problem.slice_strains(strains, solutions.vectors)  # of ε̄ + ε(Q x)
+    return Solved(means, solutions.iterations, solutions.residual, problem.numbering.size)
+
+
+class SliceMesh:
+    """DOLFINx's mesh of the slices of one layer, moved to a map and from layer to layer.
 
     Args:
         grid: Prisms whose nodes follow the interface.
 
     Attributes:
+        grid: The prisms.
         numbering: Reduced unknowns, in the order of those of `PrismProblem`.
-        map: The radius map.
+        map: The radius map of the last call of `move`.
+        mesh: DOLFINx's mesh of six-node triangles, slice after slice.
+        space: Displacements of two components on the mesh.
+        stiffness_space: Matrices (3, 3) in the cells.
+        dx: Measure of all cells; its part `INCLUSION` is that of the inclusion.
+        point_strains: Strains at the quadrature points of the cells.
+        weight: w_s of eq. 7 in the cells, for the layer where the mesh is.
+        phase: Index of the phase of each cell, shape (cells,).
+        heights: Height ζ of each slice in its layer, inside (0, 1), shape (3,).
+        node: Number of each node of `space`: slice after slice, and within each as in the plane
+            mesh; shape (nodes,).
+        interpolation: Matrix from nodal values of a layer of prisms to those at the nodes of
+            `space`.
+        rule: Nodes θ_s and weights w_s of the slices of all layers.
+        areas: Quadrature weights of the points of the cells in their slice, with sum 4 for each
+            slice, shape (layers, cells, points).
     """
 
     def __init__(self, grid: PrismGrid) -> None:
-        self.grid, self.numbering = grid, LevelNumbering(grid, MPI.COMM_SELF)
-        self._preconditioner = ThetaPreconditioner(self.numbering, MPI.COMM_SELF)
-        self._options: SolverOptions | None = None  # of this preconditioner
-        # mesh: the slices of a layer, one after another
-        plane, triangles = grid.plane, grid.plane.triangles[:, BASIX_ORDER]
-        nodes = SLICES_PER_LAYER * len(plane.points)
-        first_nodes = np.arange(0, nodes, len(plane.points))
-        cells = (first_nodes[:, None, None] + triangles).reshape(-1, 6)
+        self.grid = grid
+        self.numbering = LevelNumbering(grid, MPI.COMM_SELF)
+        plane = grid.plane
+        # Basix numbers the edges of a triangle by the opposite vertex; `Triangulation.triangles`
+        # has the midpoints of edges (0, 1), (0, 2), (1, 2).
+        triangles = plane.triangles[:, [0, 1, 2, 5, 4, 3]]
+        num_nodes = SLICES_PER_LAYER * len(plane.points)
+        first_of_slice = np.arange(0, num_nodes, len(plane.points))
+        cells = first_of_slice[:, np.newaxis, np.newaxis] + triangles
         element = basix.ufl.element("P", "triangle", 2, shape=(2,))
-        self.mesh = mesh_of(MPI.COMM_SELF, cells, nodes, element)
+        self.mesh = mesh_of(MPI.COMM_SELF, cells.reshape(-1, 6), num_nodes, element)
         self._cell: Ints = np.asarray(self.mesh.topology.original_cell_index)
         self._cell_slice, triangle = np.divmod(self._cell, len(triangles))
-        self._phase = grid.phase[triangle]
-        # form
+        self.phase = grid.phase[triangle]
+
         self.space = fem.functionspace(self.mesh, element)
-        self._weight = fem.Function(fem.functionspace(self.mesh, ("DG", 0)))
-        stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
-        dx = ufl.Measure("dx", self.mesh, metadata={"quadrature_degree": 4})
-        self._form = CellForm(self.space, stiffness_space, dx, self._weight)
-        self._matrix = fem.create_matrix(self._form.bilinear)  # of a layer
-        points = basix.make_quadrature(basix.CellType.triangle, 4)[0]
-        self._strains = PointStrains(self.space, points)
-        # constraint
-        geometry_nodes = self.mesh.geometry.input_global_indices
-        space_nodes: Ints = np.empty(nodes, int)
-        space_nodes[self.space.dofmap.list] = geometry_nodes[self.mesh.geometry.dofmap]
-        heights = prism_rule()[0][::POINTS_PER_SLICE, 2]
-        self._interpolation = layer_interpolation(plane, heights)[geometry_nodes]
-        self._constraint = LayerConstraint(
-            self.numbering, heights, space_nodes, self._matrix.to_scipy()
+        self.weight = fem.Function(fem.functionspace(self.mesh, ("DG", 0)))
+        self.stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
+        inclusion_cells = np.flatnonzero(self.phase == INCLUSION).astype(np.int32)
+        self.dx = ufl.Measure(
+            "dx",
+            self.mesh,
+            subdomain_data=[(INCLUSION, inclusion_cells)],
+            metadata={"quadrature_degree": QUADRATURE_DEGREE},
         )
+        points, _ = basix.make_quadrature(basix.CellType.triangle, QUADRATURE_DEGREE)
+        self.point_strains = PointStrains(self.space, points)
+
+        geometry = self.mesh.geometry
+        self.heights = prism_rule()[0][::POINTS_PER_SLICE, 2]
+        interpolation = layer_interpolation(plane, self.heights)
+        self._geometry_interpolation = interpolation[geometry.input_global_indices]
+        self.node: Ints = np.empty(num_nodes, int)
+        self.node[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
+        self.interpolation = interpolation[self.node]
 
     def move(self, radius_map: RadiusMap) -> None:
-        """Move the slices to the interface r(θ) of a map.
+        """Move the slices of all layers to the interface r(θ) of a map.
 
         Raises:
-            FoldedMeshError: An element is inverted.
+            FoldedMeshError: An element is inverted. The mesh is to be moved again before use.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
-        grid, law, self.map = self.grid, radius_map.distribution, radius_map
-        self._rule = level_rule(law, grid.level_thetas(law), points=SLICES_PER_LAYER)
-        positive_density(law, self._rule.nodes)
+        grid = self.grid
+        law = radius_map.distribution
+        self.map = radius_map
+        self.rule = level_rule(law, grid.level_thetas(law), points=SLICES_PER_LAYER)
+        positive_density(law, self.rule.nodes)
         levels, mid_levels = grid.positions_by_level(radius_map)
         by_layer = np.concatenate([levels[:-1], mid_levels, levels[1:]], axis=1)
-        self._positions = [self._interpolation @ positions for positions in by_layer]
-        determinants = np.array([self._strains.determinants() for _ in self._layers()])
-        self._areas = determinants * slice_weights()[0]  # (layers, cells, points)
-        sorted_areas = self._areas[:, np.argsort(self._cell)]
+        self._positions = [self._geometry_interpolation @ positions for positions in by_layer]
+        determinants = [self.point_strains.determinants() for _ in self.layers()]
+        self.areas = np.array(determinants) * slice_weights()[0]
+        # Sort the cells by prism, as shape (prisms, slices, points).
+        sorted_areas = self.areas[:, np.argsort(self._cell)]
         by_slice = sorted_areas.reshape(grid.layers, SLICES_PER_LAYER, -1, POINTS_PER_SLICE)
-        of_prisms = by_slice.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
-        require_valid_elements(grid, of_prisms)
+        by_prism = by_slice.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
+        require_valid_elements(grid, by_prism)
 
-    def _layers(self) -> Iterator[int]:
-        """Move mesh and weights w_s to each layer in turn, and yield its number."""
+    def layers(self) -> Iterator[int]:
+        """Move the mesh and `weight` to each layer in turn, and yield the number of the layer."""
         for layer, positions in enumerate(self._positions):
             self.mesh.geometry.x[:, :2] = positions
-            self._weight.x.array[:] = self._rule.weights[self._slices(layer)]
+            self.weight.x.array[:] = self.rule.weights[self.slices(layer)]
             yield layer
 
-    def _slices(self, layer: int) -> Ints:
-        """Return the number of each cell's slice among those of all layers."""
+    def slices(self, layer: int) -> Ints:
+        """Return the number of each cell's slice among those of all layers, shape (cells,)."""
         return np.asarray(layer * SLICES_PER_LAYER + self._cell_slice)
 
-    def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
-        """Return the reduced stiffness of eq. 7 for the stiffness of the phases, in Pa."""
-        self._form.stiffness.x.array[:] = np.array(stiffness)[self._phase].ravel()
-        values = self._constraint.empty_values()
-        for layer in self._layers():
-            self._matrix.set_value(0.0)
-            fem.assemble_matrix(self._matrix, self._form.bilinear)
-            self._constraint.set_layer(values[layer], self._matrix.data)
-        context, size = LayerMatrix(self._constraint, values), self.numbering.size
+
+@lru_cache(maxsize=2)
+def slice_mesh(grid: PrismGrid) -> SliceMesh:
+    """Return the mesh of the slices of a layer; that of the last two grids is kept."""
+    return SliceMesh(grid)
+
+
+@lru_cache(maxsize=2)
+def layer_constraint(mesh: SliceMesh) -> LayerConstraint:
+    """Return the constraint of displacements on the slices of a layer, kept with the mesh."""
+    return LayerConstraint(mesh.numbering, mesh.heights, mesh.interpolation, mesh.node)
+
+
+@lru_cache(maxsize=2)
+def slice_form(mesh: SliceMesh) -> CellForm:
+    """Return the form of eq. 7 on the slices of a layer, kept with the mesh."""
+    return CellForm(mesh.space, mesh.stiffness_space, mesh.dx, mesh.weight)
+
+
+@lru_cache(maxsize=2)
+def inclusion_form(mesh: SliceMesh) -> CellForm:
+    """Return the integrals of `slice_form` over the inclusion alone, kept with the mesh."""
+    return CellForm(mesh.space, mesh.stiffness_space, mesh.dx(INCLUSION), mesh.weight)
+
+
+@lru_cache(maxsize=2)
+def _layer_matrix(
+    constraint: LayerConstraint, form: CellForm
+) -> tuple[fem.MatrixCSR, LayerPattern]:
+    """Return DOLFINx's matrix of a layer, and its pattern."""
+    matrix = fem.create_matrix(form.bilinear)
+    return matrix, LayerPattern(constraint, matrix.to_scipy())
+
+
+@lru_cache(maxsize=2)
+def _preconditioner(numbering: LevelNumbering, _options: str) -> ThetaPreconditioner:
+    """Return a preconditioner, which keeps its symbolic factors while the options are the same."""
+    return ThetaPreconditioner(numbering, MPI.COMM_SELF)
+
+
+@dataclass(frozen=True, eq=False)
+class SliceProblem:
+    """The discrete problem of eq. 7 over slices.
+
+    Args:
+        mesh: The slices, moved to a map.
+        constraint: Which displacements of the slices the unknowns x of the prisms have.
+        form: The form on the slices of a layer.
+    """
+
+    mesh: SliceMesh
+    constraint: LayerConstraint
+    form: CellForm
+
+    @classmethod
+    def of_grid(cls, grid: PrismGrid) -> SliceProblem:
+        """Return the problem of a grid, whose mesh is still to be moved."""
+        mesh = slice_mesh(grid)
+        return cls(mesh, layer_constraint(mesh), slice_form(mesh))
+
+    @property
+    def numbering(self) -> LevelNumbering:
+        """The reduced unknowns."""
+        return self.mesh.numbering
+
+    def blocks(self, form: CellForm, stiffness: Sequence[Array]) -> Array:
+        """Return the blocks of 2 × 2 entries that DOLFINx assembles over the slices of each layer.
+
+        Args:
+            form: The form of the problem, or `inclusion_form`. The phases stay set in it.
+            stiffness: Stiffness of the phases, (3, 3) each, in Pa.
+
+        Returns:
+            Blocks of A_k of the layers k, shape (layers, blocks, 4).
+        """
+        form.stiffness.x.array[:] = np.array(stiffness)[self.mesh.phase].ravel()
+        layer_matrix, pattern = _layer_matrix(self.constraint, self.form)
+        blocks = np.empty((self.mesh.grid.layers, pattern.num_blocks, 4))
+        for layer in self.mesh.layers():
+            layer_matrix.set_value(0.0)
+            fem.assemble_matrix(layer_matrix, form.bilinear)
+            blocks[layer] = layer_matrix.data.reshape(-1, 4)
+        return blocks
+
+    def matrix(self, blocks: Array) -> PETSc.Mat:
+        """Return the reduced stiffness K = Σ Qᵀ A_k Q, an operator, from the blocks of A_k."""
+        _, pattern = _layer_matrix(self.constraint, self.form)
+        size = self.numbering.size
+        context = LayerMatrix(pattern, blocks)
         return PETSc.Mat().createPython((size, size), context, comm=PETSc.COMM_SELF)
 
-    def loads(self, strains: Array) -> list[PETSc.Vec]:
-        """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
-        by_layer = [[self._form.load(strain) for strain in strains] for _ in self._layers()]
-        Q, loads = self._constraint.matrix, []
-        for forces in np.array(by_layer).swapaxes(0, 1):
-            on_slices, load = Q.createVecLeft(), Q.createVecRight()
-            on_slices.array[:] = forces.ravel()
-            Q.multTranspose(on_slices, load)
-            loads.append(load)
-        return loads
+    def loads(self, form: CellForm, strains: Array) -> list[PETSc.Vec]:
+        """Return the reduced forces of macroscopic strains, shape (loads, 3).
+
+        The phases are those that are set in the form.
+        """
+        by_layer = [[form.load(strain) for strain in strains] for _ in self.mesh.layers()]
+        forces = self.constraint.forces(np.array(by_layer).swapaxes(0, 1))
+        return [PETSc.Vec().createWithArray(load, comm=PETSc.COMM_SELF) for load in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int) -> PETSc.KSP:
         """Return PETSc's solver of an assembled stiffness for some loads at once.
 
-        That of an earlier stiffness is spent. The solver's tolerance is that of each load: where
-        all have norm 1, |r_j| ≤ |r| ≤ rtol / √n · √n for the residual r of n loads together.
+        That of an earlier stiffness is spent, since both have the same preconditioner.
         """
-        if options != self._options:
-            self._preconditioner = ThetaPreconditioner(self.numbering, MPI.COMM_SELF)
-            self._options = options
+        preconditioner = _preconditioner(self.numbering, str(options))
         blocks = matrix.getPythonContext().level_blocks()
-        law, preconditioner = self.map.distribution, self._preconditioner
+        law = self.mesh.map.distribution
         ksp = krylov_solver(
             repeated(matrix, loads), options, lambda: preconditioner.set_up(law, blocks)
         )
+        # The tolerance becomes that of each load. All loads have norm 1, so that for the residual r
+        # of n loads together |r_j| ≤ |r| ≤ (rtol / √n) · √n = rtol.
         ksp.setTolerances(rtol=ksp.getTolerances()[0] / loads**0.5)
         return ksp
 
     def slice_strains(
         self, strains: Array, fluctuations: Sequence[PETSc.Vec | None]
     ) -> SliceStrains:
-        """Return integrals over the slices of fields ε̄ + ε(u): n of ε̄, (n, 3), and n of u.
+        """Return integrals over the slices of the strains ε̄ + ε(u) of some fields.
 
-        None is no u.
+        Args:
+            strains: Macroscopic strain ε̄ of each field, shape (fields, 3).
+            fluctuations: Reduced unknowns of u of each field; None where u is zero.
         """
-        rule, count, Q = self._rule, len(strains), self._constraint.matrix
-        on_slices = np.zeros((count, self.grid.layers, Q.size[0] // self.grid.layers))
-        for k, vector in enumerate(fluctuations):
-            if vector is not None:
-                u = Q.createVecLeft()
-                Q.mult(vector, u)
-                on_slices[k] = u.array.reshape(on_slices.shape[1:])
-        is_phase = np.equal.outer(np.arange(len(self.grid.names)), self._phase)[..., None]
-        integrals = SliceStrains.zeros(rule, phases=len(is_phase), fields=count)
-        values = np.empty((len(self._cell), POINTS_PER_SLICE, 3, count))
-        for layer in self._layers():
-            for k, vector in enumerate(fluctuations):
-                values[..., k] = strains[k]
-                if vector is not None:
-                    values[..., k] += self._strains(on_slices[k, layer])
-            areas = is_phase * self._areas[layer] / AREA
-            integrals.add(values, areas, self._slices(layer))
+        mesh, count = self.mesh, len(strains)
+        moving = [field for field, vector in enumerate(fluctuations) if vector is not None]
+        unknowns = np.array([fluctuations[field].array_r for field in moving])
+        displacements = self.constraint.displacements(unknowns)
+        phases = np.arange(len(mesh.grid.names))
+        is_phase = np.equal.outer(phases, mesh.phase)[..., np.newaxis]
+        integrals = SliceStrains.zeros(mesh.rule, phases=len(phases), fields=count)
+        for layer in mesh.layers():
+            values = np.empty((*mesh.areas.shape[1:], 3, count))
+            values[:] = strains.T
+            for field, on_layer in zip(moving, displacements[:, layer], strict=True):
+                values[..., field] += mesh.point_strains(on_layer)
+            areas = is_phase * mesh.areas[layer] / AREA
+            integrals.add(values, areas, mesh.slices(layer))
         return integrals
 
 

@@ -42,12 +42,13 @@ class Resolution:
 
 
 class AnyModel(Protocol):
-    """What `fuzzy_stiffness` asks of every model: a frozen dataclass of its resolution.
+    """What every model of a cell says of itself: a frozen dataclass of its resolution.
 
-    `name` is the word for it in results and cases, `convention` the average that its E and ν are
-    of. `errors_by_reference` says whether declared errors take a reference solution, so that a
-    campaign takes them at the nominal inputs alone. `is_exact` says whether errors are so small
-    that signs hold which mechanics proves of exact cells.
+    A model inherits from one of the two protocols below, and with it what most models say.
+
+    Attributes:
+        name: Word for the model in results and cases.
+        convention: Words for the average of the stiffness that its E and ν are of.
     """
 
     name: ClassVar[str]
@@ -55,22 +56,34 @@ class AnyModel(Protocol):
 
     @property
     def errors_by_reference(self) -> bool:
-        """Whether declared errors take a reference solution."""
+        """Whether declared errors take a reference solution.
+
+        A campaign takes such errors at the nominal inputs alone.
+        """
+        return False
 
     @property
     def is_exact(self) -> bool:
-        """Whether signs hold that mechanics proves of exact cells."""
+        """Whether errors are so small that signs hold which mechanics proves of exact cells."""
+        return False
+
+    @property
+    def solver_text(self) -> str:
+        """How finite elements are assembled and solved, in words; empty where there are none."""
+        return ""
 
     def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
         """Return the model for many samples of one cell.
 
-        It declares no error that takes a reference solution. `moduli` are the least and the
-        greatest Young's modulus of the particle in Pa, if samples differ in it; `energies` says
+        It declares no error that takes a reference solution. `moduli` are the smallest and the
+        largest Young's modulus of the particle in Pa, if samples differ in it; `energies` says
         whether the strain energies of the phases are needed, for loss factors.
         """
+        return self
 
     def coarser(self) -> Self:
         """Return a model that is cheaper and less accurate, to test bounds by."""
+        return self
 
 
 class CellModel(AnyModel, Protocol):

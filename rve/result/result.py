@@ -45,6 +45,7 @@ class StressCurve:
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
         stiffness: The whole stiffness at the nodes if known, in Voigt order, in Pa: of the plane
             (11, 22, 12 with 2 ε12), shape (n, 3, 3), or of space, (n, 6, 6).
+        error: Declared relative error of the stress at a single θ, beside that of the means.
     """
 
     theta: Array
@@ -52,6 +53,7 @@ class StressCurve:
     s11: Array
     s12: Array
     stiffness: Array | None = None
+    error: float = 0.0
 
     @classmethod
     def from_stiffness(cls, rule: ThetaRule, stiffness: Array) -> StressCurve:

@@ -32,7 +32,7 @@ from alphacut.rve.cell.outline import Outline, circle, is_round, require_outline
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes, plane_mesh, quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
-from alphacut.rve.result.cell_model import Resolution
+from alphacut.rve.result.cell_model import CellModel, Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli, mori_tanaka, square_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
@@ -191,7 +191,7 @@ _NOISE = 1e-13  # of a declared error: what rounding leaves
 
 
 @dataclass(frozen=True)
-class SlicesModel:
+class SlicesModel(CellModel):
     """Plane finite elements of order 4 with curved sides at the nodes of a Gauss rule in θ.
 
     Args:
@@ -205,7 +205,6 @@ class SlicesModel:
     outline: Outline = circle
     name: ClassVar[str] = "slices"
     convention: ClassVar[str] = AVERAGES[AXES]
-    errors_by_reference: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_mesh_size(self.mesh_size)
@@ -222,9 +221,10 @@ class SlicesModel:
         """Whether the particle is round, of which mechanics proves signs; see `CellModel`."""
         return is_round(self.outline)
 
-    def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
-        """This model; see `CellModel`."""
-        return self
+    @property
+    def solver_text(self) -> str:
+        """How the cell is assembled and solved; see `AnyModel`."""
+        return "one UFL form over curved triangles by DOLFINx, solved by PETSc's cholesky"
 
     def coarser(self) -> Self:
         """Slices on elements twice as large."""

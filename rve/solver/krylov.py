@@ -96,13 +96,11 @@ class Solutions:
 
     Args:
         vectors: x of each load f.
-        products: K x of each.
         iterations: Of each.
         residual: Largest |K x − f| over |f|.
     """
 
     vectors: list[PETSc.Vec]
-    products: list[PETSc.Vec]
     iterations: tuple[int, ...]
     residual: float
 
@@ -149,7 +147,7 @@ def solve(
     """
     matrix, _ = ksp.getOperators()
     together = matrix.size[0] // loads[0].size
-    vectors, products, iterations, residuals = [], [], [], []
+    vectors, iterations, residuals = [], [], []
     ksp.setInitialGuessNonzero(bool(guesses))
     for first in range(0, len(loads), together):
         group = slice(first, first + together)
@@ -170,10 +168,9 @@ def solve(
         product = b.duplicate()
         matrix.mult(x, product)
         vectors += _split(x, loads[group], norms)
-        products += _split(product, loads[group], norms)
         iterations += together * [count]
         residuals.append((product - b).norm())  # at least that of each load, whose norm is 1
-    return Solutions(vectors, products, tuple(iterations), max(residuals))
+    return Solutions(vectors, tuple(iterations), max(residuals))
 
 
 def _join(vectors: Sequence[PETSc.Vec], norms: Sequence[float], *, into: PETSc.Vec) -> None:

@@ -7,9 +7,9 @@ triangles,
     u = (1 − ζ) U_k + ζ U_k+1 + 4 ζ (1 − ζ) J (M_k − (V_k + V_k+1) / 2),
 
 where V_k are the values of U_k at vertices and J injects linear into quadratic triangles. With
-periodicity and the fixed corner this is u = Q x on the slices of a layer, for the unknowns x of its
-two levels and its mid-level, and the reduced stiffness is K = Qᵀ diag(A_k) Q, where A_k is what
-DOLFINx assembles over the slices of layer k.
+periodicity and the fixed corner this is u = Q x_k on the slices of layer k, for the unknowns x_k of
+its two levels and its mid-level. Q is the same for all layers. The reduced stiffness is the sum of
+Qᵀ A_k Q over the layers, where A_k is what DOLFINx assembles over the slices of layer k.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.lib.stride_tricks import sliding_window_view
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import PETSc, aij, columns
@@ -27,176 +28,251 @@ from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.theta_preconditioner import interpolated_vertices
 
 
-@dataclass(frozen=True)
-class BlockSum:
-    """Entries of Bᵀ A B as sums of those of A, for matrices A of one pattern.
-
-    SciPy's product would leave out sums that are zero by chance, so that its pattern depended on
-    the entries of A.
-
-    Args:
-        sums: Matrix from the entries of A to those of Bᵀ A B, both in the order of CSR.
-        block: Bᵀ A B, whose entries are set anew for each A.
-    """
-
-    sums: sp.csr_matrix
-    block: sp.csr_matrix
-
-    def scaled(self, factors: Array) -> sp.csr_matrix:
-        """Return `sums` of entries of A that are multiplied by factors, one for each."""
-        return self.sums @ sp.diags(factors)
-
-    def filled(self, entries: Array) -> sp.csr_matrix:
-        """Return `block` with these entries; the next call changes it."""
-        self.block.data = entries
-        return self.block
-
-
 class LayerConstraint:
-    """The constraint u = Q x of all slices, layer after layer, by the unknowns of the levels.
+    """The constraint u = Q x_k between the unknowns of a layer and the nodes of its slices.
 
     Args:
-        numbering: Reduced unknowns, all on this rank.
-        heights: ζ of the slices, inside (0, 1), shape (slices,).
-        node: Number of each node of DOLFINx's space on the slices of a layer: slice after slice, in
-            each as in the plane mesh; shape (nodes,).
-        pattern: Pattern of DOLFINx's matrix in that space, in blocks of 2 × 2.
-
-    Attributes:
-        matrix: Q, shape (layers · 2 nodes, unknowns).
-        transposed: Qᵀ.
+        numbering: Numbering of the unknowns, all on this rank.
+        heights: Height ζ of each slice in its layer, inside (0, 1), shape (slices,).
+        interpolation: Matrix of `layer_interpolation`, its rows in the order of DOLFINx's nodes on
+            the slices, shape (nodes, nodes of a layer of prisms).
+        node: Number of each of DOLFINx's nodes: slice after slice, and within each as in the plane
+            mesh; shape (nodes,).
     """
 
     def __init__(
-        self, numbering: LevelNumbering, heights: Array, node: Ints, pattern: sp.bsr_matrix
+        self, numbering: LevelNumbering, heights: Array, interpolation: sp.csr_matrix, node: Ints
     ) -> None:
-        plane, layers = numbering.grid.plane, numbering.grid.layers
-        of_layer = layer_interpolation(plane, heights)[node] @ _periodicity(numbering)
-        Q = sp.kron(of_layer, sp.eye(2), "coo")
-        layer = np.arange(layers)[:, None]
-        places = (Q.row + layer * Q.shape[0]).ravel(), (Q.col + layer * numbering.stride).ravel()
-        shape = layers * Q.shape[0], numbering.size
-        all_layers = sp.csr_matrix((np.tile(Q.data, layers), places), shape)
-        self.matrix, self.transposed = aij(all_layers), aij(all_layers.T.tocsr())
-        self._pattern = _scalar_pattern(pattern)
-        # the CSR pattern of diag(A_k): `sp.kron` and `sp.block_diag` take ten times as long
-        rows, entries = self._pattern.shape[0], self._pattern.nnz
-        starts = np.append(0, (self._pattern.indptr[1:] + layer * entries).ravel())
+        self.numbering = numbering
+        self.heights = heights
+        scalar = interpolation @ _periodicity(numbering)
+        by_component = sp.kron(scalar, sp.eye(2), "csr")
+        self._matrix = aij(by_component)  # Q
+        self._transposed = aij(by_component.T.tocsr())
+        on_slice, plane_node = np.divmod(node, len(numbering.grid.plane.points))
+        self.on_slice = on_slice
+        self.unknown = numbering.planar[plane_node]
+
+    def displacements(self, unknowns: Array) -> Array:
+        """Return Q x_k of all layers.
+
+        Args:
+            unknowns: Unknowns of several fields, shape (fields, unknowns).
+
+        Returns:
+            Displacements of DOLFINx's nodes, shape (fields, layers, 2 nodes).
+        """
+        # The unknowns of a layer follow one another, and those of the level above it are also the
+        # first ones of the next layer: x_k are overlapping windows of x.
+        stride, width = self.numbering.stride, self._matrix.size[1]
+        windows = sliding_window_view(unknowns, width, axis=1)[:, ::stride]
+        products = self._matrix.matMult(columns(windows.reshape(-1, width)))
+        return np.array(products.getDenseArray().T).reshape(*windows.shape[:2], -1)
+
+    def forces(self, on_slices: Array) -> Array:
+        """Return the sum of Qᵀ f_k over the layers.
+
+        Args:
+            on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes).
+
+        Returns:
+            Forces on the unknowns, shape (fields, unknowns).
+        """
+        fields, layers, size = on_slices.shape
+        products = self._transposed.matMult(columns(on_slices.reshape(-1, size)))
+        by_layer = products.getDenseArray().T.reshape(fields, layers, -1)
+        stride, level_size = self.numbering.stride, self.numbering.level_size
+        total = np.zeros((fields, layers + 1, stride))
+        total[:, :-1] = by_layer[..., :stride]
+        total[:, 1:, :level_size] += by_layer[..., stride:]
+        return total.reshape(fields, -1)[:, : self.numbering.size]
+
+
+@dataclass(frozen=True)
+class BlockSum:
+    """The product Bᵀ A B as sums of entries of A, for matrices A of one pattern.
+
+    The entries of B are 0 and 1. SciPy's product would leave out sums that are zero by chance, so
+    that its pattern depended on the entries of A.
+
+    Args:
+        sums: Matrix from the blocks of A to those of Bᵀ A B, each of 2 × 2 entries.
+        pattern: CSR pattern of Bᵀ A B; its values are their places among the entries of the blocks.
+    """
+
+    sums: sp.csr_matrix
+    pattern: sp.csr_matrix
+
+    @classmethod
+    def of_parents(cls, pattern: sp.bsr_matrix, parents: Ints) -> BlockSum:
+        """Prepare the product with B, which is 1 from the parents of each node to that node.
+
+        Args:
+            pattern: Pattern of A in blocks of 2 × 2.
+            parents: Numbers of pairs of unknowns, −1 for none, shape (nodes, parents).
+        """
+        size = int(parents.max()) + 1
+        node = _rows(pattern)
+        row = parents[node][:, :, np.newaxis]
+        column = parents[pattern.indices][:, np.newaxis, :]
+        is_free = (row >= 0) & (column >= 0)
+        keys, place = np.unique((row * size + column)[is_free], return_inverse=True)
+        num_blocks = len(pattern.indices)
+        all_blocks = np.arange(num_blocks)[:, np.newaxis, np.newaxis]
+        block = np.broadcast_to(all_blocks, is_free.shape)[is_free]
+        ones = np.ones(len(place))
+        sums = sp.csr_matrix((ones, (place, block)), (len(keys), num_blocks))
+        indptr = np.searchsorted(keys, np.arange(size + 1) * size)
+        blocks = np.ones((len(keys), 2, 2))
+        product = sp.bsr_matrix((blocks, keys % size, indptr), (2 * size, 2 * size))
+        return cls(sums, _scalar_pattern(product))
+
+    def scaled(self, factors: Array) -> BlockSum:
+        """Return the product for matrices A whose blocks are multiplied by factors first."""
+        sums = self.sums.copy()
+        sums.data *= factors[sums.indices]
+        return BlockSum(sums, self.pattern)
+
+    def entries(self, blocks: Array) -> Array:
+        """Return the entries of Bᵀ A B in the order of CSR from the blocks of A, shape (n, 4)."""
+        return np.asarray((self.sums @ blocks).ravel()[self.pattern.data])
+
+    def matrix(self, entries: Array) -> sp.csr_matrix:
+        """Return Bᵀ A B with some entries, without a copy of them."""
+        csr = entries, self.pattern.indices, self.pattern.indptr
+        return sp.csr_matrix(csr, self.pattern.shape)
+
+
+class LayerPattern:
+    """What follows from the pattern of DOLFINx's matrix A_k, the same for all layers.
+
+    Args:
+        constraint: The constraint u = Q x_k.
+        pattern: Pattern of A_k in blocks of 2 × 2.
+    """
+
+    def __init__(self, constraint: LayerConstraint, pattern: sp.bsr_matrix) -> None:
+        self.constraint = constraint
+        self.num_blocks = len(pattern.indices)
+        scalar = _scalar_pattern(pattern)
+        self._places = scalar.data
+        # The CSR pattern of the block diagonal matrix diag(A_k). `sp.kron` and `sp.block_diag` take
+        # ten times as long to make it.
+        layer = np.arange(constraint.numbering.grid.layers)[:, np.newaxis]
+        starts = np.append(0, (scalar.indptr[1:] + layer * scalar.nnz).ravel())
+        indices = (scalar.indices + layer * scalar.shape[0]).ravel()
         self._indptr = starts.astype(PETSc.IntType)
-        self._indices = (self._pattern.indices + layer * rows).ravel().astype(PETSc.IntType)
-        # The preconditioner's blocks are Bᵀ A B with B from hats, then from bubbles, to the slices:
-        # (1 − ζ), ζ at a node, and 4 ζ (1 − ζ) / 2 from both ends of the edge of a midpoint.
-        on_slice, plane_node = np.divmod(node, len(plane.points))
-        unknown = numbering.planar[plane_node]
-        ends = np.where(unknown[:, None] < 0, -1, interpolated_vertices(numbering)[unknown])
-        row = np.repeat(np.repeat(on_slice, 2), np.diff(self._pattern.indptr))  # slice of an entry
-        lower, upper = 1 - heights[row], heights[row]
-        hats, bubbles = (_block_sum(pattern, x) for x in (unknown[:, None], ends))
-        self._hats, self._bubbles = hats, bubbles
-        self._lower, self._upper = hats.scaled(lower**2), hats.scaled(upper**2)
-        self._bubble = bubbles.scaled((2 * lower * upper) ** 2)
+        self._indices = indices.astype(PETSc.IntType)
 
-    def empty_values(self) -> Array:
-        """Return an array for the values of A_k in CSR, shape (layers, entries)."""
-        entries = self._pattern.nnz
-        return np.empty((len(self._indices) // entries, entries))
+        # The blocks of the preconditioner are Bᵀ A B, where B takes hat functions, and then bubble
+        # functions, of θ to the slices. A hat is 1 − ζ or ζ at a node. A bubble is 4 ζ (1 − ζ) at a
+        # vertex, and half of it at a midpoint from each end of its edge.
+        unknown = constraint.unknown[:, np.newaxis]
+        ends = np.where(unknown < 0, -1, interpolated_vertices(constraint.numbering)[unknown[:, 0]])
+        hats = BlockSum.of_parents(pattern, unknown)
+        bubbles = BlockSum.of_parents(pattern, ends)
+        height = constraint.heights[constraint.on_slice[_rows(pattern)]]  # of each block
+        self._lower_hats = hats.scaled((1 - height) ** 2)
+        self._upper_hats = hats.scaled(height**2)
+        self._bubbles = bubbles.scaled((2 * height * (1 - height)) ** 2)
 
-    def set_layer(self, values: Array, blocks: Array) -> None:
-        """Set the values of a layer, (entries,), to those of DOLFINx's blocks."""
-        np.take(blocks, self._pattern.data, out=values, mode="clip")  # "raise" copies
-
-    def block_diagonal(self, values: Array) -> PETSc.Mat:
-        """Return diag(A_k) on the values of all layers, shape (layers, entries)."""
+    def block_diagonal(self, blocks: Array) -> PETSc.Mat:
+        """Return diag(A_k) from the blocks of all layers, shape (layers, blocks, 4)."""
+        values = np.take(blocks.reshape(len(blocks), -1), self._places, axis=1).ravel()
         size = len(self._indptr) - 1
-        csr = values.ravel(), self._indices, self._indptr
-        return aij(sp.csr_matrix(csr, (size, size)))
+        return aij(sp.csr_matrix((values, self._indices, self._indptr), (size, size)))
 
-    def level_blocks(self, values: Array) -> Iterator[sp.csr_matrix]:
-        """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels."""
-        below = [*(self._lower @ x for x in values), 0.0]  # of the layer above each level
-        above = [0.0, *(self._upper @ x for x in values)]
-        for from_above, from_below in zip(below, above, strict=True):
-            yield self._hats.filled(from_above + from_below)
-        for x in values:
-            yield self._bubbles.filled(self._bubble @ x)
+    def level_blocks(self, blocks: Array) -> Iterator[sp.csr_matrix]:
+        """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels.
+
+        Args:
+            blocks: Blocks of A_k of all layers, shape (layers, blocks, 4).
+        """
+        # A level is the upper end of the layer below it and the lower end of the layer above it.
+        layer_above = [*(self._lower_hats.entries(layer) for layer in blocks), 0.0]
+        layer_below = [0.0, *(self._upper_hats.entries(layer) for layer in blocks)]
+        for below, above in zip(layer_below, layer_above, strict=True):
+            yield self._lower_hats.matrix(below + above)
+        for layer in blocks:
+            yield self._bubbles.matrix(self._bubbles.entries(layer))
 
 
 class LayerMatrix:
-    """K = Qᵀ diag(A_k) Q; a context of PETSc's ``python`` matrix.
+    """The reduced stiffness K = Σ Qᵀ A_k Q; a context of PETSc's ``python`` matrix.
 
     Args:
-        constraint: Q and the pattern of A_k.
-        values: Those of A_k, shape (layers, entries).
+        pattern: Pattern of A_k.
+        blocks: Blocks of A_k of all layers, shape (layers, blocks, 4).
     """
 
-    def __init__(self, constraint: LayerConstraint, values: Array) -> None:
-        self._constraint, self._values = constraint, values
-        self._layers = constraint.block_diagonal(values)
+    def __init__(self, pattern: LayerPattern, blocks: Array) -> None:
+        self._pattern = pattern
+        self._blocks = blocks
+        self._layers = pattern.block_diagonal(blocks)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Set y to K x; called by PETSc. Several x may stand one after another in a vector.
+        """Set y to K x; called by PETSc.
 
-        They are read and multiplied together, which takes little longer than one.
+        Several x may stand one after another in a vector. They are multiplied together, which takes
+        little longer than one of them, since matrices are read once.
         """
-        Q, transposed = self._constraint.matrix, self._constraint.transposed
-        fields = columns(x.array_r.reshape(-1, Q.size[1]))
-        forces = self._layers.matMult(Q.matMult(fields))
-        products = transposed.matMult(forces)  # named, since its array does not keep it alive
-        y.array[:] = products.getDenseArray().T.ravel()
+        constraint = self._pattern.constraint
+        fields = x.array_r.reshape(-1, constraint.numbering.size)
+        u = constraint.displacements(fields)
+        products = self._layers.matMult(columns(u.reshape(len(fields), -1)))
+        on_slices = products.getDenseArray().T.reshape(u.shape)
+        y.array[:] = constraint.forces(on_slices).ravel()
 
     def level_blocks(self) -> Iterator[sp.csr_matrix]:
         """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels."""
-        return self._constraint.level_blocks(self._values)
+        return self._pattern.level_blocks(self._blocks)
 
 
 def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
-    """Return the matrix from nodal values of a layer of prisms to those of its slices.
+    """Return the matrix from nodal values of a layer of prisms to nodal values of its slices.
 
-    Rows are the nodes of slice after slice; columns those of the level below, the vertices of the
-    mid-level, and the nodes of the level above.
+    Its rows are the nodes of one slice after another. Its columns are the nodes of the level below,
+    the vertices of the mid-level, and the nodes of the level above.
+
+    Args:
+        plane: The plane mesh.
+        heights: Height ζ of each slice in the layer, from 0 to 1, shape (slices,).
     """
-    nodes, vertices = len(plane.points), plane.vertices
-    midpoints = np.repeat(np.arange(nodes - vertices), 2), plane.ends.ravel()
-    halves = sp.csr_matrix((np.full(plane.ends.size, 0.5), midpoints))
-    injection = sp.vstack([sp.eye(vertices), halves])  # J
-    ζ = heights[:, None]
-    bubble = sp.kron(4 * ζ * (1 - ζ), injection)
-    half = sp.kron(2 * ζ * (1 - ζ), injection @ sp.eye(vertices, nodes))  # of J V / 2
-    below, above = sp.kron(1 - ζ, sp.eye(nodes)), sp.kron(ζ, sp.eye(nodes))
-    return sp.hstack([below - half, bubble, above - half], "csr")
+    num_nodes, num_vertices = len(plane.points), plane.vertices
+    midpoints = np.repeat(np.arange(num_nodes - num_vertices), 2)
+    halves = sp.csr_matrix((np.full(plane.ends.size, 0.5), (midpoints, plane.ends.ravel())))
+    injection = sp.vstack([sp.eye(num_vertices), halves])  # J
+    vertex_injection = injection @ sp.eye(num_vertices, num_nodes)  # J V
+    ζ = heights[:, np.newaxis]
+    correction = sp.kron(2 * ζ * (1 - ζ), vertex_injection)
+    below = sp.kron(1 - ζ, sp.eye(num_nodes)) - correction
+    above = sp.kron(ζ, sp.eye(num_nodes)) - correction
+    return sp.hstack([below, sp.kron(4 * ζ * (1 - ζ), injection), above], "csr")
 
 
 def _periodicity(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Return the matrix from pairs of unknowns of a layer to its nodes, zero where held."""
-    planar, vertices = numbering.planar, numbering.planar[: numbering.grid.plane.vertices]
-    mid_first, above_first = numbering.level_size // 2, numbering.stride // 2
-    pair = np.concatenate([planar, vertices + mid_first, planar + above_first])
+    """Return the matrix from pairs of unknowns of a layer to its nodes, zero where one is held."""
+    planar = numbering.planar
+    vertices = planar[: numbering.grid.plane.vertices]
+    first_on_mid_level = numbering.level_size // 2
+    first_above = numbering.stride // 2
+    pair = np.concatenate([planar, vertices + first_on_mid_level, planar + first_above])
     is_free = np.concatenate([planar, vertices, planar]) >= 0
-    values = np.ones(is_free.sum()), (np.flatnonzero(is_free), pair[is_free])
-    return sp.csr_matrix(values, (len(pair), above_first + mid_first))
+    ones = np.ones(np.count_nonzero(is_free))
+    places = np.flatnonzero(is_free), pair[is_free]
+    return sp.csr_matrix((ones, places), (len(pair), first_above + first_on_mid_level))
 
 
-def _block_sum(pattern: sp.bsr_matrix, parents: Ints) -> BlockSum:
-    """Return Bᵀ A B of matrices A of 2 × 2 blocks, where B is 1 from each node's parents, else 0.
-
-    `parents` are numbers of pairs of unknowns, −1 for none, shape (nodes, parents).
-    """
-    entries, size = len(pattern.indices), int(parents.max()) + 1
-    node = np.repeat(np.arange(len(parents)), np.diff(pattern.indptr))
-    row, column = parents[node][:, :, None], parents[pattern.indices][:, None, :]
-    is_free = (row >= 0) & (column >= 0)
-    keys, place = np.unique((row * size + column)[is_free], return_inverse=True)
-    entry = np.broadcast_to(np.arange(entries)[:, None, None], is_free.shape)[is_free]
-    sums = sp.csr_matrix((np.ones(len(place)), (place, entry)), (len(keys), entries))
-    indptr = np.searchsorted(keys, np.arange(size + 1) * size)
-    blocks = np.ones((len(keys), 2, 2)), keys % size, indptr
-    scalar = _scalar_pattern(sp.bsr_matrix(blocks, (2 * size, 2 * size)))
-    by_component = sp.kron(sums, sp.eye(4), "csr")[scalar.data]
-    return BlockSum(by_component[:, _scalar_pattern(pattern).data], scalar)
+def _rows(pattern: sp.bsr_matrix) -> Ints:
+    """Return the row of each block of a matrix."""
+    return np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
 
 
 def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
-    """Return the CSR pattern of a block matrix; its values are their places among the blocks'."""
+    """Return the CSR pattern of a block matrix.
+
+    Its values are the places of its entries in the array of the blocks, read in the order of C.
+    """
     places = np.arange(pattern.data.size).reshape(-1, 2, 2)
     blocks = sp.bsr_matrix((places, pattern.indices, pattern.indptr), pattern.shape)
     return blocks.tocsr()

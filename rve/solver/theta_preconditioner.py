@@ -137,7 +137,7 @@ class ThetaPreconditioner:
             self._solvers[number].factorise(block.data / mass)
         return self
 
-    def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
+    def apply(self, _pc: PETSc.PC | None, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Set the result to P⁻¹ residual; called by PETSc.
 
         On one rank several residuals may stand one after another in a vector.

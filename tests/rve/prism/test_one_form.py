@@ -9,7 +9,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 import ufl
 
 from alphacut.rve import LevelSetModel, MeshModel, Phase, PrismModel
-from alphacut.rve.prism import model, own_mesh
+from alphacut.rve.prism import model, own_mesh, slices
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.solver import form
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -46,7 +46,7 @@ RUNS = {
 @pytest.fixture
 def stiffness_times():
     """Set a factor of the stiffness in the bilinear form alone, and forget compiled forms."""
-    caches = [model.cached_slices, model.cached_problem, own_mesh._mesh_problem]
+    caches = [slices.slice_mesh, model.cached_problem, own_mesh._mesh_problem]
     original = form.virtual_work
 
     def set_factor(factor):

@@ -10,8 +10,9 @@ from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
-from alphacut.rve.prism.model import PrismModel, cached_slices
+from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import FoldedMeshError
+from alphacut.rve.prism.slices import slice_mesh
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
 from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.rve.series.model import SeriesModel
@@ -86,7 +87,7 @@ def test_samples_on_coarse_meshes_are_those_solved_alone(size, layers):
     particles = [Phase(e * 1e9) for e in (80, 81, 82, 85, 75)]
     model = PrismModel(size, layers, estimate=False)
     together = model.solve(PAPER, MATRIX, particles)
-    cached_slices.cache_clear()
+    slice_mesh.cache_clear()
     alone = model.solve(PAPER, MATRIX, particles[-1:])
     assert together[-1].modulus == alone[0].modulus
     assert together[0].modulus < together[1].modulus < together[2].modulus < together[3].modulus
