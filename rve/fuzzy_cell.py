@@ -130,6 +130,15 @@ class FuzzyStiffness:
         """Number of linear systems that were solved for the samples."""
         return int(self._samples("systems").sum())
 
+    @property
+    def curve_error(self) -> float:
+        """Declared relative error of the samples' stress at a single θ, beside that of means.
+
+        It is that of samples which share solutions: their means are far more accurate than their
+        stress at a single θ, see `modulus_basis`. 0 where each sample is solved by itself.
+        """
+        return float(self._samples("curve_error").max())
+
     def _samples(self, output: str) -> Array:
         assert self.bounds.samples is not None
         return self.bounds.samples.values.output(output)
@@ -170,7 +179,7 @@ class FuzzyStiffness:
         """Return a dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples.
 
         Each constant has its values NAME_sample, `point` has the inputs of the samples and
-        `curve11` their stresses σ11 over θ.
+        `curve11` their stresses σ11 over θ, with `curve_error` as attribute "relative_error".
         """
         import xarray
 
@@ -187,7 +196,8 @@ class FuzzyStiffness:
         for name, cut in {} if self.losses is None else self.losses.cuts.items():
             variables[f"loss_{name}"] = (CUT, cut)
         variables["point"] = (("sample", "parameter"), bounds.samples.points)
-        variables["curve11"] = (("sample", "theta"), self._samples("curve11"), {"units": "Pa"})
+        of_curves = {"units": "Pa", "relative_error": self.curve_error}
+        variables["curve11"] = (("sample", "theta"), self._samples("curve11"), of_curves)
         axes = {"bound": ["lower", "upper"], "parameter": list(bounds.inputs)}
         return xarray.Dataset(variables, {"theta": self.theta, "alpha": bounds.alpha, **axes})
 
@@ -426,7 +436,8 @@ class CellSamples:
         """Return the outputs at each point by name, moduli and stresses in Pa.
 
         Beside `QUANTITIES` these are the number of linear systems, the stress curve "curve11" at
-        `theta`, errors of E by source, checks, and bounds of the loss factors, shape (levels, 3).
+        `theta` with its error, errors of E by source, checks, and bounds of the loss factors, shape
+        (levels, 3).
         """
         return [self._outputs(result) for result in self.solve(points)]
 
@@ -442,6 +453,7 @@ class CellSamples:
         outputs |= plane_constants_by_name(result)
         outputs["systems"] = len(result.iterations)
         outputs["curve11"] = between_nodes(curve.theta, curve.s11, self.theta)
+        outputs["curve_error"] = curve.error
         outputs |= {f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")}
         outputs |= {f"check:{name}": value for name, value in result.checks.items()}
         if self.loss_cuts is not None:

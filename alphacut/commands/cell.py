@@ -65,7 +65,10 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     document = {**document_of(result), "references": references}
     if options.export:
         document["export"] = export(problem, Path(options.export))
-    write_answer(options, document, out, summary(document, result.convention))
+    text = summary(document, result.convention)
+    if solver := problem.model().solver_text:
+        text += f"Cell: {solver}\n"
+    write_answer(options, document, out, text)
     return 0
 
 
@@ -165,9 +168,9 @@ def summary(document: Document, convention: str) -> str:
         label, ends = f"{isotropic_label(convention)}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}"
         rows.append((label, ends, ""))
     iterations = ", ".join(map(str, document["iterations"]))
-    solver = f", {document['solver']}, iterations {iterations}" if iterations else ""
+    cost = f", iterations {iterations}" if iterations else ""
     table = text_table((convention, "value", "± error"), rows)
-    text = f"{table}{document['method']}, {document['unknowns']} unknowns{solver}\n"
+    text = f"{table}{document['method']}, {document['unknowns']} unknowns{cost}\n"
     if document["declared_error"] is None:
         text += f"{UPPER_BOUND}\n"
     return text

@@ -105,7 +105,7 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
         fibres=in_units_of_results({name: known[name] for name in FIBRES if name in known}),
         plane=plane,
         method=problem.modulus.method,
-        solver=getattr(problem.model(), "solver_text", ""),
+        solver=problem.model().solver_text,
         plan=bounds.method,
         samples=bounds.evaluations,
         solves=stiffness.systems,

@@ -70,7 +70,8 @@ class SliceStrains:
                 triangles, points).
             slices: Number of each triangle's slice, shape (triangles,).
         """
-        for phase, phase_areas in enumerate(areas):
+        for phase in range(len(areas)):
+            phase_areas: Array = areas[phase]
             has_phase = phase_areas.any(axis=1)
             points = strain[has_phase]
             weights = phase_areas[has_phase]

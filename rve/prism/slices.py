@@ -319,18 +319,19 @@ class SliceProblem:
             strains: Macroscopic strain ε̄ of each field, shape (fields, 3).
             fluctuations: Reduced unknowns of u of each field; None where u is zero.
         """
-        mesh, count = self.mesh, len(strains)
-        moving = [field for field, vector in enumerate(fluctuations) if vector is not None]
-        unknowns = np.array([fluctuations[field].array_r for field in moving])
+        mesh = self.mesh
+        count = len(strains)
+        vectors = {field: u for field, u in enumerate(fluctuations) if u is not None}
+        unknowns = np.array([vector.array_r for vector in vectors.values()])
         displacements = self.constraint.displacements(unknowns)
         phases = np.arange(len(mesh.grid.names))
         is_phase = np.equal.outer(phases, mesh.phase)[..., np.newaxis]
         integrals = SliceStrains.zeros(mesh.rule, phases=len(phases), fields=count)
         for layer in mesh.layers():
-            values = np.empty((*mesh.areas.shape[1:], 3, count))
+            values: Array = np.empty((*mesh.areas.shape[1:], 3, count))
             values[:] = strains.T
-            for field, on_layer in zip(moving, displacements[:, layer], strict=True):
-                values[..., field] += mesh.point_strains(on_layer)
+            for number, field in enumerate(vectors):
+                values[..., field] += mesh.point_strains(displacements[number, layer])
             areas = is_phase * mesh.areas[layer] / AREA
             integrals.add(values, areas, mesh.slices(layer))
         return integrals

@@ -189,10 +189,11 @@ class LayerPattern:
             blocks: Blocks of A_k of all layers, shape (layers, blocks, 4).
         """
         # A level is the upper end of the layer below it and the lower end of the layer above it.
-        layer_above = [*(self._lower_hats.entries(layer) for layer in blocks), 0.0]
-        layer_below = [0.0, *(self._upper_hats.entries(layer) for layer in blocks)]
-        for below, above in zip(layer_below, layer_above, strict=True):
-            yield self._lower_hats.matrix(below + above)
+        lower = [self._lower_hats.entries(layer) for layer in blocks]
+        upper = [self._upper_hats.entries(layer) for layer in blocks]
+        nothing: Array = np.zeros(lower[0].shape)
+        for from_below, from_above in zip([nothing, *upper], [*lower, nothing], strict=True):
+            yield self._lower_hats.matrix(from_below + from_above)
         for layer in blocks:
             yield self._bubbles.matrix(self._bubbles.entries(layer))
 

@@ -11,6 +11,7 @@ from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.modulus_basis import ModulusBasis
 from alphacut.rve.prism.problem import FoldedMeshError
 from alphacut.rve.prism.slices import slice_mesh
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
@@ -101,6 +102,9 @@ def test_projected_samples_are_those_solved_whatever_their_company():
     for one, other in zip(projected, solved, strict=True):
         assert one.modulus == pytest.approx(other.modulus, rel=2e-10)
         assert len(one.iterations) == 2 * len(other.iterations)
+        error = abs(one.curve.s11 / other.curve.s11 - 1).max()
+        assert 1e-9 < error <= one.curve.error == ModulusBasis.curve_error
+        assert other.curve.error == 0
     assert model.solve(PAPER, MATRIX, [Phase(77e9)])[0].modulus == projected[1].modulus
     assert len(model.solve(PAPER, MATRIX, [Phase(90e9)])[0].iterations) == 2
 
