@@ -1,4 +1,4 @@
-"""Types of NumPy arrays, for all packages, and BLAS on one thread."""
+"""Types of NumPy arrays for all packages, and a decorator for BLAS on one thread."""
 
 import sys
 from collections.abc import Callable
@@ -19,10 +19,11 @@ T = TypeVar("T")
 
 
 def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Decorator: BLAS uses one thread while the function runs, so that its result is the same bits.
+    """Decorate a function so that BLAS uses one thread while it runs.
 
-    With more threads BLAS splits its sums otherwise, and an optimisation or a proof turns the
-    rounding into differences of 1e-9. Small matrices are also several times slower with them.
+    The result then has the same bits on every machine with the same libraries. With more threads
+    BLAS divides its sums in other ways, and an optimisation or a proof turns the rounding into
+    differences of 1e-9. Products of small matrices are also several times slower with them.
     """
 
     @wraps(function)
@@ -35,7 +36,11 @@ def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
 
 @lru_cache(maxsize=1)
 def _thread_pools(_modules: int) -> "ThreadpoolController":
-    """The libraries with threads; looked for (20 ms) again when more modules are loaded."""
+    """Return the loaded libraries that have threads.
+
+    Looking for them takes 20 ms. It is done again only where the number of loaded modules has
+    changed, since a new module may have brought a library.
+    """
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

@@ -7,26 +7,31 @@ import io
 import re
 from collections.abc import Iterable, Sequence
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What a text begins with that spreadsheets execute (OWASP, CSV injection)."""
-
 
 def csv_cell(text: str) -> str:
-    """Return a cell that no spreadsheet takes for a formula, before it is quoted.
+    """Return a text as a cell that no spreadsheet executes, before it is quoted.
 
-    A text that begins as a formula does gets an apostrophe in front, numbers do not.
+    A text that begins like a formula (OWASP, CSV injection) gets an apostrophe in front, unless it
+    is a number.
 
     Example:
         >>> csv_cell("=1+1"), csv_cell("-1.5e3")
         ("'=1+1", '-1.5e3')
     """
-    is_formula = text.startswith(_FORMULA) and _NUMBER.fullmatch(text) is None
-    return f"'{text}" if is_formula else text
+    begins_like_formula = text.startswith(("=", "+", "-", "@", "\t", "\r"))
+    is_number = re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", text)
+    if begins_like_formula and not is_number:
+        return f"'{text}"
+    return text
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return lines of comma-separated cells, those with commas, quotes or line ends quoted."""
+    """Return a table as the text of a CSV file: cells apart by commas, quoted where they must be.
+
+    Args:
+        head: Titles of the columns.
+        rows: Cells of each row.
+    """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerows([csv_cell(cell) for cell in row] for row in (head, *rows))

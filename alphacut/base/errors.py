@@ -1,4 +1,4 @@
-"""Errors of every package, with what a caller needs to know as fields."""
+"""Errors that all packages raise, and checks of arguments that raise them."""
 
 from __future__ import annotations
 
@@ -14,45 +14,64 @@ import numpy as np
 from alphacut.base.arrays import Array
 
 MAX_LENGTH = 300
-"""Characters of a message; beyond it value and allowed values are cut, and never the cure."""
-MIN_SHOWN = 20  # characters that remain of a value or of allowed values
+"""Largest length of a message in characters, about three lines of a terminal."""
 
 
 def printable(value: object, most: int = MAX_LENGTH) -> str:
-    """Return a value as one line of printable characters, cut off after `most` of them."""
+    """Return a value as one line of at most `most` printable characters.
+
+    Longer texts end with "…". Characters that a terminal would execute or hide become blanks.
+    """
     try:
         text = str(value)[: 4 * most]
-    except ValueError:  # of an integer longer than Python writes
+    except ValueError:
+        # Python refuses to write integers of more than some thousands of digits
         text = "a number of thousands of digits"
-    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
-    return line if len(line) <= most else f"{line[: most - 1]}…"
+    characters = [" "] * len(text)
+    for k, character in enumerate(text):
+        if character.isprintable():
+            characters[k] = character
+    line = " ".join("".join(characters).split())
+    if len(line) <= most:
+        return line
+    return f"{line[: most - 1]}…"
 
 
 def fit_message(
     value: str, allowed: str, compose: Callable[[str, str], str], cure: str = ""
 ) -> str:
-    """Return `compose(value, allowed)` and then the cure, of at most `MAX_LENGTH` characters.
+    """Return a message of at most `MAX_LENGTH` characters that ends with the hint.
 
-    The value is cut off first, the allowed values next, the cure never.
+    If the message is too long, the value is shortened first and the allowed values next, to 20
+    characters each. The hint is never shortened.
+
+    Args:
+        value: The value that was refused.
+        allowed: The allowed values.
+        compose: Makes a sentence from both.
+        cure: The hint; it may be empty.
     """
-    end = f"; {cure}" if cure else ""
-    room = max(MAX_LENGTH - len(end), MIN_SHOWN)
+    min_shown = 20
+    end = ""
+    if cure:
+        end = f"; {cure}"
+    room = max(MAX_LENGTH - len(end), min_shown)
     excess = max(len(compose(value, allowed)) - room, 0)
-    value = printable(value, max(MIN_SHOWN, len(value) - excess))
+    value = printable(value, max(min_shown, len(value) - excess))
     excess = max(len(compose(value, allowed)) - room, 0)
-    allowed = printable(allowed, max(MIN_SHOWN, len(allowed) - excess))
+    allowed = printable(allowed, max(min_shown, len(allowed) - excess))
     return printable(compose(value, allowed), room) + end
 
 
 class RefusedError(ValueError):
-    """A value that is not allowed for this argument or key.
+    """An argument or a key of a case has a value that is not allowed.
 
     Args:
-        key: Name of the argument or of the case key, such as "mesh.size".
-        value: The value as the caller wrote it; None where it is missing.
+        key: Name of the argument or of the key, such as "mesh.size".
+        value: The value as the caller wrote it; None if it is missing.
         allowed: The allowed values, such as "values in (0, 1]".
-        cure: What to do, where `allowed` does not say it.
-        place: File, and line, that the value stands in; empty where the key says it.
+        cure: What the caller can do, where `allowed` does not say it.
+        place: File, and line, of the value; empty where the key is enough to find it.
 
     Example:
         >>> RefusedError("mesh.size", -1, "values in (0, 1]")
@@ -62,26 +81,43 @@ class RefusedError(ValueError):
     def __init__(
         self, key: str, value: object, allowed: str, cure: str = "", place: str = ""
     ) -> None:
-        self.key, self.value, self.allowed, self.cure, self.place = key, value, allowed, cure, place
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+        self.cure = cure
+        self.place = place
 
-        def line(value_text: str, allowed_text: str) -> str:
-            has = "is missing" if value is None else f"is {value_text or 'empty'}"
-            text = f"{place}: {key} {has}" if place else f"{key} {has}"
-            return f"{text}; allowed: {allowed_text}" if allowed_text else text
+        def sentence(value_text: str, allowed_text: str) -> str:
+            text = f"{key} is {value_text or 'empty'}"
+            if value is None:
+                text = f"{key} is missing"
+            if place:
+                text = f"{place}: {text}"
+            if allowed_text:
+                text = f"{text}; allowed: {allowed_text}"
+            return text
 
-        super().__init__(fit_message(printable(value), allowed, line, cure))
+        super().__init__(fit_message(printable(value), allowed, sentence, cure))
 
     def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str, str]]:
-        """For pickle, which sends it to other processes: the value as text."""
-        value = None if self.value is None else printable(self.value)
+        """Pickle the error with its value as text, since not every value can be pickled."""
+        value = None
+        if self.value is not None:
+            value = printable(self.value)
         return type(self), (self.key, value, self.allowed, self.cure, self.place)
 
 
 class FailedError(RuntimeError):
-    """A computation that ended without an answer: what failed, and what the caller can change."""
+    """A computation ended without a result.
+
+    Args:
+        what: What failed.
+        cure: What the caller can change.
+    """
 
     def __init__(self, what: str, cure: str = "") -> None:
-        self.what, self.cure = what, cure
+        self.what = what
+        self.cure = cure
         super().__init__(fit_message(what, "", lambda text, _: text, cure))
 
 
@@ -94,70 +130,91 @@ def checked_number(
     least: float = -inf,
     most: float = inf,
 ) -> float:
-    """Return a finite real number from `least` to `most` as a float; True and False are refused.
+    """Return a value as a float if it is a finite real number from `least` to `most`.
 
     Args:
         key: Name of the argument, for the message.
-        value: The value as the caller gave it.
+        value: The value as the caller gave it. True and False are not numbers.
         positive: Whether it must be greater than 0.
-        whole: Whether it must be an integer, 0 or more.
-        least: Least allowed number.
-        most: Greatest allowed number.
+        whole: Whether it must be an integer that is not negative.
+        least: Smallest allowed number.
+        most: Largest allowed number.
 
     Raises:
-        RefusedError: It is not such a number.
+        RefusedError: The value is not such a number.
     """
-    least, kind = (max(least, 0), Integral) if whole else (least, Real)
-    is_bool = type(value).__name__ in ("bool", "bool_")
-    try:
-        number = float(value) if isinstance(value, kind) and not is_bool else nan
-    except OverflowError:  # of an integer
-        number = inf
-    allowed = "whole numbers" if whole else "finite numbers"
+    kind = "finite numbers"
+    if whole:
+        kind = "whole numbers"
+        least = max(least, 0)
+    number = nan
+    if is_number(value, whole=whole):
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except OverflowError:  # of a large integer
+            number = inf
+    allowed = kind
     if positive:
         allowed += " greater than 0"
     elif least > -inf:
         allowed += f" from {least:g} on"
-    allowed += f", up to {most:g}" if most < inf else ""
+    if most < inf:
+        allowed += f", up to {most:g}"
     is_allowed = isfinite(number) and least <= number <= most and (number > 0 or not positive)
-    shown = printable(value) if isinstance(value, Integral) else repr(value)
+    shown = repr(value)
+    if isinstance(value, Integral):
+        shown = printable(value)  # `repr` fails for thousands of digits
     require(is_allowed, key, value=shown, allowed=allowed)
     return number
 
 
 def path_of(key: str, value: object) -> Path:
-    """Return the path of a file that a caller names by a text or a path; refuses others."""
+    """Return the path of a file that a caller gave as a string or a path.
+
+    Raises:
+        RefusedError: `value` is neither; `key` is the name of the argument.
+    """
     is_path = isinstance(value, str | PathLike) and not isinstance(value, bytes)
     require(is_path, key, repr(value), 'the path of a file, as "NAME"')
     return Path(value)  # type: ignore[arg-type]
 
 
 def is_number(value: object, *, whole: bool = False) -> bool:
-    """True for a real number, or a whole one, of Python or NumPy; not for True and False."""
-    kind = Integral if whole else Real
+    """Return whether a value is a real number, or an integer, of Python or of NumPy.
+
+    True and False are not numbers here.
+    """
+    kind = Real
+    if whole:
+        kind = Integral
     return isinstance(value, kind) and type(value).__name__ not in ("bool", "bool_")
 
 
 def array_of_call(key: str, function: object, *points: Array, allowed: str) -> Array:
-    """Return what a function of the caller's gives at arrays of points, of their shape, as floats.
+    """Call a function of the user with arrays, and return its values as floats.
 
     Args:
-        key: Name of the function, for the message.
-        function: What the caller gave as one.
+        key: Name of the argument that is the function, for the message.
+        function: What the user gave as a function.
         points: Its arguments, arrays of one shape.
-        allowed: What the function takes and gives, in words.
+        allowed: What such a function takes and returns, in words.
+
+    Returns:
+        Array of the shape of the points.
 
     Raises:
-        RefusedError: It is no function, raises an error, or gives an array of another shape.
+        RefusedError: It is not a function, it raises an error, or it returns another shape.
     """
     if not callable(function):
         raise RefusedError(key, repr(function), allowed)
     try:
         values = np.asarray(function(*points), float)
-    except Exception as error:  # whatever the caller's function raises
+    except Exception as error:  # a function of the user may raise anything
         value = f"a function that raises {type(error).__name__}: {error}"
-        is_of_one_number = re.search("length-1 arrays|truth value|0-dimensional", str(error))
-        cure = "write it by NumPy's functions, as np.hypot and np.where" if is_of_one_number else ""
+        cure = ""
+        # what NumPy says where a function for one number, as math.hypot, gets an array
+        if re.search("length-1 arrays|truth value|0-dimensional", str(error)):
+            cure = "write it by NumPy's functions, as np.hypot and np.where"
         raise RefusedError(key, value, allowed, cure) from None
     if values.shape != points[0].shape:
         value = f"a function that gives shape {values.shape} at points of shape {points[0].shape}"
@@ -166,17 +223,20 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
 
 
 def require_numbers(name: str, values: object) -> None:
-    """Refuse values that are not a list, tuple or array of finite real numbers."""
+    """Raise RefusedError unless `values` is a list, tuple or array of finite real numbers."""
     is_list = isinstance(values, Collection) and not isinstance(values, str)
     require(is_list, name, value=repr(values), allowed="a list of numbers")
-    if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and np.isfinite(values).all():
-        return  # without a loop: matrices have many entries
-    for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
+    if isinstance(values, np.ndarray):
+        # without a loop over all entries, of which matrices have many
+        if values.dtype.kind in "iuf" and np.isfinite(values).all():
+            return
+        values = np.ravel(values).tolist()
+    for value in values:  # type: ignore[attr-defined]
         checked_number(name, value)
 
 
 def require_sequence(key: str, values: object, allowed: str) -> None:
-    """Refuse what is no list, tuple or array of one dimension or more, as a number or a text."""
+    """Raise RefusedError unless `values` is a list, a tuple or an array with an axis."""
     is_list = isinstance(values, Sequence) and not isinstance(values, str)
     is_array = isinstance(values, np.ndarray) and values.ndim > 0
     cure = "put a single value into brackets"
@@ -184,12 +244,12 @@ def require_sequence(key: str, values: object, allowed: str) -> None:
 
 
 def require_choice(key: str, value: object, names: Iterable[str]) -> None:
-    """Refuse a value that is not one of the allowed names."""
+    """Raise RefusedError unless `value` is one of the allowed names."""
     allowed = tuple(names)
     require(value in allowed, key, value=value, allowed=", ".join(allowed))
 
 
 def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:
-    """Raise `RefusedError`(key, value, allowed, cure) unless the condition `holds`."""
+    """Raise `RefusedError(key, value, allowed, cure)` unless the condition `holds`."""
     if not holds:
         raise RefusedError(key, value, allowed, cure)
