@@ -1,9 +1,9 @@
-"""Numba's decorator with a cache that no change of a helper outlives and that checkouts share.
+"""Numba's decorator with a cache of compiled code that all checkouts of a user share.
 
-Numba compiles again where the file of a kernel has changed. The compiled code also holds the
-kernels that it calls and the constants that it reads, which may stand in other files: here a cached
-kernel is known by the texts of all of them, and by the versions of Numba, NumPy and Python. Numba
-itself adds the processor.
+Numba compiles a kernel again if its own file has changed. But the compiled code also contains the
+kernels that it calls and the constants that it reads, which may stand in other files. Here the key
+of cached code is made from the texts of all these files and from the versions of Numba, NumPy and
+Python. Numba itself adds the processor.
 """
 
 from __future__ import annotations
@@ -27,21 +27,24 @@ import numpy as np
 from alphacut.base.user_cache import remove_unused, user_folder
 
 with_kernels = set[str]()
-"""Modules that have kernels; those of helpers come before those that call them."""
-PACKAGE = Path(__file__).parents[1]
-IMPORT = re.compile(r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))", re.MULTILINE)
-DIGEST_BYTES = sha256().digest_size
-_LOCK = RLock()
+"""Names of the modules that have kernels, in the order of their import."""
 prange = range
-"""Loop of parallel kernels, in whose module Numba's prange takes its place."""
+"""The loop of parallel kernels, until Numba is imported and its own prange takes its place."""
+_creation_lock = RLock()
 
 
 class _Kernel:
-    """A function that Numba compiles at its first call, before which Numba is not imported."""
+    """A function that Numba compiles at its first call; Numba is not imported before.
+
+    Args:
+        function: The function.
+        options: Options of `numba.njit`.
+    """
 
     def __init__(self, function: Callable[..., Any], options: Mapping[str, object]) -> None:
         update_wrapper(self, function)
-        self._function, self._options = function, options
+        self._function = function
+        self._options = options
         self._created: Any = None
         with_kernels.add(function.__module__)
 
@@ -51,16 +54,19 @@ class _Kernel:
 
     @property
     def _dispatcher(self) -> Any:
-        """Numba's dispatcher of the function, with its code in `shared_folder`."""
+        """Numba's dispatcher of the function, whose compiled code is in `shared_folder`."""
         if self._created is None:
-            with _LOCK:  # a second dispatcher would leave kernels that were compiled with the first
+            # with two dispatchers, kernels compiled with the first one would not know the second
+            with _creation_lock:
                 self._created = self._created or self._create()
         return self._created
 
     def _create(self) -> Any:
-        import numba  # which takes time to import
+        """Return a new dispatcher; without a folder for its code it compiles in each process."""
+        import numba  # takes .3 s
 
-        function, options = self._function, self._options
+        function = self._function
+        options = self._options
         if options.get("parallel"):
             function.__globals__["prange"] = numba.prange
         try:
@@ -75,31 +81,40 @@ class _Kernel:
         return dispatcher
 
     def __getattr__(self, name: str) -> Any:
-        """Return what Numba asks of a dispatcher that another kernel calls, as its type."""
+        """Return an attribute of the dispatcher, which Numba asks for in kernels that call it."""
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self._dispatcher, name)
 
     def __reduce__(self) -> str:
-        """Pickle by name."""
+        """Pickle the kernel as the global of its name."""
         return str(self.__qualname__)
 
 
 def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles functions at their first call, with options of Numba's njit.
+    """Return a decorator that compiles a function at its first call.
 
-    Compiled code is kept in `shared_folder`, else where Numba keeps it, or for the process alone
-    where no folder can be written. Division by zero gives infinity or NaN, and the interpreter's
-    lock is released.
+    The compiled code is kept in `shared_folder`, or where Numba keeps it, or for the process alone
+    if no folder can be written. Division by zero gives infinity or NaN, and the lock of the
+    interpreter is released during calls.
+
+    Args:
+        options: Further options of `numba.njit`.
     """
     return partial(_Kernel, options={"nogil": True, "error_model": "numpy", **options})
 
 
 def _shared_index(folder: str, name: str, stamp: str) -> Any:
-    """Numba's index of a kernel's compiled code, but with files that no other process writes.
+    """Return Numba's index of a kernel's compiled code, made safe for several processes.
 
-    A digest of its content ends each file. A file that it does not fit, as of a copy that was
-    interrupted, is removed and taken as missing: unpickled, it would raise or end the process.
+    Each process writes files of its own names. Each file ends with a digest of its content. A file
+    with another digest, such as a copy that was interrupted, is removed and taken as missing:
+    unpickling it would raise an error or end the process.
+
+    Args:
+        folder: Folder of the files.
+        name: Beginning of their names.
+        stamp: What code must have been compiled from; other code is ignored.
     """
     from numba.core.caching import IndexDataCacheFile
 
@@ -135,25 +150,29 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
 
 
 def _remove_damaged(path: Path) -> None:
-    """Remove a file that does not end with the digest of what stands before, if there is one.
+    """Remove a file whose last bytes are not the digest of all others; it may be missing.
 
     Raises:
-        OSError: It cannot be read or removed.
+        OSError: The file cannot be read or removed.
     """
+    digest_bytes = sha256().digest_size
     with suppress(FileNotFoundError):
         content = path.read_bytes()
-        if sha256(content[:-DIGEST_BYTES]).digest() != content[-DIGEST_BYTES:]:
+        if sha256(content[:-digest_bytes]).digest() != content[-digest_bytes:]:
             path.unlink()
 
 
 @cache
 def shared_folder(module: str) -> Path | None:
-    """Return the folder of a module's compiled code that all checkouts of this user share.
+    """Return the folder of a module's compiled code, which all checkouts of this user share.
 
-    None where `user_folder` is, or where NUMBA_CACHE_DIR names a folder. A new digest clears away
-    what is unused.
+    It is made if need be; then the folders of other versions that were not used for a while are
+    removed. None is returned if the variable NUMBA_CACHE_DIR names a folder, or if the user's cache
+    cannot be written.
     """
-    base = None if os.environ.get("NUMBA_CACHE_DIR") else user_folder("kernels")
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return None
+    base = user_folder("kernels")
     if base is None:
         return None
     folder = base / f"{module}-{digest(module)[:16]}"
@@ -172,7 +191,10 @@ compiled = kernel()
 
 @cache
 def digest(module: str) -> str:
-    """Return a digest of a module's text, of what it imports if it has kernels, and of versions."""
+    """Return a digest of a module's text and of the versions of Numba, NumPy and Python.
+
+    Of a module with kernels it covers, in turn, the digests of all modules that it imports.
+    """
     text = _file(module).read_text("utf-8")
     total = sha256(f"{version('numba')} {np.__version__} {sys.version}{text}".encode())
     if module in with_kernels:
@@ -182,15 +204,21 @@ def digest(module: str) -> str:
 
 
 def _imports(text: str) -> Iterator[str]:
-    for package, lines, line in IMPORT.findall(text):
-        for module in (
-            package,
-            *(f"{package}.{name}" for name in re.findall(r"\w+", lines + line)),
-        ):
+    """Yield the names of this project's modules that the text of a module imports."""
+    statement = r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))"
+    for package, names_in_brackets, names in re.findall(statement, text, re.MULTILINE):
+        modules = [package]
+        for name in re.findall(r"\w+", names_in_brackets + names):
+            modules.append(f"{package}.{name}")  # if it is a module and no function
+        for module in modules:
             if _file(module).exists():
                 yield module
 
 
 def _file(module: str) -> Path:
-    path = PACKAGE.joinpath(*module.split(".")[1:])
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    """Return the file of a module of this project, such as alphacut.frame."""
+    package = Path(__file__).parents[1]
+    path = package.joinpath(*module.split(".")[1:])
+    if path.is_dir():
+        return path / "__init__.py"
+    return path.with_suffix(".py")

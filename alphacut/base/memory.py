@@ -1,4 +1,4 @@
-"""The memory that is free, against which sizes are held that files promise."""
+"""The free memory, and checks that what a file promises fits into it before it is read."""
 
 from __future__ import annotations
 
@@ -10,24 +10,22 @@ from stat import S_ISDIR, S_ISREG
 
 from alphacut.base.errors import RefusedError
 
-BYTES_OF_TEXT = 30
-"""Memory of a byte of text while its numbers are told apart: two digits and a blank take 64."""
-AVAILABLE = "MemAvailable:"
-"""Line of /proc/meminfo with the kibibytes that processes can take without swapping."""
-
 
 def free_memory() -> float:
-    """Return the bytes that this process may still take; infinity where the system does not tell.
+    """Return the number of bytes that this process may still take; infinity if unknown.
 
-    The least of four: the machine's memory, what of it is free, what the control group has left,
-    and what the process's own limit of address space (RLIMIT_AS) leaves.
+    It is the smallest of the machine's memory, the part of it that is free, what is left of the
+    limit of the control group, and what is left of the process's own limit of address space
+    (RLIMIT_AS).
     """
     free = [inf]
     with suppress(AttributeError, OSError, ValueError):  # Windows has no sysconf
         free.append(float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
     with suppress(OSError, ValueError, IndexError):
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        free += [1024.0 * int(x.split()[1]) for x in lines if x.startswith(AVAILABLE)]
+        # the kibibytes that processes can take without swapping
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                free.append(1024.0 * int(line.split()[1]))
     with suppress(OSError, ValueError):  # "max" is no number: there is no limit
         group = Path("/sys/fs/cgroup")
         most = int((group / "memory.max").read_text())
@@ -43,15 +41,12 @@ def free_memory() -> float:
 
 
 def require_free_memory(name: str, needed: float, what: str) -> None:
-    """Refuse what takes more memory than is free.
+    """Raise RefusedError if reading a file would take more memory than is free.
 
     Args:
         name: Name of the file.
-        needed: Bytes that reading it takes.
-        what: What the file promises, as "an array of 3 × 4".
-
-    Raises:
-        RefusedError: `needed` is more than `free_memory()`.
+        needed: Number of bytes that reading it takes.
+        what: What the file promises, such as "an array of 3 × 4".
     """
     free = free_memory()
     if needed > free:
@@ -60,17 +55,20 @@ def require_free_memory(name: str, needed: float, what: str) -> None:
 
 
 def require_text(path: Path) -> None:
-    """Refuse a file of text that does not fit the free memory, and what is no regular file.
+    """Check that a file of text can be read: it is a regular file and fits into the free memory.
 
-    Pipes and devices have no end, and reading them would wait for ever.
+    Reading a pipe or a device might never end. Folders pass, since opening one says clearly that it
+    is a folder.
 
     Raises:
-        RefusedError: As said.
-        OSError: The file is not there.
+        RefusedError: The file is a pipe or a device, or too large.
+        OSError: The file does not exist.
     """
+    # Telling the numbers in a text apart takes a list of texts: two digits and a blank take 64
+    # bytes, longer numbers less for each byte of the file.
+    bytes_per_byte = 30
     status = path.stat()
-    is_regular = S_ISREG(status.st_mode) or S_ISDIR(status.st_mode)  # reading a folder says so
-    if not is_regular:
+    if not (S_ISREG(status.st_mode) or S_ISDIR(status.st_mode)):
         raise RefusedError(str(path), "a pipe or a device", "a regular file")
     what = f"a text of {status.st_size} bytes"
-    require_free_memory(path.name, float(BYTES_OF_TEXT * status.st_size), what)
+    require_free_memory(path.name, float(bytes_per_byte * status.st_size), what)

@@ -1,4 +1,4 @@
-"""Progress of a computation: reported to the caller, or as a bar on a terminal."""
+"""Progress of a computation, reported to a function of the caller or shown on the terminal."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from contextlib import contextmanager
 from time import monotonic
 
 Progress = Callable[[float], None]
-_BAR_DELAY = 1.0  # seconds before a bar appears
-_BAR_PERIOD = 0.2  # seconds between its updates
-_LINE_PERIOD = 10.0  # seconds between lines where there is no terminal
-_WIDTH = 30  # letters of the bar
-_FORETOLD = 0.05  # fraction of the work from which on the time left is told
+"""A function that takes the completed fraction of a computation, 0 to 1."""
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Return a function that reports the progress of a part of a task, from `first` to `last`."""
+    """Return a function that reports the progress of a part of a computation.
+
+    Args:
+        progress: Function for the whole computation; None reports nothing.
+        first: Completed fraction of the whole at the beginning of the part.
+        last: Completed fraction at its end.
+    """
     if progress is None:
         return lambda done: None
     return lambda done: progress(first + (last - first) * done)
@@ -24,14 +26,15 @@ def subprogress(progress: Progress | None, first: float, last: float) -> Progres
 
 @contextmanager
 def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Context with a function that reports the completed fraction, 0 to 1, and never a smaller one.
+    """Give a context a function to report the completed fraction with.
 
-    Several computations in a row may each report from 0 on; what is below the largest fraction so
-    far is not passed on.
+    Several computations in a row may each report from 0 on; a fraction below the largest one so far
+    is not passed on.
 
     Args:
-        progress: The caller's function. None or True: a bar on a terminal, or a line every ten
-            seconds where standard error is no terminal. False: nothing, and the value is None.
+        progress: Function of the caller. None or True shows a bar on the terminal, or writes a line
+            every ten seconds if standard error is not a terminal. False reports nothing; then the
+            context has None in place of a function.
     """
     if progress is False:
         yield None
@@ -60,31 +63,43 @@ def _rising(progress: Progress) -> Progress:
 
 
 class _Display:
-    """A bar on a terminal, removed in the end; elsewhere a line now and then with the time left."""
+    """A bar on a terminal, which `close` removes; elsewhere lines with the time that is left."""
 
     def __init__(self) -> None:
-        self.is_terminal, self.has_bar = sys.stderr.isatty(), False
-        self.begun = self.written = monotonic()
+        self.is_terminal = sys.stderr.isatty()
+        self.has_bar = False
+        self.begun = monotonic()
+        self.written = self.begun
 
     def __call__(self, fraction: float) -> None:
-        now = monotonic()
-        elapsed, pause = now - self.begun, _BAR_PERIOD if self.is_terminal else _LINE_PERIOD
-        if elapsed < _BAR_DELAY or now - self.written < pause:
-            return
-        self.written, self.has_bar = now, self.is_terminal
+        """Show a completed fraction, if the last display was long enough ago."""
+        pause = 10.0  # seconds between lines
         if self.is_terminal:
-            full = round(_WIDTH * fraction)
-            bar = "█" * full + "░" * (_WIDTH - full)
+            pause = 0.2  # seconds between changes of a bar
+        now = monotonic()
+        elapsed = now - self.begun
+        if elapsed < 1.0 or now - self.written < pause:
+            return
+        self.written = now
+        if self.is_terminal:
+            self.has_bar = True
+            width = 30
+            full = round(width * fraction)
+            bar = "█" * full + "░" * (width - full)
             _write(f"\r\x1b[K{bar} {fraction:4.0%} {elapsed:.0f} s")
             return
-        left = f", some {elapsed / fraction - elapsed:.0f} s left" if fraction >= _FORETOLD else ""
-        _write(f"{fraction:4.0%} after {elapsed:.0f} s{left}\n")
+        time_left = ""
+        if fraction >= 0.05:  # before that the estimate would be of no use
+            time_left = f", some {elapsed / fraction - elapsed:.0f} s left"
+        _write(f"{fraction:4.0%} after {elapsed:.0f} s{time_left}\n")
 
     def close(self) -> None:
+        """Remove the bar."""
         if self.has_bar:
             _write("\r\x1b[K")
 
 
 def _write(text: str) -> None:
+    """Write to standard error at once."""
     sys.stderr.write(text)
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""The folder in which processes and checkouts of one user share what is expensive to make anew."""
+"""The cache folder of a user, which all processes and checkouts share."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ from alphacut.base.kept_files import whole_file
 
 Arrays = Sequence[NDArray[np.generic]]
 UNUSED_DAYS = 14
-"""Days after which what no process has asked for is removed."""
+"""Days without use after which files of the cache are removed."""
 
 
 def user_folder(name: str) -> Path | None:
-    """Return a folder of this user's cache by its name, made if need be.
+    """Return a folder of this user's cache, which is made if need be.
 
-    None where it cannot be written, or where another user could write it, whose files this one
-    would then trust.
+    None is returned if the folder cannot be written, and also if other users can write it: this
+    user would trust files that others made.
+
+    Args:
+        name: Name of the folder.
     """
     try:
         home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -35,36 +38,48 @@ def user_folder(name: str) -> Path | None:
         status = folder.stat()
     except (OSError, RuntimeError):
         return None
-    return None if status.st_mode & 0o022 or status.st_uid != os.getuid() else folder
+    is_writable_by_others = bool(status.st_mode & 0o022)
+    if is_writable_by_others or status.st_uid != os.getuid():
+        return None
+    return folder
 
 
 def remove_unused(folder: Path) -> None:
     """Remove files and folders in `folder` that were not used for `UNUSED_DAYS`."""
-    for unused in folder.iterdir():
-        if unused.stat().st_mtime < time.time() - UNUSED_DAYS * 86400:
-            shutil.rmtree(unused) if unused.is_dir() else unused.unlink()
+    for path in folder.iterdir():
+        if path.stat().st_mtime >= time.time() - UNUSED_DAYS * 86400:
+            continue
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
 
 
 def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arrays:
-    """Return the arrays of `make`, from folder `name` of the cache where it has them.
+    """Return arrays from the cache, or make them and keep them there.
+
+    A file that is damaged, or that was made from something else, is made anew.
 
     Args:
-        name: Folder in the cache.
-        content: All that the arrays depend on.
-        make: Makes them. A file that is damaged or of another content is made anew.
+        name: Name of the folder in the cache.
+        content: All that the arrays depend on; a digest of it is the name of the file.
+        make: Makes the arrays.
     """
-    folder, digest = user_folder(name), sha256(content)
+    folder = user_folder(name)
     if folder is None:
         return make()
-    file, key = folder / f"{digest.hexdigest()}.npz", np.frombuffer(digest.digest(), np.uint8)
+    digest = sha256(content)
+    file = folder / f"{digest.hexdigest()}.npz"
+    key = np.frombuffer(digest.digest(), np.uint8)
     with suppress(OSError, ValueError, TypeError, EOFError, BadZipFile):
-        with np.load(file) as stored:  # which loads no objects
+        with np.load(file) as stored:  # pickled objects are not loaded
             stored_key, *arrays = (stored[name] for name in stored.files)
         if np.array_equal(stored_key, key):
-            os.utime(file)  # for `remove_unused`
+            os.utime(file)  # so that `remove_unused` keeps it
             return arrays
     new_arrays = make()
-    with suppress(OSError, FailedError):  # a full disk, or a folder that was cleared: none is kept
+    # on a full disk, or where the folder was cleared meanwhile, the arrays are not kept
+    with suppress(OSError, FailedError):
         with whole_file(file) as partial:
             np.savez(partial, key, *new_arrays)
         remove_unused(folder)
