@@ -32,7 +32,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, is_number
 from alphacut.rve.cell.cell import Cell, Phase, require_points, require_solve_arguments
-from alphacut.rve.result.cell_model import CellModel, Resolution
+from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
@@ -197,7 +197,7 @@ square_stiffness = CIRCLES.converged_moduli
 
 
 @dataclass(frozen=True)
-class SeriesModel(CellModel):
+class SeriesModel(AnyModel):
     """Multipole series at the nodes of a Gauss rule in θ.
 
     Args:
