@@ -1,4 +1,4 @@
-"""A box of a linear structure's inputs: models over it, and exact motions at points of it."""
+"""A box of a linear structure's inputs: models over it, and exact responses at points of it."""
 
 from __future__ import annotations
 
@@ -13,22 +13,27 @@ from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.envelope import within_steps
-from alphacut.frame.modes.structure import Classical, classical_structure
-from alphacut.frame.modes.superposition import Modal, load_at_nodes, modes_at, outputs_at
+from alphacut.frame.modes.intervening import Excitation
+from alphacut.frame.modes.structure import ClassicalStructure, classical_structure
+from alphacut.frame.modes.superposition import (
+    PointModes,
+    RoundedValues,
+    load_at_nodes,
+    modes_at,
+    outputs_at,
+)
 from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 
 MAX_ENTRIES = 400_000
-"""Entries of the matrices of all points whose exact motions are computed together."""
-SUBSTEPS = 4
-"""Parts of a step at whose ends the peak of one motion is read; what lies between falls with its
-square."""
+"""Entries of the matrices of all points whose exact responses are computed together, which limits
+the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Inputs of a structure between two ends, d of which have a width.
+    """Box of the n inputs of a structure, d of which have a width; T time nodes, m outputs.
 
     Unit coordinates are those of these d inputs, within [−1, 1].
     """
@@ -37,7 +42,7 @@ class Box:
     names: tuple[str, ...]  # its inputs, n of them
     time: Array  # nodes, (T,), in s
     low: Array  # lower ends, (n,), in SI units
-    high: Array  # upper ends
+    high: Array  # upper ends, (n,), in SI units
 
     @property
     def active(self) -> Ints:
@@ -45,8 +50,8 @@ class Box:
         return np.flatnonzero(self.high > self.low)
 
     @property
-    def centre(self) -> Array:
-        """Middle of all inputs, shape (n,)."""
+    def midpoint(self) -> Array:
+        """Midpoints of all inputs, shape (n,)."""
         return np.asarray((self.low + self.high) / 2)
 
     @cached_property
@@ -55,138 +60,196 @@ class Box:
         return histories(self.system)
 
     @cached_property
-    def structure(self) -> Classical:
+    def structure(self) -> ClassicalStructure:
         """The structure over the whole box."""
         return over_box(self.system, self.names, self.low, self.high)
 
     def inputs(self, unit: Array) -> Array:
-        """Inputs (…, n) in SI units for unit coordinates (…, d)."""
-        points = np.tile(self.centre, (*unit.shape[:-1], 1))
-        points[..., self.active] += ((self.high - self.low) / 2)[self.active] * unit
+        """Return the inputs (…, n) in SI units for unit coordinates (…, d); never outside."""
+        points = np.tile(self.midpoint, (*unit.shape[:-1], 1))
+        radius = ((self.high - self.low) / 2)[self.active]
+        points[..., self.active] += radius * unit
         return np.clip(points, self.low, self.high)
 
     def level(
         self,
         nodes: Ints | slice = slice(None),
-        allowed: Array | None = None,
+        truncation_tolerance: Array | None = None,
         outputs: Ints | slice = slice(None),
     ) -> LevelModels:
-        """Models over the box of the motion of `outputs` at `nodes`, both all unless given.
+        """Return models over the box of the response.
 
-        `allowed` is the truncation error of each output that is allowed, (m,).
+        Args:
+            nodes: Numbers of the time nodes; all unless given.
+            truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). As
+                many modes as possible are enclosed unless it is given.
+            outputs: Numbers of the outputs; all unless given.
 
         Raises:
             UnprovedError: No mode of the structure can be enclosed.
         """
         try:
             whole = self.structure
-            rows, factor, order = whole.rows[outputs], whole.factor[outputs], whole.order[outputs]
-            structure = replace(whole, rows=rows, factor=factor, order=order)
-            excitation = self.loads, self.time[nodes], sources(self.system, structure)
-            return LevelModels.from_structure(structure, excitation, allowed)
+            structure = replace(
+                whole,
+                output_rows=whole.output_rows[outputs],
+                output_factors=whole.output_factors[outputs],
+                derivative_orders=whole.derivative_orders[outputs],
+            )
+            excitation = Excitation(self.loads, self.time[nodes], sources(self.system, structure))
+            return LevelModels.from_structure(structure, excitation, truncation_tolerance)
         except UnprovedError as refusal:
-            if refusal.along is not None:  # of the active inputs; made one of all
+            if refusal.along is not None:  # counts the active inputs; made to count all
                 refusal.along = int(self.active[refusal.along])
             raise
 
-    def reached(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array]:
-        """Exact values of one output at one node for each of S points, and their rounding, (S,).
+    def exact_values(self, unit: Array, node: Ints, output: Ints) -> RoundedValues:
+        """Return exact values of one output at one node for each of S points.
 
-        Points are unit coordinates (S, d); modes are found once for all nodes of a point, about.
+        The modes of a point are found once for all its nodes and outputs, about.
+
+        Args:
+            unit: Unit coordinates, shape (S, d).
+            node: Number of the node for each point, shape (S,).
+            output: Number of the output for each point, shape (S,).
         """
-        values_and_errors = np.empty((2, len(unit)))
+        value = np.empty(len(unit))
+        error = np.empty(len(unit))
+        # Equal points are computed together.
         by_point = np.unique(unit, axis=0, return_inverse=True)[1].argsort()
-        count = max(MAX_ENTRIES // len(self.structure.pattern) ** 2, 1)
-        for rows in np.array_split(by_point, -(-len(unit) // count)):
+        points_at_once = max(MAX_ENTRIES // self.structure.unknowns**2, 1)
+        for rows in np.array_split(by_point, -(-len(unit) // points_at_once)):
             points, point = np.unique(unit[rows], axis=0, return_inverse=True)
-            modal, nodes = self._modal(points), node[rows]
+            modes = self._modes(points)
+            nodes = node[rows]
             loads = {
-                name: load_at_nodes(modal.sigma[point], load, self.time, nodes)
+                name: load_at_nodes(modes.sigma[point], load, self.time, nodes)
                 for name, load in self.loads.items()
             }
-            values_and_errors[:, rows] = outputs_at(
-                modal, point, output[rows], self.time[nodes], loads
-            )
-        return values_and_errors[0], values_and_errors[1]
+            found = outputs_at(modes, point, output[rows], self.time[nodes], loads)
+            value[rows] = found.value
+            error[rows] = found.error
+        return RoundedValues(value, error)
 
     @cached_property
-    def centre_modes(self) -> Modal:
-        """Modes in the middle of the box."""
-        return self._modal(np.zeros((1, len(self.active))))
+    def midpoint_modes(self) -> PointModes:
+        """Modes at the midpoint of the box."""
+        return self._modes(np.zeros((1, len(self.active))))
 
-    def centre_motion(self, outputs: Ints | slice = slice(None)) -> tuple[Array, Array]:
-        """Exact outputs in the middle of the box and bounds of their rounding, (T, m) each.
+    def midpoint_response(self, outputs: Ints | slice = slice(None)) -> RoundedValues:
+        """Return the exact outputs at the midpoint of the box, shape (T, m).
 
         Outputs are those of some numbers (m,), all unless given.
         """
-        sigma, point = self.centre_modes.sigma[0], np.zeros(len(self.time), int)
+        sigma = self.midpoint_modes.sigma[0]
+        point = np.zeros(len(self.time), int)
         loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
         columns = [
-            outputs_at(self.centre_modes, point, np.full_like(point, output), self.time, loads)
-            for output in np.arange(len(self.structure.order))[outputs]
+            outputs_at(self.midpoint_modes, point, np.full_like(point, output), self.time, loads)
+            for output in self._output_numbers(outputs)
         ]
-        value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
-        return value, error
+        value = np.stack([column.value for column in columns], axis=-1)
+        error = np.stack([column.error for column in columns], axis=-1)
+        return RoundedValues(value, error)
 
     def peak_over_time(
-        self, unit: Array, between: Array, outputs: Ints | slice = slice(None)
+        self, unit: Array, between_nodes: Array, outputs: Ints | slice = slice(None)
     ) -> Array:
-        """Upper bound of outputs' magnitudes, (m,), at one point (d,), between nodes too.
+        """Return an upper bound of max |output| over time at one point, also between nodes, (m,).
 
-        `between` (T, m) bounds how far these outputs stray from straight lines in each step.
+        Args:
+            unit: Unit coordinates of the point, shape (d,).
+            between_nodes: Bounds of the distance of these outputs from a straight line in the step
+                before each node, shape (T, m).
+            outputs: Numbers of the outputs, shape (m,); all unless given.
         """
         point = self.inputs(unit)
-        motion = replace(self, low=point, high=point)
-        size = motion._centre_size(outputs)
-        peak = size.max(1)
-        # steps that may hold more than the nodes are divided
-        steps = np.flatnonzero((within_steps(size, between.T) > peak[:, None]).any(0)) - 1
+        at_point = replace(self, low=point, high=point)
+        magnitude = at_point._midpoint_magnitude(outputs)
+        peak = magnitude.max(axis=1)
+        # Only steps whose bound exceeds the peak at nodes matter. They are divided: the distance
+        # from a straight line falls with the square of the number of substeps.
+        is_above = within_steps(magnitude, between_nodes.T) > peak[:, np.newaxis]
+        steps = np.flatnonzero(is_above.any(axis=0)) - 1
         if len(steps):
-            place = np.unique(SUBSTEPS * steps[:, None] + np.arange(SUBSTEPS + 1))
-            time = np.interp(place / SUBSTEPS, np.arange(len(self.time)), self.time)
-            finer = replace(motion, time=time)
-            bound = within_steps(finer._centre_size(outputs), finer.centre_straying(outputs).T)
-            is_divided = np.diff(place, prepend=-1) == 1  # no gap between divided steps
-            peak = np.maximum(peak, bound[:, is_divided].max(1))
+            substeps = 4
+            place = np.unique(substeps * steps[:, np.newaxis] + np.arange(substeps + 1))
+            time = np.interp(place / substeps, np.arange(len(self.time)), self.time)
+            finer = replace(at_point, time=time)
+            error = finer.midpoint_interpolation_error(outputs)
+            bound = within_steps(finer._midpoint_magnitude(outputs), error.T)
+            is_substep = np.diff(place, prepend=-1) == 1  # and no gap between divided steps
+            peak = np.maximum(peak, bound[:, is_substep].max(axis=1))
         return peak
 
-    def _centre_size(self, outputs: Ints | slice) -> Array:
-        """Upper bounds of outputs' magnitudes in the middle at nodes, (m, T)."""
-        value, error = self.centre_motion(outputs)
-        return (np.abs(value) + error).T
+    def _midpoint_magnitude(self, outputs: Ints | slice) -> Array:
+        """Return upper bounds of |output| at the midpoint and at nodes, shape (m, T)."""
+        found = self.midpoint_response(outputs)
+        return np.asarray((np.abs(found.value) + found.error).T)
 
-    def centre_straying(self, outputs: Ints | slice = slice(None)) -> Array:
-        """Bound of how far that motion strays from straight lines in the step to a node, (T, m)."""
-        modal, outputs = self.centre_modes, np.arange(len(self.structure.order))[outputs]
-        orders = [int(order) for order in self.structure.order[outputs]]
-        deviation = np.zeros((len(self.time), len(outputs)))
-        read = np.abs(modal.output_coefficients(np.zeros_like(outputs), outputs)[0])
-        for k, sigma in enumerate(modal.sigma[0]):
+    def midpoint_interpolation_error(self, outputs: Ints | slice = slice(None)) -> Array:
+        """Bound the distance of the outputs at the midpoint from a straight line in each step.
+
+        Returns:
+            Shape (T, m); row j belongs to the step that ends at node j.
+        """
+        modes = self.midpoint_modes
+        numbers = self._output_numbers(outputs)
+        orders = [int(order) for order in self.structure.derivative_orders[numbers]]
+        error = np.zeros((len(self.time), len(numbers)))
+        coefficients = modes.output_coefficients(np.zeros_like(numbers), numbers).value
+        for k, sigma in enumerate(modes.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
             oscillator = Oscillators(grid, self.loads, self.time, set(orders))
-            for source, share in modal.share.items():
-                waves = {order: oscillator.responses(source, order) for order in set(orders)}
+            for source, participation in modes.participation.items():
+                responses = {order: oscillator.responses(source, order) for order in set(orders)}
                 for o, order in enumerate(orders):
-                    deviation[:, o] += read[o, k] * abs(share[0, k]) * waves[order].line_deviation
-        return deviation
+                    of_mode = np.abs(coefficients[o, k]) * abs(participation.value[0, k])
+                    error[:, o] += of_mode * responses[order].line_deviation
+        return error
 
-    def _modal(self, unit: Array) -> Modal:
+    def _output_numbers(self, outputs: Ints | slice) -> Ints:
+        """Return the numbers of the outputs, shape (m,)."""
+        return np.arange(len(self.structure.derivative_orders))[outputs]
+
+    def _modes(self, unit: Array) -> PointModes:
+        """Return the modes at points with unit coordinates (S, d)."""
         return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
 
-def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
-    """The structure as Taylor models in those inputs `names` whose `low` is below `high`."""
-    active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
-    inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
-    centres = {name: float(x) for name, x in zip(names, centre, strict=True)}
-    values = {**system.parameters, **centres}
-    parameters = {name: TaylorModel.constant(x, d) for name, x in values.items()}
-    parameters |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
+def over_box(
+    system: LinearSystem, names: Sequence[str], low: Array, high: Array
+) -> ClassicalStructure:
+    """Return a structure as Taylor models in those inputs whose lower end is below the upper one.
+
+    Args:
+        system: The structure.
+        names: Its inputs, n of them; other parameters have the values of the structure.
+        low: Lower ends, shape (n,), in SI units.
+        high: Upper ends, shape (n,).
+
+    Raises:
+        UnprovedError: Its modes are not known to be classical.
+    """
+    midpoint = (low + high) / 2
+    radius = (high - low) / 2
+    active = np.flatnonzero(high > low)
+    variables = TaylorModel.variables(midpoint[active], radius[active])
+    values = dict(system.parameters)
+    for name, value in zip(names, midpoint, strict=True):
+        values[name] = float(value)
+    parameters = {name: TaylorModel.constant(x, len(active)) for name, x in values.items()}
+    for column, i in enumerate(active):
+        parameters[names[int(i)]] = variables[column]
     return classical_structure(system, parameters)
 
 
-def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
-    """Names of what moves the structure: loads, velocity, start."""
-    moved = np.asarray(structure.start.magnitude().any(-1))
-    at_start = [name for name, k in (("velocity", 1), ("start", 0)) if moved[k]]
-    return (*histories(system), *at_start)
+def sources(system: LinearSystem, structure: ClassicalStructure) -> tuple[str, ...]:
+    """Return the names of what moves a structure: its loads, then "velocity" and "start"."""
+    displacements, velocities = structure.initial_state.magnitude()
+    names = list(histories(system))
+    if velocities.any():
+        names.append("velocity")
+    if displacements.any():
+        names.append("start")
+    return tuple(names)

@@ -1,4 +1,9 @@
-"""What proofs of bounds over a box of inputs are asked for and answer, and the hull of that."""
+"""What a proof of bounds over one sub-box of the inputs takes and returns, and the hull of these.
+
+A proof bounds −q and q from above for every output q, at all time nodes and on several α-levels.
+Arrays of such bounds have a last axis of two sides, in this order: −q, q. A "peak" is the largest
+value of one side of one output over the time nodes.
+"""
 
 from __future__ import annotations
 
@@ -17,44 +22,49 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.fuzzy.result import Nature
 
-ADDED = ("boxes", "evaluations")
-"""Facts of boxes that are added; of the others the largest counts."""
-
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """Bounds that a proof is asked for over a box of L levels, and what is known there."""
+    """Bounds that a proof is asked for over a sub-box of L levels, and what is known there.
+
+    There are T time nodes and m outputs.
+    """
 
     scale: Array  # units of the tolerances of each output, (m,)
-    peak: Array  # peak of each output at the nominal inputs and the probes, (m,)
-    needed: Mask  # bounds of (−output, output) that are asked for, (L, T, m, 2)
-    outer: Array  # upper bounds that are known, the same shape; infinite where none is
-    incumbent: Array  # largest reached values of (−output, output), (L, m, 2)
+    peak: Array  # peak magnitude of each output at the nominal inputs and the probes, (m,)
+    needed: Mask  # bounds that are asked for, (L, T, m, 2)
+    known_upper: Array  # upper bounds that are known, (L, T, m, 2); infinite where none is
+    incumbent: Array  # largest values over time that exact trajectories attain, (L, m, 2)
     workers: int  # number of threads
-    last: bool  # whether a refusal ends the proof, so that wide bounds are better than none
+    is_last: bool  # whether a refusal ends the proof, so that wide bounds are better than none
     tick: Callable[[float], None]  # called with the completed fraction
 
 
 @dataclass(frozen=True, eq=False)
 class BoxBounds:
-    """Bounds of (−output, output) over one level of a box of n inputs."""
+    """Bounds of (−q, q) over one level of a sub-box of n inputs."""
 
-    outer: Array  # proved upper bounds, (T, m, 2); at nodes not asked for any valid bound
-    inner: Array  # values that motions reach, less rounding; −inf where none is known
-    at: Array  # inputs of these motions, (T, m, 2, n), in SI units
-    # largest deviation of an output from a straight line in the step before each node, (T, m)
-    between: Array
-    shares: Array  # fraction of each input in the gap at each peak, (m, 2, n)
-    # what the exact motion at `at` may exceed `inner` by, (T, m)
+    # guaranteed upper bounds, (T, m, 2); at nodes that were not asked for, any valid bound
+    upper: Array
+    # values that exact trajectories attain, less their rounding, (T, m, 2); −inf where none is
+    # known
+    attained: Array
+    attained_at: Array  # inputs of these trajectories, (T, m, 2, n), in SI units
+    # guaranteed largest distance of an output from a straight line in the step before each node,
+    # (T, m)
+    between_nodes: Array
+    # fraction of the gap of each peak that each input accounts for, (m, 2, n)
+    gap_fractions: Array
+    # what the exact trajectory at `attained_at` may exceed `attained` by, (T, m)
     attained_error: Array | float = 0.0
-    # lower and upper ends of the box that may contain each peak, (2, m, 2, n), in SI units; None
-    # for all of the box
+    # lower and upper ends of the part of the sub-box that may contain each peak, (2, m, 2, n), in
+    # SI units; None for all of the sub-box
     remaining: Array | None = None
-    # upper bounds over the rest of the box for each peak, (T, m, 2); None if all of the box
-    # remains
-    pruned: Array | None = None
-    # lower bound of each output's least peak over time, and the peak of a motion that peaks low,
-    # between nodes too, (m,) each; None for what the bounds at nodes say
+    # upper bounds over what is not `remaining`, for each peak, (T, m, 2)
+    pruned_upper: Array | None = None
+    # For each output q, a lower bound of the smallest max |q| over time in the sub-box, and the
+    # max |q| of one trajectory that has a small one, (m,) each, between nodes too. None for what
+    # the bounds at nodes say.
     least_peaks: Ends | None = None
     facts: Mapping[str, float] = field(default_factory=dict)  # further numbers by name
 
@@ -67,23 +77,23 @@ Answer = BoxBounds | UnprovedError
 
 
 class BoxProof(Protocol):
-    """A proof of bounds over any box of the inputs."""
+    """A proof of bounds over any sub-box of the inputs."""
 
     name: ClassVar[str]
 
     @property
     def parts(self) -> int:
-        """Most boxes that a peak of an output is worth, and that may be refused."""
+        """Most sub-boxes that a peak of an output is worth, and that may be refused."""
 
     @property
     def workers(self) -> int | None:
         """Threads; all cores unless given."""
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Return the expected work on the box, in evaluations of a mode's motion at a node.
+        """Return the expected work on the box, in evaluations of a mode's response at a node.
 
         Raises:
-            UnprovedError: No part of the box can be proved.
+            UnprovedError: No sub-box can be proved.
         """
 
     def peak_gap(self, flow: UnitFlow) -> Array:
@@ -93,7 +103,7 @@ class BoxProof(Protocol):
         """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> Sequence[Answer]:
-        """Return bounds on each level of a box, or the refusal of that level.
+        """Return the bounds on each level of a sub-box, or the refusal of that level.
 
         Raises:
             UnprovedError: All levels are refused.
@@ -115,90 +125,145 @@ def refusing() -> Iterator[None]:
 
 
 class Hull:
-    """Bounds of (−output, output) on A levels, at T nodes, of m outputs, from those of boxes."""
+    """Bounds of (−q, q) over the whole box on A levels, collected from those of its sub-boxes.
+
+    Every point of the box lies in a sub-box that is closed in the end. So the largest bound over
+    all closed sub-boxes holds for the whole box.
+    """
 
     def __init__(self, problem: UnitFlow, flow: LinearFlow) -> None:
-        self.problem, self.flow, names = problem, flow, problem.boxes.names
-        levels, outputs = len(problem.boxes.alpha), len(flow.outputs)
+        self.problem = problem
+        self.flow = flow
+        levels = len(problem.boxes.alpha)
+        outputs = len(flow.outputs)
         shape = (levels, len(flow.time), outputs, 2)
-        # proved upper bounds of closed boxes, largest reached values, and their inputs, in SI units
-        self.closed, self.inner = np.full((2, *shape), -np.inf)
-        self.at = np.zeros((*shape, len(names)))
-        self.between, self.attained_error = np.zeros((2, *shape[1:3]))
-        # of each output's least peak over time a lower bound, and the peak of a motion that is low
-        self.least_lower, self.least_upper = np.full((2, levels, outputs), np.inf)
+        # guaranteed upper bounds over closed sub-boxes, and the largest attained values
+        self.upper = np.full(shape, -np.inf)
+        self.attained = np.full(shape, -np.inf)
+        self.attained_at = np.zeros((*shape, len(problem.boxes.names)))  # inputs, in SI units
+        self.between_nodes = np.zeros(shape[1:3])
+        self.attained_error = np.zeros(shape[1:3])
+        # for each output a lower bound of the smallest max |q| over time, and the smallest max |q|
+        # of a known trajectory
+        self.min_peak_lower = np.full((levels, outputs), np.inf)
+        self.min_peak_upper = np.full((levels, outputs), np.inf)
         self.facts: dict[str, float] = {"parts": 0}
 
     def incumbent(self, level: int) -> Array:
-        """Return the largest reached value of (−output, output) on a level, (m, 2); 0 at least."""
-        return np.asarray(np.maximum(self.inner[level:].max((0, 1)), 0.0))
+        """Return the largest attained value of each side over a level, shape (m, 2); 0 at least.
 
-    def close(self, level: int, peaks: Mask, outer: Array) -> None:
-        """Raise the bounds of some peaks (m, 2) at all nodes to those of a box, (T, m, 2)."""
-        self.closed[level][:, peaks] = np.maximum(self.closed[level][:, peaks], outer[:, peaks])
+        A trajectory of a higher level lies in this level too, since the α-cuts are nested.
+        """
+        largest = self.attained[level:].max(axis=(0, 1))
+        return np.asarray(np.maximum(largest, 0.0))
 
-    def take(self, level: int, bounds: BoxBounds) -> None:
-        """Take over what motions of a box reach, errors and facts."""
-        better = bounds.inner > self.inner[level]
-        self.inner[level][better], self.at[level][better] = bounds.inner[better], bounds.at[better]
-        self.between = np.maximum(self.between, bounds.between)
+    def close(self, level: int, peaks: Mask, upper: Array) -> None:
+        """Raise the bounds of some peaks to those over one more sub-box, at all time nodes.
+
+        Args:
+            level: Row of the level.
+            peaks: Which outputs and sides the bounds are raised of, shape (m, 2).
+            upper: Guaranteed upper bounds over the sub-box, shape (T, m, 2).
+        """
+        hull = self.upper[level]
+        hull[:, peaks] = np.maximum(hull[:, peaks], upper[:, peaks])
+
+    def add_attained(self, level: int, bounds: BoxBounds) -> None:
+        """Add the attained values of a sub-box, its errors and its facts; not its upper bounds."""
+        is_better = bounds.attained > self.attained[level]
+        self.attained[level][is_better] = bounds.attained[is_better]
+        self.attained_at[level][is_better] = bounds.attained_at[is_better]
+        self.between_nodes = np.maximum(self.between_nodes, bounds.between_nodes)
         self.attained_error = np.maximum(self.attained_error, bounds.attained_error)
         if bounds.least_peaks is not None:
-            self.least_upper[level] = np.minimum(self.least_upper[level], bounds.least_peaks.upper)
+            known = self.min_peak_upper[level]
+            self.min_peak_upper[level] = np.minimum(known, bounds.least_peaks.upper)
         for name, value in bounds.facts.items():
             earlier = self.facts.get(name, 0)
-            self.facts[name] = earlier + value if name in ADDED else max(earlier, value)
+            # Counts of sub-boxes add up; of any other fact the largest value stands.
+            is_count = name in ("boxes", "evaluations")
+            self.facts[name] = earlier + value if is_count else max(earlier, value)
 
     def envelope(self, method: str, notes: Iterable[str]) -> Envelope:
-        """Return the guaranteed envelope; raise if a reached bound lies outside a proved one."""
-        # what holds in a wider cut holds in a narrower one, whose motions are in the wider one too
-        outer, inner, at = np.minimum.accumulate(self.closed, axis=0), self.inner, self.at
-        for level in reversed(range(len(inner) - 1)):
-            better = inner[level + 1] > inner[level]
-            inner[level][better] = inner[level + 1][better]
-            at[level][better] = at[level + 1][better]
-        is_wrong = ~(inner <= outer)  # also where one is NaN
-        if is_wrong.any():
-            output = self.flow.outputs[int(np.argwhere(is_wrong)[0, 2])]
-            excess = np.nanmax(np.where(is_wrong, inner - outer, np.nan))
-            what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
-            raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
-        least_upper = self._least_upper(outer)
-        error = (outer - inner).max(-1)
-        largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
-        # the gap of an output at rest is judged by what the motion's energy allows
+        """Return the guaranteed envelope.
+
+        `attained` and `attained_at` are raised in place to those of higher levels.
+
+        Raises:
+            FailedError: An attained value exceeds a guaranteed bound, so the proof is wrong.
+        """
+        # The α-cuts are nested. A bound over a wider cut holds over a narrower one, and a
+        # trajectory of a narrower cut is one of the wider cut.
+        upper = np.minimum.accumulate(self.upper, axis=0)
+        for level in reversed(range(len(upper) - 1)):
+            is_better = self.attained[level + 1] > self.attained[level]
+            self.attained[level][is_better] = self.attained[level + 1][is_better]
+            self.attained_at[level][is_better] = self.attained_at[level + 1][is_better]
+        attained = self.attained
+        self._require_consistent(upper)
+
+        min_peak_upper = self._min_peak_upper_bounds(upper)
+        error = (upper - attained).max(axis=-1)
+        largest = np.maximum(np.abs(upper).max(axis=(1, 3)), 1e-300)
+        # The gap of an output at rest is judged by what the energy of the response allows.
         largest = np.where(self.problem.at_rest, self.problem.peak, largest)
+        peak_gaps = (upper.max(axis=1) - attained.max(axis=1)).max(axis=-1)
         facts = {
             **self.facts,
             "gap": float((error / self.problem.scale).max()),
-            "gap_of_peaks": float(((outer.max(1) - inner.max(1)).max(-1) / largest).max()),
+            "gap_of_peaks": float((peak_gaps / largest).max()),
         }
         return self.problem.envelope(
-            outer,
-            at,
+            upper,
+            self.attained_at,
             error,
             nature=Nature.GUARANTEED,
             method=method,
             basis=("the equations of motion hold",),
-            inner=Ends(-inner[..., 0], inner[..., 1]),
-            between=self.between,
+            inner=Ends(-attained[..., 0], attained[..., 1]),
+            between=self.between_nodes,
             least_peaks=Ends(
-                np.maximum.accumulate(self.least_lower, axis=0),
-                np.minimum.accumulate(least_upper[::-1], axis=0)[::-1],
+                np.maximum.accumulate(self.min_peak_lower, axis=0),
+                np.minimum.accumulate(min_peak_upper[::-1], axis=0)[::-1],
             ),
             attained_error=self.attained_error if self.attained_error.any() else None,
-            evaluations=int(facts.pop("evaluations", inner.size)),
+            evaluations=int(facts.pop("evaluations", attained.size)),
             facts=facts,
             notes=(*notes,),
         )
 
-    def _least_upper(self, outer: Array) -> Array:
-        """Peak over time of a motion of each level that peaks low, shape (A, m)."""
-        reached = self.least_upper
-        for level, output in np.argwhere(~np.isfinite(reached)):
-            # without a better one: the motion that is smallest where all motions are largest
-            node, side = divmod(int(outer[level, :, output].argmin()), 2)
-            motion = self.flow.values(self.at[level, node, output, side][None])[0, :, output]
-            size = np.abs(motion) + self.attained_error[:, output]
-            reached[level, output] = within_steps(size, self.between[:, output]).max()
-        return reached
+    def _require_consistent(self, upper: Array) -> None:
+        """Raise FailedError where an attained value is not below its bound in `upper`, or NaN."""
+        is_wrong = ~(self.attained <= upper)  # true also where one of both is NaN
+        if not is_wrong.any():
+            return
+        output = self.flow.outputs[int(np.argwhere(is_wrong)[0, 2])]
+        excess = np.nanmax(np.where(is_wrong, self.attained - upper, np.nan))
+        what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
+        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
+
+    def _min_peak_upper_bounds(self, upper: Array) -> Array:
+        """Return an upper bound of the smallest max |q| over time on each level, shape (A, m).
+
+        The largest |q| over time of any trajectory of a level is such a bound. Where the proof has
+        named no trajectory, one is chosen here from those that attain the largest values of −q and
+        of q, whose inputs `attained_at` must be known. `upper` are the bounds of (−q, q), shape
+        (A, T, m, 2).
+
+        Returns:
+            The array `min_peak_upper`, whose infinite entries have been replaced in place.
+        """
+        bounds = self.min_peak_upper
+        for level, output in np.argwhere(~np.isfinite(bounds)):
+            # Any trajectory gives a valid bound, and one with a small peak gives a good one. Where
+            # the upper bound of −q or q is most negative, all trajectories are far from zero, and
+            # the one that attains the largest value of that side is the closest to zero.
+            of_output = upper[level, :, output]  # (T, 2)
+            node, side = np.unravel_index(of_output.argmin(), of_output.shape)
+            inputs = self.attained_at[level, node, output, side]
+            trajectory = self.flow.values(inputs[np.newaxis])[0, :, output]
+            # The exact trajectory may exceed the computed one by `attained_error` at a node, and
+            # both ends of a step by `between_nodes` within it.
+            magnitude = np.abs(trajectory) + self.attained_error[:, output]
+            bounds[level, output] = within_steps(magnitude, self.between_nodes[:, output]).max()
+        return bounds

@@ -1,13 +1,16 @@
-"""The dual function of a Lagrangian relaxation and its minimisation by deflected subgradients.
+"""The dual function of a Lagrangian relaxation, and its minimisation by deflected subgradients.
 
-An output at a node is Σ_k F_k(z_k(u)): z_k are intervening variables of mode k, F_k the response of
-one oscillator. All z are scaled to [−1, 1] over the box: z = a·u + u·Q u ± R. For any multipliers μ
-the maximum of side × output over the inputs u is at most (Geoffrion 1974, Lemaréchal 2001)
+An output at a time node is Σ_k F_k(z_k(u)): z_k are the intervening variables of mode k, functions
+of the inputs u, and F_k is the response of one oscillator. All z are scaled to [−1, 1] over the
+box: z = a·u + u·Q u + cubic terms ± R. For any multipliers μ the maximum over the box of side ×
+output, side being −1 or 1, is at most (Geoffrion 1974, Lemaréchal 2001)
 
     D(μ) = Σ_k max over the mode's table of [ Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g ]
-         + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R,
+         + max over u of [ Σ μ (a·u + u·Q u) + truncated modes ] + Σ |μ| R
 
-a convex function; e are responses to source s, c ± r the range of their amplitude.
+plus a bound of the cubic terms. D is convex. In the first line e is the response to source s of the
+oscillator at a point (ω, g) of the table, and c ± r is the range of its participation factor over
+the box, with the multiplier μ_s.
 """
 
 from __future__ import annotations
@@ -22,45 +25,61 @@ from alphacut.base.kernels import compiled, kernel
 from alphacut.frame.calculus.unproved import UnprovedError
 
 LARGEST = 1e100
-"""Magnitude of models, tables and multipliers at most: no sum of their products overflows."""
+"""Largest magnitude of models, tables and multipliers, so that no sum of their products overflows;
+with a larger one the products of three of them could."""
 
 
 class Data(NamedTuple):
-    """Models and tables of K modes for one output: L inputs, Z = K (2 + sources) variables."""
+    """Models and tables of one side of one output, as the kernels take them.
 
-    table: Array  # responses, (K, sources, T, Q W)
+    There are K modes, T time nodes, L inputs, and Z = K (2 + sources) intervening variables: of
+    each mode ω, g and its participation factor for each source, in this order. The table of a mode
+    stands on a grid of W values of ω and Q values of q = g/ω; its points are numbered with ω
+    running fastest. Quadratic and cubic coefficients are packed by rows, i ≤ j ≤ k.
+    """
+
+    table: Array  # responses to a unit participation factor, (K, sources, T, Q W)
     omega: Array  # scaled ω of the tables' points, (K, Q W)
-    decay: Array  # scaled g of them, the same
-    start: Array  # least ω and q of each table, (K, 2)
-    step: Array  # distances of its points, (K, 2)
-    points: Array  # number of points along ω and along q, (2,)
-    ends: Array  # first and last point along ω and along q that the box reaches, (K, 4)
-    centre: Array  # centres of ω and g, (K, 2)
-    radius: Array  # their radii
-    share: Array  # centres of the shares, (K, sources)
-    reach: Array  # their radii
-    linear: Array  # linear parts of all scaled variables, (Z, L)
-    quadratic: Array  # quadratic parts, packed by rows, (Z, L (L + 1)/2)
-    cubic: Array  # cubic parts, packed, (Z, monomials)
-    expected: Array  # what is expected of the cubic parts' sum for a multiplier of 1, (Z,)
-    remainder: Array  # remainders, with `expected`, (Z,)
-    # middles and half ranges of truncated modes' responses, (2 sources, T); (0, 1) if there are
-    # none
+    decay: Array  # scaled g of the tables' points, (K, Q W)
+    grid_start: Array  # smallest ω and q of each table, (K, 2)
+    grid_step: Array  # distances of its points along ω and q, (K, 2)
+    grid_points: Array  # number of points along ω and along q, (2,)
+    # first and last point along ω, then along q, that enclose the range of each mode, (K, 4)
+    cell: Array
+    midpoint: Array  # midpoints of ω and g over the box, (K, 2)
+    radius: Array  # radii of ω and g, by which they are scaled, (K, 2)
+    participation: Array  # midpoints of the participation factors, (K, sources)
+    participation_radius: Array  # radii of the participation factors, (K, sources)
+    linear: Array  # linear coefficients of the scaled variables, (Z, L)
+    quadratic: Array  # quadratic coefficients, (Z, L (L + 1)/2)
+    cubic: Array  # cubic coefficients, (Z, monomials)
+    # what the sum of the cubic terms is expected to reach for a multiplier of 1, (Z,)
+    expected_cubic: Array
+    remainder: Array  # bounds of what the models leave out, with `expected_cubic`, (Z,)
+    # midpoints and radii of the responses of truncated modes, in turn, (2 sources, T); (0, 1) if
+    # there are none
     truncated_response: Array
-    truncated_linear: Array  # linear parts of their shares and amplitudes, (2 sources, L)
-    truncated_quadratic: Array  # quadratic parts
-    grain: Array  # distance of the values that multipliers take, (1,)
+    # linear coefficients of their participation factors and amplitudes, in turn, (2 sources, L)
+    truncated_linear: Array
+    truncated_quadratic: Array  # quadratic coefficients of the same
+    multiplier_spacing: Array  # distance of the values that multipliers take, (1,)
 
 
 def data_without_modes() -> Data:
     """Return `Data` of empty arrays, with which a kernel can be called before there are models."""
     dimensions = dict.fromkeys(Data._fields, 2)
-    dimensions |= {"table": 4, "points": 1, "expected": 1, "remainder": 1, "grain": 1}
+    dimensions["table"] = 4
+    for name in ("grid_points", "expected_cubic", "remainder", "multiplier_spacing"):
+        dimensions[name] = 1
     return Data(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
 
 
 def roundings(modes: int, sources: int, inputs: int) -> int:
-    """Roundings of a term of the dual function: of its sums over variables, pairs and modes."""
+    """Return the number of roundings of a term of D(μ) in its sums over variables and inputs.
+
+    The sums run over the variables of all modes, over pairs of inputs and single inputs, and over
+    the sources of truncated modes; 32 are for the operations of the term itself.
+    """
     return 2 * modes * (sources + 2) + 2 * inputs**2 + 4 * inputs + 4 * sources + 32
 
 
@@ -71,60 +90,72 @@ def require_in_range(fields: Mapping[str, Array]) -> None:
             raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
 
 
-# bounds of rounding hold for any order of a sum, with fused products too; NaN and infinity stay
+# The bounds of rounding hold for any order of a sum and for fused products, so the compiler may use
+# both. NaN and infinity keep their meaning.
 loops = kernel(fastmath={"reassoc", "contract"})
 
 
 @loops
 def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
-    """Upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over [−1, 1]^d; `u` near it is written.
+    """Return an upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over the box [−1, 1]^d.
 
-    Inputs whose slope outweighs all that couples them are at an end of the box, one after the
-    other; products of the rest count by magnitude. The q_ij are packed by rows.
+    The coefficients q_ij are packed by rows. `u` is overwritten with a point at which the function
+    is near the bound.
     """
     d = len(u)
-    # full: q_ij, symmetric; slack: Σ_j |q_ij| over the free j ≠ i
-    full, slack, slope = np.empty((d, d)), np.empty(d), linear.copy()
+    full = np.empty((d, d))  # q_ij, symmetric
+    slope = linear.copy()  # of the function, at the inputs that are fixed so far
     at = 0
     for i in range(d):
         for j in range(i, d):
             full[i, j] = full[j, i] = quadratic[at]
             at += 1
+    slack = np.empty(d)  # Σ_j |q_ij| over the inputs j ≠ i that are free
     for i in range(d):
         slack[i] = -abs(full[i, i])
         for j in range(d):
             slack[i] += abs(full[i, j])
-    free = np.ones(d, np.bool_)
-    total, has_fixed = 0.0, True
+
+    # The derivative by u_i is slope_i + 2 q_ii u_i + Σ_j q_ij u_j over the free j. Where |slope_i|
+    # ≥ slack_i + 2 max(−q_ii, 0) it has one sign (or q_ii > 0 and the function is convex in u_i),
+    # so the maximum is at an end. Fixing an input changes the slopes of the others.
+    is_free = np.ones(d, np.bool_)
+    total = 0.0
+    has_fixed = True
     while has_fixed:
         has_fixed = False
         for i in range(d):
-            if free[i] and abs(slope[i]) >= slack[i] + 2 * max(-full[i, i], 0.0):
-                free[i], has_fixed = False, True
+            if is_free[i] and abs(slope[i]) >= slack[i] + 2 * max(-full[i, i], 0.0):
+                is_free[i] = False
+                has_fixed = True
                 u[i] = 1.0 if slope[i] >= 0 else -1.0
                 total += abs(slope[i]) + full[i, i]
                 for j in range(d):
                     slope[j] += full[i, j] * u[i]
                     slack[j] -= abs(full[i, j])
+
+    # The parabolas of the free inputs are maximised one by one; products of two free inputs count
+    # by magnitude.
     for i in range(d):
-        if not free[i]:
+        if not is_free[i]:
             continue
-        size, bend = abs(slope[i]), full[i, i]
+        magnitude = abs(slope[i])
+        bend = full[i, i]
         u[i] = 1.0 if slope[i] >= 0 else -1.0
-        if bend >= 0 or size >= -2 * bend:
-            total += size + bend
+        if bend >= 0 or magnitude >= -2 * bend:
+            total += magnitude + bend
         else:
-            total -= size * size / (4 * bend)
-            u[i] *= size / (-2 * bend)
+            total -= magnitude * magnitude / (4 * bend)
+            u[i] *= magnitude / (-2 * bend)
         for j in range(i + 1, d):
-            if free[j]:
+            if is_free[j]:
                 total += abs(full[i, j])
     return total
 
 
 @loops
 def products(u: Array, out: Array) -> None:
-    """u_i u_j, packed by rows, i ≤ j."""
+    """Write the products u_i u_j with i ≤ j to `out`, packed by rows."""
     at = 0
     for i in range(len(u)):
         for j in range(i, len(u)):
@@ -134,14 +165,14 @@ def products(u: Array, out: Array) -> None:
 
 @loops
 def add(out: Array, factor: float, row: Array) -> None:
-    """Adds factor × row."""
+    """Add factor × row to `out`, in place."""
     for i in range(len(out)):
         out[i] += factor * row[i]
 
 
 @loops
 def dot(a: Array, b: Array) -> float:
-    """a·b."""
+    """Return the scalar product a·b."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -152,36 +183,49 @@ def dot(a: Array, b: Array) -> float:
 def dual_value(
     mu: Array, cell: Ints, node: int, side: float, data: Data, gradient: Array, u: Array
 ) -> float:
-    """Value D(μ) of the dual function at multipliers μ (Z,), without constants and cubic parts.
+    """Return the dual function D(μ) of side × output at a node, without constants and cubic terms.
 
-    Written are a subgradient (Z,) and `u` (L,), the inputs that maximise the part over the box.
-    `cell` (K, 4) holds the first and last point along ω and along q = g/ω at which each mode's
-    table is read. |μ| and data are at most `LARGEST`.
+    Args:
+        mu: Multipliers μ, shape (Z,).
+        cell: First and last point along ω, then along q = g/ω, between which the table of each mode
+            is read, shape (K, 4).
+        node: Number of the time node.
+        side: −1 or 1.
+        data: Models and tables; they and |μ| are at most `LARGEST`.
+        gradient: Overwritten with a subgradient of D, shape (Z,).
+        u: Overwritten with the inputs that maximise the term over the box, shape (L,).
     """
-    modes, sources = data.share.shape
+    modes, sources = data.participation.shape
     gradient[:] = 0.0
-    total, values = 0.0, np.empty(data.omega.shape[1])
+    total = 0.0
+    values = np.empty(data.omega.shape[1])
     for k in range(modes):
-        highest, at = mode_maximum(mu, k, cell[k], node, side, data, values)
-        total += highest
+        largest, at = mode_maximum(mu, k, cell[k], node, side, data, values)
+        total += largest
+        # A subgradient of a maximum is the gradient of the maximand at its maximum.
         first = k * (2 + sources)
         gradient[first] = -data.omega[k, at]
         gradient[first + 1] = -data.decay[k, at]
         for s in range(sources):
-            difference = side * data.reach[k, s] * data.table[k, s, node, at] - mu[first + 2 + s]
+            response = data.table[k, s, node, at]
+            difference = side * data.participation_radius[k, s] * response - mu[first + 2 + s]
             gradient[first + 2 + s] = -1.0 if difference >= 0 else 1.0
-    slope, bend = np.zeros(data.linear.shape[1]), np.zeros(data.quadratic.shape[1])
+
+    # The second maximum: linear and packed quadratic coefficients of its argument.
+    linear = np.zeros(data.linear.shape[1])
+    quadratic = np.zeros(data.quadratic.shape[1])
     for s in range(len(data.truncated_linear)):
-        add(slope, side * data.truncated_response[s, node], data.truncated_linear[s])
-        add(bend, side * data.truncated_response[s, node], data.truncated_quadratic[s])
+        add(linear, side * data.truncated_response[s, node], data.truncated_linear[s])
+        add(quadratic, side * data.truncated_response[s, node], data.truncated_quadratic[s])
     for z in range(len(mu)):
-        add(slope, mu[z], data.linear[z])
-        add(bend, mu[z], data.quadratic[z])
-    total += box_maximum(slope, bend, u)
-    products(u, bend)
+        add(linear, mu[z], data.linear[z])
+        add(quadratic, mu[z], data.quadratic[z])
+    total += box_maximum(linear, quadratic, u)
+    u_products = quadratic  # overwritten
+    products(u, u_products)
     for z in range(len(mu)):
         total += abs(mu[z]) * data.remainder[z]
-        gradient[z] += dot(data.linear[z], u) + dot(data.quadratic[z], bend)
+        gradient[z] += dot(data.linear[z], u) + dot(data.quadratic[z], u_products)
         gradient[z] += np.sign(mu[z]) * data.remainder[z]
     return total
 
@@ -190,53 +234,70 @@ def dual_value(
 def mode_maximum(
     mu: Array, k: int, cell: Ints, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
-    """Maximum of mode k's term in D(μ) over a cell of its table, and its point.
+    """Return the maximum of mode k's term in D(μ) over a cell of its table, and its table point.
 
-    Loops run over slices from 0, without which they are not compiled to vector instructions.
+    `values` (points of the table,) is scratch. Loops run over slices from 0, without which they are
+    not compiled to vector instructions.
     """
-    count, width = int(data.points[0]), cell[1] + 1 - cell[0]  # a row has `count` points along ω
-    first, end = cell[2] * count + cell[0], cell[3] * count + cell[1] + 1
+    count = int(data.grid_points[0])  # points of a row of the table, along ω
+    width = cell[1] + 1 - cell[0]
+    first = cell[2] * count + cell[0]
+    end = cell[3] * count + cell[1] + 1
     maximand(mu, k, first, node, side, data, values[first:end])
-    highest = np.full(width, -1e300)
+
+    # The maximum over the rows for each ω, then the ω of the largest of these, then its row.
+    largest = np.full(width, -1e300)
     for begin in range(first, end, count):
         of_row = values[begin : begin + width]
         for i in range(width):
-            highest[i] = of_row[i] if of_row[i] > highest[i] else highest[i]
+            largest[i] = of_row[i] if of_row[i] > largest[i] else largest[i]
     column = 0
     for i in range(width):
-        column = i if highest[i] > highest[column] else column
+        column = i if largest[i] > largest[column] else column
     at = first + column
-    while values[at] != highest[column]:
+    while values[at] != largest[column]:
         at += count
-    return highest[column], at
+    return largest[column], at
 
 
 @loops
 def maximand(
     mu: Array, k: int, first: int, node: int, side: float, data: Data, values: Array
 ) -> None:
-    """Write Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g to `values`, from mode k's point `first` on."""
-    sources, end = data.share.shape[1], first + len(values)
+    """Write Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g to `values`, from mode k's point `first` on.
+
+    With e the response to source s and c ± r the range of its participation factor, c e + |r e −
+    μ_s| is the maximum of (c + r z) e − μ_s z over z in [−1, 1].
+    """
+    sources = data.participation.shape[1]
+    end = first + len(values)
     z = k * (2 + sources)
-    w, g, mu_w, mu_g = data.omega[k, first:end], data.decay[k, first:end], mu[z], mu[z + 1]
+    omega = data.omega[k, first:end]
+    decay = data.decay[k, first:end]
+    mu_omega = mu[z]
+    mu_decay = mu[z + 1]
     for s in range(sources):
-        e, m = data.table[k, s, node, first:end], mu[z + 2 + s]
-        c, r = side * data.share[k, s], side * data.reach[k, s]
+        e = data.table[k, s, node, first:end]
+        mu_s = mu[z + 2 + s]
+        c = side * data.participation[k, s]
+        r = side * data.participation_radius[k, s]
         if s == 0:
             for i in range(len(values)):
-                values[i] = c * e[i] + abs(r * e[i] - m) - mu_w * w[i] - mu_g * g[i]
+                values[i] = c * e[i] + abs(r * e[i] - mu_s) - mu_omega * omega[i]
+                values[i] -= mu_decay * decay[i]
         else:
             for i in range(len(values)):
-                values[i] += c * e[i] + abs(r * e[i] - m)
+                values[i] += c * e[i] + abs(r * e[i] - mu_s)
 
 
 @loops
 def remainder_bound(mu: Array, data: Data) -> float:
-    """Bound of Σ μ (cubic part) over the box, less what D(μ) has expected of it."""
-    total, expected = np.zeros(data.cubic.shape[1]), 0.0
+    """Bound Σ μ (cubic terms) over the box, less what D(μ) has expected of it."""
+    total = np.zeros(data.cubic.shape[1])
+    expected = 0.0
     for z in range(len(mu)):
         add(total, mu[z], data.cubic[z])
-        expected += abs(mu[z]) * data.expected[z]
+        expected += abs(mu[z]) * data.expected_cubic[z]
     return np.abs(total).sum() - expected
 
 
@@ -256,75 +317,92 @@ def minimise(
 ) -> float:
     """Minimise the dual function D(μ) by deflected subgradient steps; return an upper bound.
 
-    D(μ) = Σ_k max over a cell of mode k's table + max over inputs u in [−1, 1]^L + Σ |μ| R bounds
-    side × output at a node for any multipliers μ of the modes' intervening variables z(u). The
-    direction is the subgradient with a part of the last direction where these oppose one
-    another (Camerini, Fratta, Maffioli 1975). Its length aims at a value of D that is expected
-    (Polyak 1969); less is expected after `patience` steps without a third of it. The bound is the
-    least D that is met, with that of the Taylor models' cubic parts.
+    The bound, of side × output at the node without constants, is the smallest D(μ) that is met,
+    with the bound of the cubic terms. It holds for any μ, so nothing rests on convergence. The
+    direction of a step is the subgradient, with a part of the last direction where these oppose
+    one another (Camerini, Fratta, Maffioli 1975). Its length aims at an expected value of D (Polyak
+    1969); less is expected after `patience` steps that do not bring a third of it.
 
-    At most `steps` values of D are taken; it ends at `target`, and D cannot fall below
-    `model_value`, which motions of the model reach. Written are the best multipliers `mu` (Z,),
-    from which it begins; `u` (L,), the inputs of the second maximum for them; and `disagreement`
-    (Z,): |μ_z| times the distance of variable z where the table's maximum is from z(u), a mean over
-    the steps with weights that fall by 0.8.
+    Args:
+        mu: Multipliers to begin at, shape (Z,); overwritten with the best ones.
+        cell: As in `dual_value`, shape (K, 4).
+        node: Number of the time node.
+        side: −1 or 1.
+        data: Models and tables.
+        steps: Most evaluations of D.
+        patience: As above.
+        target: Value of D at which the iteration ends.
+        model_value: A value of side × output in the model; D cannot fall below it.
+        disagreement: Overwritten, shape (Z,): |μ_z| times the distance between the variable z at
+            the table's maximum and z(u), an average over the steps with weights that fall by 0.8.
+        u: Overwritten with the inputs of the second maximum for the best multipliers, shape (L,).
     """
-    gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
-    here = np.empty(len(u))
-    lowest, expected_drop, idle = np.inf, np.inf, 0
+    gradient = np.empty(len(mu))
+    direction = np.zeros(len(mu))
+    best_mu = mu.copy()
+    inputs = np.empty(len(u))
+    lowest = np.inf
+    expected_drop = np.inf
+    idle_steps = 0
     disagreement[:] = 0.0
     for _ in range(steps):
-        value = dual_value(mu, cell, node, side, data, gradient, here)
+        value = dual_value(mu, cell, node, side, data, gradient, inputs)
         for z in range(len(mu)):
             disagreement[z] = 0.8 * disagreement[z] + abs(gradient[z] * mu[z])
         if value < lowest:
             if lowest - value > 0.3 * expected_drop:
-                idle = 0
+                idle_steps = 0
             lowest = value
-            best[:], u[:] = mu, here
+            best_mu[:] = mu
+            u[:] = inputs
         if lowest <= target:
             break
         if expected_drop == np.inf:
             expected_drop = 0.7 * max(lowest - model_value, 0.0)
-        idle += 1
-        if idle > patience:  # back to the best multipliers
-            expected_drop, idle = 0.5 * expected_drop, 0
-            mu[:], direction[:] = best, 0.0
+        idle_steps += 1
+        if idle_steps > patience:  # begin again at the best multipliers, with shorter steps
+            expected_drop = 0.5 * expected_drop
+            idle_steps = 0
+            mu[:] = best_mu
+            direction[:] = 0.0
             if expected_drop < 0.1 * (target - model_value):
                 break
-        elif not subgradient_step(
-            mu, gradient, direction, value - lowest + expected_drop, data.grain[0]
-        ):
+            continue
+        drop = value - lowest + expected_drop
+        if not subgradient_step(mu, gradient, direction, drop, data.multiplier_spacing[0]):
             break
-    mu[:] = best
+    mu[:] = best_mu
     return lowest + remainder_bound(mu, data)
 
 
 @loops
 def subgradient_step(
-    mu: Array, gradient: Array, direction: Array, drop: float, grain: float
+    mu: Array, gradient: Array, direction: Array, drop: float, spacing: float
 ) -> bool:
     """Make a deflected subgradient step of the multipliers μ that aims at a fall of D by `drop`.
 
-    `mu` and `direction` are written. Multipliers are rounded to multiples of `grain`: on a grid
-    their path does not depend on rounding, and any μ gives a bound.
+    `mu` and `direction` (Z,) are changed in place; `direction` holds that of the last step.
+    Multipliers are rounded to multiples of `spacing`: on this grid their path does not depend on
+    rounding, and any μ gives a bound.
 
     Returns:
         False where the direction is zero, or a multiplier exceeds `LARGEST`.
     """
-    length = along = 0.0
+    along = 0.0
+    squared_length = 0.0
     for z in range(len(mu)):
         along += gradient[z] * direction[z]
-        length += direction[z] ** 2
-    deflection = -1.5 * along / length if along < 0 and length > 0 else 0.0
-    length = 0.0
+        squared_length += direction[z] ** 2
+    # The factor 1.5 is the one of Camerini, Fratta and Maffioli.
+    deflection = -1.5 * along / squared_length if along < 0 and squared_length > 0 else 0.0
+    squared_length = 0.0
     for z in range(len(mu)):
         direction[z] = gradient[z] + deflection * direction[z]
-        length += direction[z] ** 2
-    if length < 1e-24:
+        squared_length += direction[z] ** 2
+    if squared_length < 1e-24:
         return False
     for z in range(len(mu)):
-        mu[z] = grain * np.rint((mu[z] - drop / length * direction[z]) / grain)
+        mu[z] = spacing * np.rint((mu[z] - drop / squared_length * direction[z]) / spacing)
         if not abs(mu[z]) <= LARGEST:
             return False
     return True

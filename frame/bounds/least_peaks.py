@@ -1,12 +1,12 @@
 """Least peaks: a lower bound of the smallest peak over a box, "must the limit be exceeded?".
 
-A peak is the largest |output| over time, and its least value over the box is no less than
+A peak is the largest |output| over time, and its smallest value over the box is at least
 
     min over cells of max over nodes t of min over u in the cell of ± output(t; u),
 
-cells being ranges of the modes' frequencies and damping that cover those of the box. The last
-minimum is a dual bound with the modes' tables read over the cell alone: models are not made anew,
-and the shares keep their ranges.
+where the cells are ranges of the modes' frequencies and damping that cover those of the box. The
+last minimum is bounded from below by the dual function, with the modes' tables read over the cell
+alone: models are not made anew, and participation factors keep their ranges over the box.
 """
 
 from __future__ import annotations
@@ -28,39 +28,52 @@ class PeakCell(NamedTuple):
 
     bound: float  # lower bound of the peak over it
     number: int  # of the cell
-    ends: Ints  # first and last point of the modes' tables along ω and q, (K, 4)
-    node: int  # node of the bound
-    at: Array  # coordinates that the bound names, (d,)
+    ends: Ints  # first and last point along ω, then along q, of the modes' tables, (K, 4)
+    node: int  # time node at which the bound is that of |output|
+    at: Array  # inputs that the dual bound names, in unit coordinates, (d,)
+
+
+class CellEffort(NamedTuple):
+    """Effort that a cell is worth."""
+
+    nodes: int  # most time nodes that are tried
+    steps: int  # most evaluations of the dual function for each
+    patience: int  # steps of `minimise` after which less is expected
 
 
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     """Return a lower bound of an output's smallest peak over a box, by best-first bisection.
 
-    Returned with it, 0 or more, are unit coordinates (d,) that the bound of the lowest cell names.
+    Returns:
+        The bound, 0 or more, and the unit coordinates (d,) that the bound of the lowest cell names:
+        inputs at which the peak is expected to be small.
     """
-    sides = [OutputBounds.initial(level, output, s, 0.0) for s in (0, 1)]
-    both, data = (sides[0].data, sides[1].data), sides[0].data
-    constants = np.stack([bounds.constant.sum(0) for bounds in sides])
-    multipliers = np.zeros((constants.shape[1], len(data.linear)))  # of a node, for further cells
-    tuned = numbers.LEAST_PEAK_NODES, numbers.LEAST_PEAK_STEPS, numbers.LEAST_PEAK_PATIENCE
-    effort = tuple(map(int, tuned))
+    sides = [OutputBounds.initial(level, output, side, 0.0) for side in (0, 1)]
+    data_of_sides = sides[0].data, sides[1].data
+    data = sides[0].data
+    constants = np.stack([bounds.constant.sum(axis=0) for bounds in sides])
+    # multipliers of each node, at which further cells begin
+    multipliers = np.zeros((constants.shape[1], len(data.linear)))
+    effort = CellEffort(
+        nodes=int(numbers.LEAST_PEAK_NODES),
+        steps=int(numbers.LEAST_PEAK_STEPS),
+        patience=int(numbers.LEAST_PEAK_PATIENCE),
+    )
 
-    def bounded_cell(ends: Ints, number: int, outer_bound: float) -> PeakCell:
+    def bounded_cell(ends: Ints, number: int, parent_bound: float) -> PeakCell:
         at = np.zeros(data.linear.shape[1])
-        bound, node = _bound_cell(ends, both, constants, effort, multipliers, at)
-        return PeakCell(max(bound, outer_bound), number, ends, node, at)
+        bound, node = _bound_cell(ends, data_of_sides, constants, effort, multipliers, at)
+        return PeakCell(max(bound, parent_bound), number, ends, node, at)
 
-    cells = [bounded_cell(data.ends.astype(np.int64), 0, 0.0)]
+    cells = [bounded_cell(data.cell.astype(np.int64), 0, 0.0)]
     for number in range(1, 2 * int(numbers.LEAST_PEAK_BISECTIONS), 2):
         lowest = cells[0]
-        halves = [
-            bounded_cell(ends, number + k, lowest.bound)
-            for k, ends in enumerate(_halves(lowest, data))
-        ]
-        if not halves:
+        halves = _halves(lowest, data)
+        if halves is None:
             break
-        heapreplace(cells, halves[0])
-        heappush(cells, halves[1])
+        lower_half, upper_half = halves
+        heapreplace(cells, bounded_cell(lower_half, number, lowest.bound))
+        heappush(cells, bounded_cell(upper_half, number + 1, lowest.bound))
     return cells[0].bound, cells[0].at
 
 
@@ -69,62 +82,103 @@ def _bound_cell(
     ends: Ints,
     sides: tuple[Data, Data],
     constants: Array,
-    effort: tuple[int, int, int],
+    effort: CellEffort,
     multipliers: Array,
     at: Array,
 ) -> tuple[float, int]:
-    """Largest dual bound over a cell at peaks of its middle's motion, and its node; writes `at`."""
-    # `sides` and `constants` (2, T), added to bounds, are of −output and the output; `multipliers`
-    # (T, Z) are improved
-    (tries, steps, patience), data = effort, sides[0]
-    motion = np.zeros(data.table.shape[2])
-    for k in range(len(ends)):  # at the middle of the mode's cell
-        row = (ends[k, 2] + ends[k, 3]) // 2 * int(data.points[0])
-        for s in range(data.share.shape[1]):
-            waves = data.table[k, s, :, row + (ends[k, 0] + ends[k, 1]) // 2]
-            motion += data.share[k, s] * waves
-    size, untried = np.abs(motion), np.abs(motion)  # −1 where it is no peak or tried
-    for t in range(len(size)):
-        if size[t] < max(size[max(t - 1, 0)], size[min(t + 1, len(size) - 1)]):
+    """Return the largest lower bound of |output| over a cell at some time nodes, and its node.
+
+    The nodes are peaks over time of the response at the middle of the cell, the largest first.
+
+    Args:
+        ends: Cell of the modes' tables, shape (K, 4).
+        sides: Models and tables of −output and output.
+        constants: What is added to the dual bounds of −output and output, shape (2, T).
+        effort: What the cell is worth.
+        multipliers: Multipliers of each node, shape (T, Z); improved in place.
+        at: Overwritten with the inputs that the dual bound names, shape (d,).
+    """
+    data = sides[0]
+    response = np.zeros(data.table.shape[2])  # at the middle of the cell
+    for k in range(len(ends)):
+        row = (ends[k, 2] + ends[k, 3]) // 2 * int(data.grid_points[0])
+        for s in range(data.participation.shape[1]):
+            of_mode = data.table[k, s, :, row + (ends[k, 0] + ends[k, 1]) // 2]
+            response += data.participation[k, s] * of_mode
+    magnitude = np.abs(response)
+    untried = np.abs(response)  # −1 at nodes that are no peak over time, or were tried
+    for t in range(len(magnitude)):
+        if magnitude[t] < max(magnitude[max(t - 1, 0)], magnitude[min(t + 1, len(magnitude) - 1)]):
             untried[t] = -1.0
-    highest, highest_node = -np.inf, 0
-    u, disagreement = np.zeros(len(at)), np.empty(multipliers.shape[1])
-    for _ in range(tries):
+    largest = -np.inf
+    largest_node = 0
+    u = np.zeros(len(at))
+    disagreement = np.empty(multipliers.shape[1])  # not used
+    for _ in range(effort.nodes):
         node = int(untried.argmax())
-        if untried[node] <= max(highest, -1.0):
+        if untried[node] <= max(largest, -1.0):
             break
-        untried[node], s = -1.0, int(motion[node] < 0)  # where it is positive, of −output
-        mu, side = multipliers[node], 2.0 * s - 1.0
-        dual = minimise(
-            mu, ends, node, side, sides[s], steps, patience, -1e300, -size[node], disagreement, u
+        untried[node] = -1.0
+        # A lower bound of the output where it is positive is an upper bound of −output, number 0.
+        s = int(response[node] < 0)
+        dual_bound = minimise(
+            multipliers[node],
+            ends,
+            node,
+            2.0 * s - 1.0,
+            sides[s],
+            effort.steps,
+            effort.patience,
+            -1e300,  # no target
+            -magnitude[node],
+            disagreement,
+            u,
         )
-        least = -(dual + constants[s, node])
-        if least > highest:
-            highest, highest_node = least, node
+        lower_bound = -(dual_bound + constants[s, node])
+        if lower_bound > largest:
+            largest = lower_bound
+            largest_node = node
             at[:] = u
-    return highest, highest_node
+    return largest, largest_node
 
 
 def call_bound_cell() -> None:
     """Call the kernel of `least_peak` once without a mode; see `KernelThreads`."""
-    data, none = data_without_modes(), np.zeros((0, 0))
-    _bound_cell(np.zeros((0, 4), np.int64), (data, data), none, (0, 0, 0), none, np.zeros(0))
+    data = data_without_modes()
+    none = np.zeros((0, 0))
+    no_ends = np.zeros((0, 4), np.int64)
+    _bound_cell(no_ends, (data, data), none, CellEffort(0, 0, 0), none, np.zeros(0))
 
 
-def _halves(cell: PeakCell, data: Data) -> list[Ints]:
-    """Ends of both halves along the ω or q over which a mode varies most; none if none is left."""
-    largest, chosen, count = -1.0, (0, 0), int(data.points[0])
+def _halves(cell: PeakCell, data: Data) -> tuple[Ints, Ints] | None:
+    """Return the ends (K, 4) of both halves of a cell; None where no range can be halved.
+
+    It is halved along the ω or q of that mode whose contribution varies most along one of its axes
+    at the node of the bound.
+    """
+    largest = -1.0
+    chosen = None
+    width = int(data.grid_points[0])
     for k in range(len(cell.ends)):
         first, last, low, high = map(int, cell.ends[k])
-        table = data.table[k, :, cell.node].reshape(len(data.share[k]), -1, count)  # along q, ω
-        response = np.tensordot(data.share[k], table[:, low : high + 1, first : last + 1], 1)
-        for axis, length in ((0, last - first), (2, high - low)):
-            variation = float(np.ptp(response, axis=1 - axis // 2).max())
+        table = data.table[k, :, cell.node].reshape(len(data.participation[k]), -1, width)
+        in_cell = table[:, low : high + 1, first : last + 1]  # (sources, q, ω)
+        response = np.tensordot(data.participation[k], in_cell, 1)  # (q, ω)
+        along_omega = float(np.ptp(response, axis=1).max())
+        along_q = float(np.ptp(response, axis=0).max())
+        for variation, begin, length in (
+            (along_omega, 0, last - first),
+            (along_q, 2, high - low),
+        ):
             if length > 1 and variation > largest:
-                largest, chosen = variation, (k, axis)
-    if largest < 0:
-        return []
-    k, axis = chosen
-    lower, upper = cell.ends.copy(), cell.ends.copy()
-    lower[k, axis + 1] = upper[k, axis] = cell.ends[k, axis : axis + 2].sum() // 2
-    return [lower, upper]
+                largest = variation
+                chosen = k, begin
+    if chosen is None:
+        return None
+    k, begin = chosen
+    lower = cell.ends.copy()
+    upper = cell.ends.copy()
+    middle = (cell.ends[k, begin] + cell.ends[k, begin + 1]) // 2
+    lower[k, begin + 1] = middle
+    upper[k, begin] = middle
+    return lower, upper

@@ -1,4 +1,7 @@
-"""Models of the motion over one level's box, and bounds of each output and side at all nodes."""
+"""Models of the response over one level of a box, and bounds of each output and side at all nodes.
+
+A side of an output q is −q (number 0) or q (number 1); bounds are upper bounds of side × q.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,8 @@ from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
-from alphacut.frame.modes.models import MotionModels
-from alphacut.frame.modes.structure import Classical
+from alphacut.frame.modes.models import ModalResponseModels
+from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,
@@ -35,233 +38,295 @@ from alphacut.frame.response.straying import (
     narrowed_straying,
 )
 
-POINTS = (8, 80), (3, 12)
-"""Least and most points of a mode's table along ω and along q = g/ω."""
-UNKNOWN = -1e300
-"""Stands for −∞, the model's value where none is known."""
-LEAST_SPREAD = 1e-30
-"""Radius in SI units of a variable that does not vary, so that scaled ones stay finite."""
-GRAIN = 2.0**-24
-"""Distance of multipliers as a fraction of the output's modal responses: far above rounding, so
-that units do not lead them elsewhere, and far below gaps."""
-BLOCK = 40
-"""Nodes that one thread bounds in turn, about."""
-
 
 class ResponseTable(NamedTuple):
-    """Responses of K oscillators to all sources, read by one derivative of the motion."""
+    """Responses of K oscillators to all sources, in one derivative of the displacement."""
 
     value: Array  # responses at the points of each mode's grid, (K, sources, T, Q W)
-    largest: Array  # their largest magnitudes, (K, sources)
-    error: Array  # bounds of what interpolation and round-off miss, (K, sources, T)
-    line_deviation: Array  # bounds of their distance from straight lines between nodes, the same
+    max_magnitude: Array  # their largest magnitudes, (K, sources)
+    error: Array  # bounds of the error of bilinear interpolation and round-off, (K, sources, T)
+    # bounds of their distance from straight lines between time nodes, (K, sources, T)
+    interpolation_error: Array
 
 
 def response_tables(
-    grids: Sequence[Grid], excitation: Excitation, orders: Ints, inputs: int
+    grids: Sequence[Grid], excitation: Excitation, orders: Sequence[int], inputs: int
 ) -> dict[int, ResponseTable]:
-    """Return tables of the responses of oscillators on grids, with bounds of errors, by order.
+    """Return tables of the responses of oscillators on grids, by the order of the derivative.
 
-    `orders` (m,) are the derivatives of the motion that outputs take, `inputs` the number of inputs
-    of the sums that the responses enter.
+    Args:
+        grids: Grid over the frequency and the damping of each oscillator; all of one size.
+        excitation: Loads, time nodes, and the names of the sources.
+        orders: Derivatives of the displacements that outputs take, each once.
+        inputs: Number of inputs of the sums that the responses enter, for their rounding.
 
     Raises:
         UnprovedError: A response is out of the range of the dual function.
     """
     loads, time, sources = excitation
-    found = {order: list[list[ModalResponses]]() for order in sorted(map(int, set(orders)))}
+    by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
     for grid in grids:
-        oscillators = Oscillators(grid, loads, time, found)
-        for order, modes in found.items():
+        oscillators = Oscillators(grid, loads, time, orders)
+        for order, modes in by_order.items():
             modes.append([oscillators.responses(source, order) for source in sources])
-    rounding, tables = 2 * gamma(roundings(len(grids), len(sources), inputs)), {}
-    for order, modes in found.items():
+    rounding = 2 * gamma(roundings(len(grids), len(sources), inputs))
+    tables = {}
+    for order, modes in by_order.items():
         value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
         error = np.array([[x.error for x in mode] for mode in modes])
-        deviation = np.array([[x.line_deviation for x in mode] for mode in modes])
-        sizes = np.abs(value).max(-1)
-        require_in_range({"table": sizes})
-        tables[order] = ResponseTable(value, sizes.max(-1), error + rounding * sizes, deviation)
+        max_magnitude = np.abs(value).max(axis=-1)
+        require_in_range({"table": max_magnitude})
+        tables[order] = ResponseTable(
+            value=value,
+            max_magnitude=max_magnitude.max(axis=-1),
+            error=error + rounding * max_magnitude,
+            interpolation_error=np.array([[x.line_deviation for x in mode] for mode in modes]),
+        )
     return tables
 
 
-def _points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
-    """Numbers of table points along ω and along q = g/ω, the same for all modes."""
-    along_omega, along_q, slowest = 2.0, 2.0, 2 / duration if duration > 0 else np.inf
+def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
+    """Return the numbers of table points along ω and along q = g/ω, the same for all modes.
+
+    The distance of points is a fraction of a mode's decay, since this is the width of the peak of
+    its frequency response, or of the inverse duration where that is larger. More points make the
+    interpolation error of the tables smaller, with the square of their distance, and the dual
+    function slower in proportion to their number.
+    """
+    along_omega = 2.0
+    along_q = 2.0
+    slowest = 2 / duration if duration > 0 else np.inf
     for mode in oscillators:
-        (omega_low, omega_high), (q_low, q_high) = mode.omega_range, mode.quotient_range
+        omega_low, omega_high = mode.omega_range
+        q_low, q_high = mode.quotient_range
         spacing = numbers.TABLE_SPACING * (max(q_low, 0.0) * omega_low + slowest)
         along_omega = max(along_omega, (omega_high - omega_low) / spacing)
         along_q = max(along_q, (q_high - q_low) * omega_high / spacing)
-    return int(np.clip(along_omega, *POINTS[0])) + 1, int(np.clip(along_q, *POINTS[1])) + 1
+    return int(np.clip(along_omega, 8, 80)) + 1, int(np.clip(along_q, 3, 12)) + 1
 
 
 @dataclass(frozen=True, eq=False)
 class LevelModels:
-    """One level's models and tables."""
+    """Models of the response over the box of one level, and response tables."""
 
-    structure: Classical  # the structure over the level's box
-    models: MotionModels  # its motion
-    grids: list[Grid]  # of each oscillator the points of its tables
-    tables: dict[int, ResponseTable]  # responses of its oscillators, by order of derivative
-    excitation: Excitation  # the loads, nodes, and sources
+    structure: ClassicalStructure  # the structure over the box
+    models: ModalResponseModels  # its response
+    grids: list[Grid]  # points of the tables of each oscillator
+    tables: dict[int, ResponseTable]  # responses of the oscillators, by order of derivative
+    excitation: Excitation  # loads, time nodes, and sources
 
     def on_subbox(self, low: Array, high: Array) -> LevelModels:
-        """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
+        """Return the models over the sub-box low ≤ u ≤ high, with the same response tables."""
         return replace(self, models=self.models.on_subbox(low, high))
 
     @classmethod
     def from_structure(
-        cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
+        cls,
+        structure: ClassicalStructure,
+        excitation: Excitation,
+        truncation_tolerance: Array | None = None,
     ) -> LevelModels:
-        """Models of a structure's motion over its box, and the response tables of its oscillators.
+        """Return models of a structure's response over its box, and tables of its oscillators.
 
-        `allowed` is the truncation error of each output that is allowed, (m,); None to enclose as
-        many modes as possible.
+        `truncation_tolerance` is the allowed error of each output by truncated modes, shape (m,);
+        as many modes as possible are enclosed unless it is given.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
-        models = MotionModels.from_structure(structure, excitation, allowed)
-        modes, inputs = models.oscillators, structure.start.inputs
-        points = _points(modes, float(excitation[1][-1]))
-        grids = [grid_over(mode.omega_range, mode.quotient_range, points) for mode in modes]
-        tables = response_tables(grids, excitation, structure.order, inputs)
+        models = ModalResponseModels.from_structure(structure, excitation, truncation_tolerance)
+        points = _table_points(models.oscillators, float(excitation.time[-1]))
+        grids = [
+            grid_over(mode.omega_range, mode.quotient_range, points) for mode in models.oscillators
+        ]
+        inputs = structure.initial_state.inputs
+        tables = response_tables(grids, excitation, structure.distinct_orders, inputs)
         return cls(structure, models, grids, tables, excitation)
 
-    def line_deviation(self) -> Array:
-        """Bound of how far outputs lie beyond both their values in the step to each node, (T, m).
+    def interpolation_error(self) -> Array:
+        """Bound how far outputs lie beyond both their values in the step to each node, (T, m).
 
-        Where no force jumps, it bounds how far they stray from a straight line there.
+        Where no force jumps, it bounds the distance of outputs from a straight line in the step.
         """
-        unresolved = self.models.line_deviation + sum(
-            x.line_deviation for x in self.models.truncated
+        # Contributions whose signs within a step are not known, so that they cannot cancel.
+        unresolved = self.models.interpolation_error + sum(
+            x.interpolation_error for x in self.models.truncated
         )
         by_magnitude: Array = np.array(unresolved)
-        for o, order in enumerate(map(int, self.structure.order)):
-            deviations = self.tables[order].line_deviation
-            for mode, deviation in zip(self.models.oscillators, deviations, strict=True):
-                by_magnitude[:, o] += mode.share.magnitude()[:, o] @ deviation
+        for o, order in enumerate(self.structure.derivative_orders):
+            errors = self.tables[int(order)].interpolation_error
+            for mode, error in zip(self.models.oscillators, errors, strict=True):
+                by_magnitude[:, o] += mode.participation.magnitude()[:, o] @ error
         # The tables of oscillators contain what forces add at once through these; what they add
         # through all other modes is the difference to M⁻¹ b f.
-        time, fed = self.excitation[1], dict(self._feedthroughs())
-        for source, response in fed.items():
+        time = self.excitation.time
+        feedthroughs = dict(self._feedthroughs())
+        for source, response in feedthroughs.items():
             assert response.load is not None
-            of_others = self._fed_through_others(source, response)
+            of_others = self._feedthrough_of_truncated_modes(source, response)
             by_magnitude += np.outer(load_deviation(response.load, time), of_others)
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        responses += fed.values()
-        straying = narrowed_straying(responses, time, by_magnitude, unresolved)
-        if unresolved.any():  # whose change within a step is not known
-            return straying
-        return narrowed_at_jumps(responses, time, straying)
+        responses += feedthroughs.values()
+        narrowed = narrowed_straying(responses, time, by_magnitude, unresolved)
+        if unresolved.any():
+            # Steps in which a force jumps need the change of all contributions within the step.
+            return narrowed
+        return narrowed_at_jumps(responses, time, narrowed)
 
-    def _fed_through_others(self, source: str, fed: Response) -> Array:
-        """Bound of what a unit of a force adds at once by modes that are no oscillators, (m,)."""
-        index, is_acceleration = self.excitation[2].index(source), self.structure.order == 2
-        value: Array = fed.coefficient.real[:, 0, 0]
-        spread: Array = fed.spread[0]
+    def _feedthrough_of_truncated_modes(self, source: str, feedthrough: Response) -> Array:
+        """Bound what a unit of a force adds at once by modes that are no oscillators, (m,).
+
+        `feedthrough` is what the force adds by all modes.
+        """
+        index = self.excitation.sources.index(source)
+        is_acceleration = self.structure.derivative_orders == 2
+        midpoint: Array = feedthrough.coefficient.real[:, 0, 0]
+        radius: Array = feedthrough.spread[0]
         for mode in self.models.oscillators:
-            share = mode.share[index]
-            value = value - np.where(is_acceleration, share.value, 0.0)
-            spread = spread + np.where(is_acceleration, share.deviation(), 0.0)
-        return np.asarray(np.abs(value) + spread)
+            participation = mode.participation[index]
+            midpoint = midpoint - np.where(is_acceleration, participation.value, 0.0)
+            radius = radius + np.where(is_acceleration, participation.deviation(), 0.0)
+        return np.asarray(np.abs(midpoint) + radius)
 
     def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
-        """What each force adds to accelerations at once, M⁻¹ b f of all modes, by its source."""
+        """Yield each force's source and what it adds to accelerations at once, M⁻¹ b f."""
         structure = self.structure
-        rows = np.where((structure.order == 2)[:, None], structure.rows, 0.0)
-        for source in self.excitation[2]:
-            if is_fed_through(source, 2) and rows.any():
-                fed = (structure.forced[source][None] @ rows.T)[0] * structure.factor
-                spread = np.stack([fed.deviation(), 0 * fed.deviation()])
-                kappa = fed.value[:, None, None]
-                yield source, Response(None, self.excitation[0][source], 2, kappa, spread)
+        takes_acceleration = (structure.derivative_orders == 2)[:, np.newaxis]
+        rows = np.where(takes_acceleration, structure.output_rows, 0.0)
+        if not rows.any():
+            return
+        for source in self.excitation.sources:
+            if is_fed_through(source, 2):
+                accelerations = structure.force_accelerations[source]
+                coefficient = (accelerations[None] @ rows.T)[0] * structure.output_factors
+                real_radius = coefficient.deviation()
+                yield (
+                    source,
+                    Response(
+                        sigma=None,
+                        load=self.excitation.loads[source],
+                        order=2,
+                        coefficient=coefficient.value[:, np.newaxis, np.newaxis],
+                        spread=np.stack([real_radius, 0 * real_radius]),
+                    ),
+                )
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
-        """What a mode adds to outputs by each source, without what forces add at once."""
-        (loads, _, sources), orders = self.excitation, self.structure.order
+        """Yield what a mode adds to outputs by each source, without what forces add at once."""
+        loads, _, sources = self.excitation
+        orders = self.structure.derivative_orders
         points = int(numbers.DEVIATION_POINTS), 3
         sigma = grid_over(mode.omega_range, mode.quotient_range, points).sigma
-        for source, value, spread in zip(
-            sources, mode.share.value, mode.share.deviation(), strict=True
-        ):
-            real, imag = (read_response(source, sigma, np.full_like(sigma, x)) for x in (1, -1j))
-            for order in map(int, set(orders)):
-                share, off = value * (orders == order), spread * (orders == order)
-                kappa = share[:, None, None] * (real + 1j * imag)
-                kappa_off = np.outer([np.abs(x).max() for x in (real, imag)], off)
-                yield Response(sigma, loads.get(source), order, kappa, kappa_off)
+        midpoints = mode.participation.value
+        radii = mode.participation.deviation()
+        for source, midpoint, radius in zip(sources, midpoints, radii, strict=True):
+            # e = Re κ G with κ = κ_r + i κ_i: κ_r is what e is for G = 1, κ_i for G = −i.
+            real = read_response(source, sigma, np.full_like(sigma, 1))
+            imag = read_response(source, sigma, np.full_like(sigma, -1j))
+            largest = [np.abs(real).max(), np.abs(imag).max()]
+            for order in self.structure.distinct_orders:
+                of_order = orders == order
+                participation = (midpoint * of_order)[:, np.newaxis, np.newaxis]
+                yield Response(
+                    sigma=sigma,
+                    load=loads.get(source),
+                    order=order,
+                    coefficient=participation * (real + 1j * imag),
+                    spread=np.outer(largest, radius * of_order),
+                )
 
 
 @dataclass(eq=False)
 class OutputBounds:
-    """Bounds of side × one output at all T nodes, d inputs."""
+    """Bounds of side × one output at all T nodes, over a box of d inputs."""
 
-    # number of the output in the level's models, and 0 for −output or 1 for the output
-    index: tuple[int, int]
-    wanted_gap: float  # distance of bound and reached value that suffices
-    reached: float  # largest value of side × output that is known to be reached
-    constant: Array  # what the motion has besides the model, and what a bound has besides, (2, T)
+    index: tuple[int, int]  # number of the output in the models of the level, and of the side
+    wanted_gap: float  # distance of bound and attained value that suffices
+    attained: float  # largest value of side × output over time that is known to be attained
+    # constants (2, T): what the response has besides the model `data`, and what an upper bound
+    # adds to that for everything that is bounded by magnitude
+    constant: Array
     data: Data  # models and tables of the output
-    out: Array  # bounds and the model's values, (2, T)
-    at: Array  # inputs of the model's values, (T, d)
+    upper: Array  # guaranteed upper bounds of side × output, (T,)
+    model_value: Array  # largest values of the model that are known, not guaranteed, (T,)
+    model_inputs: Array  # unit coordinates at which the model has these values, (T, d)
 
     @classmethod
     def initial(
-        cls, level: LevelModels, o: int, s: int, wanted_gap: float, reached: float = 0.0
+        cls, level: LevelModels, output: int, side: int, wanted_gap: float, attained: float = 0.0
     ) -> OutputBounds:
-        """Infinite bounds of output number o of a level's models, of −output where s = 0."""
-        data, constant = _data(level, o, (-1.0, 1.0)[s])
-        out = np.zeros_like(constant) + np.array([[np.inf], [UNKNOWN]])
-        at = np.zeros((out.shape[1], data.linear.shape[1]))
-        return cls((o, s), wanted_gap, reached, constant, data, out, at)
+        """Return infinite bounds of a side of an output of a level's models, given by numbers."""
+        data, constant = _dual_function_data(level, output, (-1.0, 1.0)[side])
+        nodes = constant.shape[1]
+        return cls(
+            index=(output, side),
+            wanted_gap=wanted_gap,
+            attained=attained,
+            constant=constant,
+            data=data,
+            upper=np.full(nodes, np.inf),
+            model_value=np.full(nodes, -1e300),  # for −∞, which kernels could not subtract
+            model_inputs=np.zeros((nodes, data.linear.shape[1])),
+        )
 
     @property
     def side(self) -> float:
         """−1 or 1."""
         return (-1.0, 1.0)[self.index[1]]
 
-    def nodes_above(self, nodes: Ints) -> Ints:
-        """Those of some nodes whose bound exceeds the reached value by more than the wanted gap."""
-        return nodes[self.out[0, nodes] > self.reached + self.wanted_gap]
+    def nodes_above_peak(self, nodes: Ints) -> Ints:
+        """Return those of some nodes whose bound exceeds attained value + wanted gap."""
+        return nodes[self.upper[nodes] > self.attained + self.wanted_gap]
 
     def open_nodes(self, slack_below_peak: float) -> Ints:
-        """Nodes (J,) whose bound exceeds the model's value by more than suffices; see `Effort`."""
-        bound, value = self.out
-        below_peak = np.maximum(max(value.max(), self.reached) - value, 0.0)
-        return np.flatnonzero(bound - value > self.wanted_gap + slack_below_peak * below_peak)
+        """Return nodes (J,) whose bound exceeds the model value by too much; see `Effort`."""
+        peak = max(self.model_value.max(), self.attained)
+        below_peak = np.maximum(peak - self.model_value, 0.0)
+        sufficient = self.wanted_gap + slack_below_peak * below_peak
+        return np.flatnonzero(self.upper - self.model_value > sufficient)
 
     def effort(
         self, cells: int, steps: int, slack_below_peak: float = 0.0, remainder_multiple: float = 0.0
     ) -> Effort:
-        """Effort for a node, compared with the largest value so far; arguments are its fields."""
-        incumbent = float(max(self.out[1].max(), self.reached))
-        steps_of_model, grace = int(numbers.ASCENTS), int(numbers.CELL_GRACE)
-        tuned = int(numbers.PATIENCE), steps_of_model, grace, numbers.MIN_CELL_PROGRESS
-        of_node = cells, steps, slack_below_peak, remainder_multiple
-        return Effort(*of_node, self.wanted_gap, incumbent, *tuned)
+        """Return the effort for a node; the arguments are its fields of these names."""
+        return Effort(
+            cells=cells,
+            steps=steps,
+            slack_below_peak=slack_below_peak,
+            remainder_multiple=remainder_multiple,
+            wanted_gap=self.wanted_gap,
+            incumbent=float(max(self.model_value.max(), self.attained)),
+            patience=int(numbers.PATIENCE),
+            ascents=int(numbers.ASCENTS),
+            grace=int(numbers.CELL_GRACE),
+            min_progress=numbers.MIN_CELL_PROGRESS,
+        )
 
     def improve(self, nodes: Ints, effort: Effort) -> None:
-        """Lower the bounds and raise the model's values at nodes (J,), reading no others."""
-        new, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
-        bound_nodes(nodes, self.side, effort, self.constant, self.data, new, at)
-        better = new[1] > self.out[1, nodes]
-        self.at[nodes[better]] = at[better]
-        self.out[1, nodes] = np.maximum(self.out[1, nodes], new[1])
-        self.out[0, nodes] = np.minimum(self.out[0, nodes], new[0])
+        """Lower the bounds and raise the model values at rising nodes (J,), in place.
+
+        Entries at other nodes are neither read nor written.
+        """
+        upper_and_value = np.empty((2, len(nodes)))
+        inputs = np.empty((len(nodes), self.model_inputs.shape[1]))
+        bound_nodes(nodes, self.side, effort, self.constant, self.data, upper_and_value, inputs)
+        new_upper, new_value = upper_and_value
+        is_better = new_value > self.model_value[nodes]
+        self.model_inputs[nodes[is_better]] = inputs[is_better]
+        self.model_value[nodes] = np.maximum(self.model_value[nodes], new_value)
+        self.upper[nodes] = np.minimum(self.upper[nodes], new_upper)
 
     def improve_peak(self, nodes: Ints, effort: Effort) -> None:
         """Lower the highest bound of nodes (J,): the highest first, until one remains the highest.
 
-        Lower bounds of others would not lower that of the peak.
+        Lower bounds at other nodes would not lower that of the peak.
         """
         peak = -np.inf
-        for node in nodes[np.argsort(-self.out[0, nodes], kind="stable")]:
-            if self.out[0, node] <= peak:
+        for node in nodes[np.argsort(-self.upper[nodes], kind="stable")]:
+            if self.upper[node] <= peak:
                 break
             self.improve(np.array([node]), effort)
-            peak = max(peak, float(self.out[0, node]))
+            peak = max(peak, float(self.upper[node]))
 
 
 def improve_all(
@@ -271,102 +336,165 @@ def improve_all(
     *,
     peaks_alone: bool = False,
 ) -> None:
-    """Improve bounds at nodes by threads, in blocks; each node begins where the last one ended.
+    """Improve bounds at nodes by threads, in place.
 
-    Efforts are fixed before, so that no bound depends on which thread ends first. With
-    `peaks_alone` the highest bound of each job is lowered, and others for its sake.
+    Each job is some bounds, the nodes (J,) at which they are improved, and the effort for a node.
+    Efforts are fixed beforehand, so that no bound depends on which thread ends first. With
+    `peaks_alone` only the highest bound of each job is lowered, and others for its sake. `tick` is
+    called with the completed fraction.
     """
-    futures = [
-        pool.submit(bounds.improve_peak if peaks_alone else bounds.improve, block, effort)
-        for bounds, nodes, effort in jobs
-        if len(nodes)
-        for block in np.array_split(nodes, 1 if peaks_alone else -(-len(nodes) // BLOCK))
-    ]
+    futures = []
+    for bounds, nodes, effort in jobs:
+        if not len(nodes):
+            continue
+        if peaks_alone:
+            futures.append(pool.submit(bounds.improve_peak, nodes, effort))
+            continue
+        # In a block each node begins at the multipliers of the one before. About 40 nodes make few
+        # blocks begin anew, and still keep all threads busy.
+        for block in np.array_split(nodes, -(-len(nodes) // 40)):
+            futures.append(pool.submit(bounds.improve, block, effort))
     for done, future in enumerate(futures, start=1):
         future.result()
         tick(done / len(futures))
 
 
-def _data(level: LevelModels, o: int, side: float) -> tuple[Data, Array]:
-    """Models and tables of output o, and constants of the motion and of a bound, (2, T)."""
-    modes, order = level.models.oscillators, int(level.structure.order[o])
-    models = [(mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in modes]
-    variables = concatenate([x for of_mode in models for x in of_mode], -1)
-    spread = np.maximum(variables.deviation(), 1e-9 * np.abs(variables.value))
-    radius = np.maximum(spread, LEAST_SPREAD)  # by which variables are scaled, shape (Z,)
-    linear, quadratic, cubic, remainder = _scaled(variables, radius)
-    expected = numbers.EXPECTED_CUBIC * np.asarray(np.abs(cubic).sum(1))
-    # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
-    of_sums = 8 * gamma(roundings(len(modes), modes[0].share.shape[0], linear.shape[1]))
-    grids, table = level.grids, level.tables[order]
-    centres, radii = (x.reshape(len(modes), -1) for x in (variables.value, radius))
+def _dual_function_data(level: LevelModels, output: int, side: float) -> tuple[Data, Array]:
+    """Return the models and tables of one side of an output, and the constants of its bounds.
+
+    The intervening variables of K modes, each ω, g and one participation factor for each source,
+    are scaled to z = (variable − midpoint) / radius, which lies in [−1, 1] over the box.
+
+    Returns:
+        `Data`, and the constants (2, T) of `OutputBounds.constant`.
+    """
+    modes = level.models.oscillators
+    table = level.tables[int(level.structure.derivative_orders[output])]
+    variables = concatenate(
+        [
+            x
+            for mode in modes
+            for x in (mode.omega[None], mode.decay[None], mode.participation[:, output])
+        ],
+        -1,
+    )
+    # The lower limits keep variables finite that do not vary over the box.
+    radius = np.maximum(variables.deviation(), 1e-9 * np.abs(variables.value))
+    radius = np.maximum(radius, 1e-30)
+    scaled = _scaled(variables, radius)
+    expected_cubic = numbers.EXPECTED_CUBIC * np.asarray(np.abs(scaled.cubic).sum(axis=1))
+    # Rounding of the sums that multipliers enter: scaled variables are at most 1 by magnitude, and
+    # those of the tables' points, which reach a little further, are at most 2 or so.
+    sources = modes[0].participation.shape[0]
+    rounding = 8 * gamma(roundings(len(modes), sources, scaled.linear.shape[1]))
+
+    midpoints = variables.value.reshape(len(modes), -1)
+    radii = radius.reshape(len(modes), -1)
+    grids = level.grids
     omega = np.stack([np.tile(grid.omega, len(grid.quotient)) for grid in grids])
-    decay = np.stack([(grid.quotient[:, None] * grid.omega).ravel() for grid in grids])
-    start = np.array([[grid.omega[0], grid.quotient[0]] for grid in grids])
-    second = np.array([[grid.omega[1], grid.quotient[1]] for grid in grids])
-    ends = [mode.places(grid) for mode, grid in zip(modes, grids, strict=True)]
-    sizes = [np.abs(mode.share.value[:, o]) for mode in modes]
-    responses = float((np.array(sizes) * table.largest).sum())
-    truncated_terms, constant = _truncation_terms(level, o, side)
+    decay = np.stack([np.outer(grid.quotient, grid.omega).ravel() for grid in grids])
+    first_points = np.array([[grid.omega[0], grid.quotient[0]] for grid in grids])
+    second_points = np.array([[grid.omega[1], grid.quotient[1]] for grid in grids])
+    cells = [mode.table_cell(grid) for mode, grid in zip(modes, grids, strict=True)]
+    participations = np.array([np.abs(mode.participation.value[:, output]) for mode in modes])
+    response_scale = float((participations * table.max_magnitude).sum())
+    truncated, constant = _truncated_terms(level, output, side)
     data = Data(
         table=table.value,
-        omega=(omega - centres[:, [0]]) / radii[:, [0]],
-        decay=(decay - centres[:, [1]]) / radii[:, [1]],
-        start=start,
-        step=second - start,
-        points=np.array([len(grids[0].omega), len(grids[0].quotient)], float),
-        ends=np.array(ends, float),
-        centre=centres[:, :2].copy(),
+        omega=(omega - midpoints[:, [0]]) / radii[:, [0]],
+        decay=(decay - midpoints[:, [1]]) / radii[:, [1]],
+        grid_start=first_points,
+        grid_step=second_points - first_points,
+        grid_points=np.array([len(grids[0].omega), len(grids[0].quotient)], float),
+        cell=np.array(cells, float),
+        midpoint=midpoints[:, :2].copy(),
         radius=radii[:, :2].copy(),
-        share=centres[:, 2:].copy(),
-        reach=radii[:, 2:].copy(),
-        linear=linear,
-        quadratic=quadratic,
-        cubic=cubic,
-        expected=expected,
-        remainder=remainder + of_sums + expected,
-        truncated_response=truncated_terms[0],
-        truncated_linear=truncated_terms[1],
-        truncated_quadratic=truncated_terms[2],
-        grain=np.array([GRAIN * responses or 1.0]),
+        participation=midpoints[:, 2:].copy(),
+        participation_radius=radii[:, 2:].copy(),
+        linear=scaled.linear,
+        quadratic=scaled.quadratic,
+        cubic=scaled.cubic,
+        expected_cubic=expected_cubic,
+        remainder=scaled.remainder + rounding + expected_cubic,
+        truncated_response=truncated.response,
+        truncated_linear=truncated.linear,
+        truncated_quadratic=truncated.quadratic,
+        # Far above rounding, so that units do not lead multipliers elsewhere, and far below gaps.
+        multiplier_spacing=np.array([2.0**-24 * response_scale or 1.0]),
     )
     require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
     return data, constant
 
 
-def _truncation_terms(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
-    """Fields of `Data` on truncated modes, and constants of the motion and of a bound, (2, T)."""
-    modes, table = level.models.oscillators, level.tables[int(level.structure.order[o])]
-    constant: Array = np.zeros((2, len(level.excitation[1])))
-    constant[1] = level.models.added[:, o]
+class _TruncatedTerms(NamedTuple):
+    """Terms of an output that are sums over truncated modes: response × model of the inputs."""
+
+    response: Array  # midpoints and radii of the responses, in turn, (terms, T)
+    linear: Array  # linear coefficients of their factors, (terms, inputs)
+    quadratic: Array  # quadratic coefficients, packed by rows, (terms, inputs (inputs + 1)/2)
+
+
+def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_TruncatedTerms, Array]:
+    """Return the terms of truncated modes, and the constants (2, T) of `OutputBounds.constant`.
+
+    Truncated modes add P m(t) ± R r(t) with a sum P of participation factors, an amplitude R, and
+    the midpoint m and the radius r of the interval of their responses (`TruncatedModes`). An upper
+    bound of side × output thus contains side P m + R r.
+    """
+    modes = level.models.oscillators
+    table = level.tables[int(level.structure.derivative_orders[output])]
+    constant: Array = np.zeros((2, len(level.excitation.time)))
+    constant[1] = level.models.coupling[:, output]
     for mode, error in zip(modes, table.error, strict=True):
-        constant[1] += mode.share.magnitude()[:, o] @ error
-    d, sources = level.structure.rayleigh.inputs, modes[0].share.shape[0]
+        constant[1] += mode.participation.magnitude()[:, output] @ error
+    d = level.structure.rayleigh.inputs
     if not level.models.truncated:
-        return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
-    waves, models = list[Array](), list[TaylorModel]()
+        none = _TruncatedTerms(np.zeros((0, 1)), np.zeros((0, d)), np.zeros((0, d * (d + 1) // 2)))
+        return none, constant
+
+    responses = list[Array]()
+    factors = list[TaylorModel]()
     for truncated in level.models.truncated:
-        middle, half = truncated.middle[:, o], truncated.half[:, o]
-        waves += [middle, side * half]
-        models += [truncated.share[:, o], truncated.amplitude[:, o]]
-        constant[0] += side * truncated.share.value[:, o] @ middle
-        constant[1] += truncated.amplitude.value[:, o] @ half
-    wave, model = np.concatenate(waves), concatenate(models, -1)
-    linear, quadratic, cubic, remainder = _scaled(model, np.ones(len(wave)))
-    constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)
-    size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
-    constant[1] += gamma(roundings(len(modes), sources, d)) * (size @ np.abs(wave))
-    constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
-    return [wave, linear, quadratic], constant
+        midpoint = truncated.response_midpoint[:, output]
+        radius = truncated.response_radius[:, output]
+        participation = truncated.participation[:, output]
+        amplitude = truncated.amplitude[:, output]
+        responses += [midpoint, side * radius]
+        factors += [participation, amplitude]
+        constant[0] += side * participation.value @ midpoint
+        constant[1] += amplitude.value @ radius
+    response = np.concatenate(responses)
+    scaled = _scaled(concatenate(factors, -1), np.ones(len(response)))
+    # The cubic terms and the remainders of the factors are bounded by magnitude.
+    constant[1] += (scaled.remainder + np.abs(scaled.cubic).sum(axis=1)) @ np.abs(response)
+    # Rounding of the linear and quadratic terms, and of these constants.
+    sources = modes[0].participation.shape[0]
+    magnitude = np.abs(scaled.linear).sum(axis=1) + np.abs(scaled.quadratic).sum(axis=1)
+    constant[1] += gamma(roundings(len(modes), sources, d)) * (magnitude @ np.abs(response))
+    constant[1] += gamma(len(response) + 4) * np.abs(constant).sum(axis=0)
+    return _TruncatedTerms(response, scaled.linear, scaled.quadratic), constant
 
 
-def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
-    """Linear, quadratic and cubic coefficients of models (Z,), and remainders, over `radius`."""
-    pairs = monomials(x.inputs, 2)
-    by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))  # i ≤ j, as the kernel has them
-    remainder = np.asarray(x.remainder + gamma(8) * x.magnitude())
-    parts = (
-        (part / radius).T
-        for part in (x.homogeneous_part(1), x.homogeneous_part(2)[by_rows], x.homogeneous_part(3))
+class _ScaledModels(NamedTuple):
+    """Coefficients of Z Taylor models of d inputs, each over its radius."""
+
+    linear: Array  # (Z, d)
+    quadratic: Array  # of u_i u_j, i ≤ j, packed by rows, (Z, d (d + 1)/2)
+    cubic: Array  # (Z, monomials of third degree)
+    remainder: Array  # with the rounding of the coefficients, (Z,)
+
+
+def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
+    """Return the coefficients of Taylor models, shape (Z,), divided by radii of this shape."""
+    pairs = monomials(models.inputs, 2)
+    by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))  # the order i ≤ j that the kernels use
+    remainder = np.asarray(models.remainder + gamma(8) * models.magnitude())
+    linear = models.homogeneous_part(1) / radius
+    quadratic = models.homogeneous_part(2)[by_rows] / radius
+    cubic = models.homogeneous_part(3) / radius
+    return _ScaledModels(
+        linear=np.ascontiguousarray(linear.T),
+        quadratic=np.ascontiguousarray(quadratic.T),
+        cubic=np.ascontiguousarray(cubic.T),
+        remainder=remainder / radius,
     )
-    return (*(np.ascontiguousarray(part) for part in parts), remainder / radius)

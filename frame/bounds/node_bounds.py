@@ -1,7 +1,8 @@
 """Bounds at nodes: best-first bisection of the modes' frequencies and damping, with dual bounds.
 
-Where the bound at a node is too far above a value of the model, the cell of the modes' tables with
-the largest bound is halved: ranges of the few ω and g/ω of a mode, not of the many inputs.
+A cell is a range of the table of each mode, that is of its ω and q = g/ω. Where the bound at a node
+is too far above a value of the model, the cell with the largest bound is halved along the ω or q of
+one mode: few ranges, where the inputs are many.
 """
 
 from __future__ import annotations
@@ -22,9 +23,6 @@ from alphacut.frame.bounds.dual_function import (
     products,
 )
 
-GRID = 2.0**24
-"""Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
-
 
 class Effort(NamedTuple):
     """Effort that a node is worth."""
@@ -34,65 +32,79 @@ class Effort(NamedTuple):
     # addition to the wanted gap of a node below the peak, as a fraction of its distance from the
     # peak; at 1 only bounds above the peak count
     slack_below_peak: float
-    # least gap worth any effort, as a multiple of what the remainders of the Taylor models add to
-    # the bound
+    # smallest gap worth any effort, as a multiple of what the remainders of the Taylor models add
+    # to the bound
     remainder_multiple: float
     wanted_gap: float  # distance of bound and model value that suffices
-    incumbent: float  # the largest reached value of side × output over time
+    incumbent: float  # the largest attained value of side × output over time
     patience: int  # steps of `minimise` after which less is expected
     ascents: int  # most steps of the model's ascent
     grace: int  # cells after which the fall of the gap counts
-    min_progress: float  # least fall of the gap, as a fraction of an even fall to what suffices
+    min_progress: float  # smallest fall of the gap, as a fraction of an even fall to what suffices
 
 
 class Cells(NamedTuple):
-    """Parts of the modes' tables with their dual bounds, at most `Effort.cells` of them."""
+    """Cells of the modes' tables with their dual bounds, at most `Effort.cells` of them."""
 
-    ends: Ints  # first and last point along ω and along q = g/ω of each mode's table, (…, K, 4)
-    mu: Array  # multipliers μ, (…, Z)
-    # |μ_z| times the distance of variable z between the inputs of the maxima over the tables and
-    # over the box in D(μ), (…, Z)
-    disagreement: Array
-    value: Array  # upper bounds D(μ) over the cells, (…,)
+    # first and last point along ω, then along q = g/ω, of each mode's table, (cells, K, 4)
+    ends: Ints
+    mu: Array  # multipliers μ, (cells, Z)
+    disagreement: Array  # of the variables for these multipliers, see `minimise`, (cells, Z)
+    value: Array  # upper bounds D(μ) over the cells, (cells,)
 
 
 @compiled
 def bound_nodes(
     nodes: Ints, side: float, effort: Effort, constants: Array, data: Data, out: Array, at: Array
 ) -> None:
-    """Write upper bounds of side × output at rising time nodes (J,), each begun from the last.
+    """Write upper bounds of side × output at rising time nodes (J,).
 
-    At each node the output's dual function D(μ), see `dual_function`, is minimised over cells of
-    the modes' tables, and the cell of the largest bound is halved until that is near a value of the
-    model: best-first bisection of the ranges of the modes' ω and q = g/ω.
+    At each node the dual function D(μ), see `dual_function`, is minimised over cells of the modes'
+    tables, and the cell of the largest bound is halved until that is near a value of the model. The
+    bound at the node is the largest over its cells. Each node begins at the multipliers and inputs
+    of the one before.
 
-    `constants` (2, T) are added to the model's value for the motion's, and to both for the bound.
-    Written are `out` (2, J), bounds of side × output and the model's values of it, and `at` (J, L),
-    the inputs of the latter.
+    Args:
+        nodes: Numbers of the time nodes.
+        side: −1 or 1.
+        effort: What a node is worth.
+        constants: What is added to the model value for the response, and to that sum for the bound,
+            shape (2, T).
+        data: Models and tables.
+        out: Overwritten with the bounds, and with the model's values of side × output at the best
+            inputs found, shape (2, J).
+        at: Overwritten with these inputs, shape (J, L).
     """
-    max_cells, Z = effort.cells, len(data.linear)
+    max_cells = effort.cells
+    variables = len(data.linear)
     cells = Cells(
-        np.zeros((max_cells, len(data.share), 4), np.int64),
-        np.zeros((max_cells, Z)),
-        np.zeros((max_cells, Z)),
+        np.zeros((max_cells, len(data.participation), 4), np.int64),
+        np.zeros((max_cells, variables)),
+        np.zeros((max_cells, variables)),
         np.zeros(max_cells),
     )
-    mu, u = np.zeros(Z), np.zeros(data.linear.shape[1])  # of undivided tables; of the model's value
+    mu = np.zeros(variables)  # of undivided tables
+    u = np.zeros(data.linear.shape[1])  # inputs of the model value
     for j in range(len(nodes)):
-        node, constant = nodes[j], constants[:, nodes[j]]
-        cells.ends[0], cells.mu[0], cells.value[0] = data.ends.astype(np.int64), mu, np.inf
+        node = nodes[j]
+        constant = constants[:, node]
+        cells.ends[0] = data.cell.astype(np.int64)
+        cells.mu[0] = mu
+        cells.value[0] = np.inf
         model_value = ascend(u, node, side, data, effort.ascents)
         target = target_value(model_value, 0.0, effort, constant)
         model_value = bound_cell(0, node, side, data, effort, target, cells, model_value, u)
         mu[:] = cells.mu[0]
-        least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
-        count, first_bound = 1, cells.value[0]
+        of_remainders = constant[1] + dot(np.abs(mu), data.remainder)
+        min_gap = effort.remainder_multiple * of_remainders
+        count = 1
+        first_bound = cells.value[0]
         while count < max_cells:
             worst = int(np.argmax(cells.value[:count]))
-            target = target_value(model_value, least_gap, effort, constant)
-            fall = (first_bound - target) * effort.min_progress * count / max_cells
-            falls_slowly = count >= effort.grace and cells.value[worst] > first_bound - fall
-            if cells.value[worst] <= target or falls_slowly:
+            target = target_value(model_value, min_gap, effort, constant)
+            even_fall = (first_bound - target) * effort.min_progress * count / max_cells
+            falls_slowly = cells.value[worst] > first_bound - even_fall
+            if cells.value[worst] <= target or (count >= effort.grace and falls_slowly):
                 break
             if not halve_cell(cells, worst, count):
                 break
@@ -108,7 +120,7 @@ def bound_nodes(
 
 def call_bound_nodes() -> None:
     """Call `bound_nodes` once without a node; see `KernelThreads`."""
-    none, data = np.zeros((2, 0)), data_without_modes()
+    none = np.zeros((2, 0))
     effort = Effort(
         cells=0,
         steps=0,
@@ -121,14 +133,19 @@ def call_bound_nodes() -> None:
         grace=0,
         min_progress=0.0,
     )
-    bound_nodes(np.zeros(0, np.int64), 1.0, effort, none, data, none, np.zeros((0, 0)))
+    no_nodes = np.zeros(0, np.int64)
+    no_inputs = np.zeros((0, 0))
+    bound_nodes(no_nodes, 1.0, effort, none, data_without_modes(), none, no_inputs)
 
 
 @compiled
-def target_value(model_value: float, least_gap: float, effort: Effort, constant: Array) -> float:
-    """Value of the dual function at which a node's bound is as tight as asked for."""
+def target_value(model_value: float, min_gap: float, effort: Effort, constant: Array) -> float:
+    """Return the value of the dual function at which a node's bound is as tight as asked for.
+
+    `min_gap` is the smallest gap worth any effort, `constant` (2,) are the node's constants.
+    """
     below_peak = max(0.0, effort.incumbent - model_value - constant[0])
-    gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak
+    gap = max(effort.wanted_gap, min_gap) + effort.slack_below_peak * below_peak
     return model_value + gap - constant[1]
 
 
@@ -144,41 +161,64 @@ def bound_cell(
     model_value: float,
     u: Array,
 ) -> float:
-    """Improve the dual bound of a cell; return the largest model value so far, at inputs `u`."""
-    here, steps, patience = np.empty(len(u)), effort.steps, effort.patience
-    ends, mu, disagreement = cells.ends[cell], cells.mu[cell], cells.disagreement[cell]
-    value = minimise(
-        mu, ends, node, side, data, steps, patience, target, model_value, disagreement, here
+    """Improve the dual bound of one of `cells`, in place; return the largest model value so far.
+
+    The multipliers and the disagreement of the cell are overwritten too. `model_value` is the
+    largest value of side × output in the model that is known before, at the inputs `u` (L,); where
+    a larger one is found, `u` is overwritten.
+    """
+    inputs = np.empty(len(u))
+    bound = minimise(
+        cells.mu[cell],
+        cells.ends[cell],
+        node,
+        side,
+        data,
+        effort.steps,
+        effort.patience,
+        target,
+        model_value,
+        cells.disagreement[cell],
+        inputs,
     )
-    cells.value[cell] = min(value, cells.value[cell])
+    cells.value[cell] = min(bound, cells.value[cell])
     if cells.value[cell] > target or cell == 0:
-        new_value = ascend(here, node, side, data, effort.ascents)
+        new_value = ascend(inputs, node, side, data, effort.ascents)
         if new_value > model_value:
             model_value = new_value
-            u[:] = here
+            u[:] = inputs
     return model_value
 
 
 @compiled
 def halve_cell(cells: Cells, halved: int, count: int) -> bool:
-    """Halve a cell along the ω, or g by q = g/ω, of largest disagreement (see `Cells`).
+    """Halve a cell along the ω, or g by q = g/ω, of largest disagreement (see `minimise`).
 
-    The cell keeps the lower half, and number `count` becomes the upper one. Returns False where no
-    range of ω or q has a point of its table between its ends.
+    The cell keeps the lower half, and cell number `count` becomes the upper one, with the same
+    multipliers and bound; both are changed in place.
+
+    Returns:
+        False where no range of ω or q has a point of its table between its ends.
     """
-    ends, disagreement = cells.ends[halved], cells.disagreement[halved]
-    n_variables = len(disagreement) // len(ends)  # of a mode: ω, g and its amplitudes
-    largest, mode, axis = 0.0, -1, 0
+    ends = cells.ends[halved]
+    disagreement = cells.disagreement[halved]
+    n_variables = len(disagreement) // len(ends)  # of a mode: ω, g and its participation factors
+    largest = 0.0
+    mode = -1
+    axis = 0
     for k in range(len(ends)):
         for direction in range(2):  # ω and q
             n_intervals = ends[k, 2 * direction + 1] - ends[k, 2 * direction]
             of_variable = disagreement[k * n_variables + direction]
             if n_intervals >= 2 and of_variable > largest:
-                largest, mode, axis = of_variable, k, direction
+                largest = of_variable
+                mode = k
+                axis = direction
     if mode < 0:
         return False
     middle = (ends[mode, 2 * axis] + ends[mode, 2 * axis + 1]) // 2
-    cells.ends[count], cells.mu[count] = ends, cells.mu[halved]
+    cells.ends[count] = ends
+    cells.mu[count] = cells.mu[halved]
     cells.value[count] = cells.value[halved]
     cells.ends[halved, mode, 2 * axis + 1] = middle
     cells.ends[count, mode, 2 * axis] = middle
@@ -187,22 +227,28 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
 
 @loops
 def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
-    """Side × output in the model at inputs u (L,), without its constants; `gradient` is written."""
-    bilinear, slopes = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
-    products(u, bilinear)
+    """Return side × output in the model at inputs u (L,), without its constants.
+
+    `gradient` is overwritten with its derivatives by the inputs, shape (L,).
+    """
+    u_products = np.empty(data.quadratic.shape[1])
+    slopes = np.zeros(len(data.linear))  # by the intervening variables
+    products(u, u_products)
     total = response_and_gradient(u, node, side, data, slopes)
+
+    # Linear and quadratic coefficients in u of the response that is linear in these variables.
     gradient[:] = 0.0
-    quadratic = np.zeros(len(bilinear))  # of the linearised response, packed by rows i ≤ j
-    for a in range(len(slopes)):
-        add(gradient, slopes[a], data.linear[a])
-        add(quadratic, slopes[a], data.quadratic[a])
-    for s in range(len(data.truncated_linear)):  # truncated modes
-        wave = side * data.truncated_response[s, node]
-        total += wave * (
-            dot(data.truncated_linear[s], u) + dot(data.truncated_quadratic[s], bilinear)
+    quadratic = np.zeros(len(u_products))
+    for z in range(len(slopes)):
+        add(gradient, slopes[z], data.linear[z])
+        add(quadratic, slopes[z], data.quadratic[z])
+    for s in range(len(data.truncated_linear)):
+        response = side * data.truncated_response[s, node]
+        total += response * (
+            dot(data.truncated_linear[s], u) + dot(data.truncated_quadratic[s], u_products)
         )
-        add(gradient, wave, data.truncated_linear[s])
-        add(quadratic, wave, data.truncated_quadratic[s])
+        add(gradient, response, data.truncated_linear[s])
+        add(quadratic, response, data.truncated_quadratic[s])
     at = 0
     for i in range(len(u)):
         for j in range(i, len(u)):
@@ -214,66 +260,90 @@ def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: A
 
 @loops
 def response_and_gradient(u: Array, node: int, side: float, data: Data, slopes: Array) -> float:
-    """Sum of the modes' responses, side × output, in the model at inputs u (L,).
+    """Return the sum of the modes' responses, side × output, in the model at inputs u (L,).
 
-    `slopes` (Z,) is written: its gradient by all scaled intervening variables.
+    Responses are read by bilinear interpolation in the tables. `slopes` is overwritten with the
+    derivatives of the sum by all scaled intervening variables, shape (Z,).
     """
-    bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
-    products(u, bilinear)
+    u_products = np.empty(data.quadratic.shape[1])
+    z = np.empty(len(data.linear))  # scaled intervening variables at u
+    products(u, u_products)
     for v in range(len(z)):
-        z[v] = dot(data.linear[v], u) + dot(data.quadratic[v], bilinear)
+        z[v] = dot(data.linear[v], u) + dot(data.quadratic[v], u_products)
     slopes[:] = 0.0
-    total, width, sources = 0.0, int(data.points[0]), data.share.shape[1]
-    for k in range(len(data.share)):  # by bilinear interpolation in the table of mode k
-        first = k * (2 + sources)  # of its variables: ω, g and amplitudes
-        w = data.centre[k, 0] + data.radius[k, 0] * z[first]
-        g = data.centre[k, 1] + data.radius[k, 1] * z[first + 1]
-        x = min(max((w - data.start[k, 0]) / data.step[k, 0], 0.0), width - 1.000001)
-        y = min(max((g / w - data.start[k, 1]) / data.step[k, 1], 0.0), data.points[1] - 1.000001)
-        i, j = int(x), int(y)
-        x, y = x - i, y - j
+    total = 0.0
+    width = int(data.grid_points[0])  # points of a row of a table, along ω
+    sources = data.participation.shape[1]
+    for k in range(len(data.participation)):
+        first = k * (2 + sources)  # ω of the mode, then g and the participation factors
+        omega = data.midpoint[k, 0] + data.radius[k, 0] * z[first]
+        g = data.midpoint[k, 1] + data.radius[k, 1] * z[first + 1]
+        # Place (x, y) along ω and q = g/ω in steps of the grid, inside the table's last cell at
+        # most; then the cell (i, j), and the place in it.
+        x = min(max((omega - data.grid_start[k, 0]) / data.grid_step[k, 0], 0.0), width - 1.000001)
+        y = (g / omega - data.grid_start[k, 1]) / data.grid_step[k, 1]
+        y = min(max(y, 0.0), data.grid_points[1] - 1.000001)
+        i = int(x)
+        j = int(y)
+        x = x - i
+        y = y - j
         at = j * width + i
         for s in range(sources):
             e = data.table[k, s, node]
-            a, b, c, f = e[at], e[at + 1], e[at + width], e[at + width + 1]  # corners
+            a = e[at]
+            b = e[at + 1]
+            c = e[at + width]
+            f = e[at + width + 1]
             value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
-            along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
-            across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
-            amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
+            by_omega = side * ((1 - y) * (b - a) + y * (f - c)) / data.grid_step[k, 0]
+            by_q = side * ((1 - x) * (c - a) + x * (f - b)) / data.grid_step[k, 1]
+            amplitude = (
+                data.participation[k, s] + data.participation_radius[k, s] * z[first + 2 + s]
+            )
             total += amplitude * value
-            slopes[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
-            slopes[first + 1] += amplitude * across / w * data.radius[k, 1]
-            slopes[first + 2 + s] = value * data.reach[k, s]
+            # dq = dg/ω − g dω/ω²
+            slopes[first] += amplitude * (by_omega - by_q * g / omega**2) * data.radius[k, 0]
+            slopes[first + 1] += amplitude * by_q / omega * data.radius[k, 1]
+            slopes[first + 2 + s] = value * data.participation_radius[k, s]
     return total
 
 
 @loops
 def ascend(u: Array, node: int, side: float, data: Data, steps: int) -> float:
-    """Raise the model's side × output from inputs u (L,), which are written; return its value.
+    """Raise side × output in the model by moving the inputs u (L,), in place; return its value.
 
-    It is a projected gradient ascent over [−1, 1]^L with steps by Barzilai and Borwein (1988).
+    It is a projected gradient ascent over the box [−1, 1]^L with the step lengths of Barzilai and
+    Borwein (1988). Any inputs give a valid value, so that it need not converge.
     """
+    # Inputs are rounded to multiples of 1/grid, so that their path does not depend on rounding.
+    grid = 2.0**24
     d = len(u)
-    slope, trial, trial_slope, point = np.empty(d), np.empty(d), np.empty(d), u.copy()
+    slope = np.empty(d)
+    trial = np.empty(d)
+    trial_slope = np.empty(d)
+    point = u.copy()
     value = model_and_gradient(u, node, side, data, slope)
-    size = 0.3 / (np.abs(slope).max() + 1e-300)
+    length = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(steps):
         for i in range(d):
-            trial[i] = np.rint(GRID * min(max(point[i] + size * slope[i], -1.0), 1.0)) / GRID
-        new = model_and_gradient(trial, node, side, data, trial_slope)
-        along = bend = 0.0
+            trial[i] = np.rint(grid * min(max(point[i] + length * slope[i], -1.0), 1.0)) / grid
+        new_value = model_and_gradient(trial, node, side, data, trial_slope)
+        squared_step = 0.0
+        bend = 0.0  # step · (fall of the slope)
         for i in range(d):
             step = trial[i] - point[i]
-            along += step * step
+            squared_step += step * step
             bend += step * (slope[i] - trial_slope[i])
-        if along < 1e-8:
+        if squared_step < 1e-8:
             break
-        if new < value - 0.02 * abs(value):
-            size *= 0.3
+        # The value may fall a little in between; where it falls more, the step is shortened.
+        if new_value < value - 0.02 * abs(value):
+            length *= 0.3
             continue
-        size = along / bend if bend > 0 else 4 * size
-        point[:], slope[:] = trial, trial_slope
-        if new > value:
-            value = new
+        length = squared_step / bend if bend > 0 else 4 * length
+        point[:] = trial
+        slope[:] = trial_slope
+        if new_value > value:
+            value = new_value
             u[:] = point
     return value

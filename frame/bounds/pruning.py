@@ -1,12 +1,14 @@
 """Pruning of a box: of each input, the end of its range that cannot hold a higher peak.
 
 The half or quarter of an input's range that lies away from the best inputs found is bounded by the
-models at hand. Where no bound lies above the peak, that end is pruned (domain reduction by probing:
-Tawarmalani, Sahinidis 2002). What remains is narrower in many inputs at once, and the remainders of
-models that are expanded anew there fall with the fourth power of the widths.
+models at hand. Where no bound there exceeds the peak, that end is pruned (domain reduction by
+probing: Tawarmalani, Sahinidis 2002). What remains is narrower in many inputs at once, and the
+remainders of models that are expanded anew there fall with the fourth power of the widths.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,68 +17,106 @@ from alphacut.frame import numbers
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.bounds.node_bounds import response_and_gradient
 
-FRACTIONS = (0.25, 0.5)
-"""Fractions of an input's range that are tried, the second where the first can be pruned."""
+
+class PrunedBox(NamedTuple):
+    """What remains of the box [−1, 1]^d for one peak, and bounds over what was pruned."""
+
+    low: Array  # lower ends of what remains, (d,)
+    high: Array  # upper ends
+    upper: Array  # upper bounds at the given nodes over all that is pruned, (J,); −inf for nothing
+    gap_fractions: Array  # fraction of the gap that each input accounts for, (d,)
 
 
-def prune_ends(
-    level: LevelModels, bounds: OutputBounds, above: Ints
-) -> tuple[Array, Array, Array, Array]:
+def prune_ends(level: LevelModels, bounds: OutputBounds, above: Ints) -> PrunedBox:
     """Prune ends of the box [−1, 1]^d over which no bound exceeds the peak by more than the gap.
 
     Args:
         level: Models over the box.
-        bounds: Bounds of one output and side over the box.
+        bounds: Bounds of one side of one output over the box.
         above: Nodes whose bounds exceed the peak, shape (J,).
-
-    Returns:
-        Lower and upper ends of what remains, (d,) each; upper bounds at these nodes over all that
-        is pruned, (J,), −inf if nothing is; and each input's share in the gap, (d,).
     """
-    highest = int(above[bounds.out[0, above].argmax()])
-    best = bounds.at[highest]
-    low, high = -np.ones_like(best), np.ones_like(best)
-    pruned = np.full(len(above), -np.inf)
-    limit = bounds.reached + bounds.wanted_gap
-    for cells in (1, int(numbers.PRUNING_CELLS)):
-        for i in range(len(best)):
-            prune_upper = best[i] <= 0
-            for fraction in FRACTIONS if high[i] - low[i] == 2.0 else ():  # not pruned before
-                end = 1 - 2 * fraction if prune_upper else 2 * fraction - 1
-                piece_low, piece_high = low.copy(), high.copy()
-                (piece_low if prune_upper else piece_high)[i] = end
+    highest_node = int(above[bounds.upper[above].argmax()])
+    best_inputs = bounds.model_inputs[highest_node]
+    low = -np.ones_like(best_inputs)
+    high = np.ones_like(best_inputs)
+    pruned_upper = np.full(len(above), -np.inf)
+    # The first pass bounds each end by one cell of the modes' ranges, which is cheap. The second
+    # tries the ends that are left with many cells.
+    for max_cells in (1, int(numbers.PRUNING_CELLS)):
+        for i in range(len(best_inputs)):
+            if high[i] - low[i] < 2.0:  # pruned before
+                continue
+            prunes_upper_end = best_inputs[i] <= 0
+            # A quarter of the range is tried first, and half of it if that can be pruned.
+            for fraction in (0.25, 0.5):
+                end = 1 - 2 * fraction if prunes_upper_end else 2 * fraction - 1
+                piece_low = low.copy()
+                piece_high = high.copy()
+                if prunes_upper_end:
+                    piece_low[i] = end
+                else:
+                    piece_high[i] = end
                 piece = level.on_subbox(piece_low, piece_high)
-                inside = OutputBounds.initial(
-                    piece, *bounds.index, bounds.wanted_gap, bounds.reached
-                )
-                inside.out[0] = bounds.out[0]
-                effort = inside.effort(cells, int(numbers.PRUNING_STEPS), slack_below_peak=1.0)
-                for node in above[np.argsort(-bounds.out[0, above])]:  # the largest bound first
-                    inside.improve(np.array([node]), effort)
-                    if inside.out[0, node] > limit:
-                        break
-                over_piece = inside.out[0, above]
-                if over_piece.max() > limit:
+                piece_upper = _bounds_over_piece(piece, bounds, above, max_cells=max_cells)
+                if piece_upper.max() > bounds.attained + bounds.wanted_gap:
                     break
-                pruned = np.maximum(pruned, over_piece)
-                (high if prune_upper else low)[i] = end
-    return low, high, pruned, remainder_addition(bounds, highest)[1]
+                pruned_upper = np.maximum(pruned_upper, piece_upper)
+                if prunes_upper_end:
+                    high[i] = end
+                else:
+                    low[i] = end
+    gap_fractions = remainder_addition(bounds, highest_node).input_fractions
+    return PrunedBox(low, high, pruned_upper, gap_fractions)
 
 
-def remainder_addition(bounds: OutputBounds, node: int) -> tuple[float, Array]:
-    """Return what Taylor remainders add to a bound at least, and the inputs' fractions of it, (d,).
+def _bounds_over_piece(
+    piece: LevelModels, bounds: OutputBounds, above: Ints, *, max_cells: int
+) -> Array:
+    """Return upper bounds over a piece of the box at the nodes `above`, shape (J,).
 
-    At the maximum the multipliers are the slopes of the motion by the intervening variables.
-    Remainders are of fourth degree: they are shared out by the squares of what the first and second
-    degree of each variable have of an input.
+    They begin at those over the whole box. Nodes are bounded in the order of these, the largest
+    first, until one stays above the peak by more than the gap: then the piece cannot be pruned.
     """
-    data, d = bounds.data, bounds.data.linear.shape[1]
+    inside = OutputBounds.initial(piece, *bounds.index, bounds.wanted_gap, bounds.attained)
+    inside.upper[:] = bounds.upper
+    effort = inside.effort(max_cells, int(numbers.PRUNING_STEPS), slack_below_peak=1.0)
+    for node in above[np.argsort(-bounds.upper[above])]:
+        inside.improve(np.array([node]), effort)
+        if inside.upper[node] > bounds.attained + bounds.wanted_gap:
+            break
+    return inside.upper[above]
+
+
+class RemainderAddition(NamedTuple):
+    """What the remainders of Taylor models add to a bound."""
+
+    least: float  # lower estimate of the addition, in the unit of the output
+    input_fractions: Array  # fraction of it that each input accounts for, (d,)
+
+
+def remainder_addition(bounds: OutputBounds, node: int) -> RemainderAddition:
+    """Estimate what Taylor remainders add to the bound at a node, and which inputs cause it.
+
+    At the minimum of the dual function the multipliers are the slopes of the response by the
+    intervening variables z, and the bound contains Σ |slope_z| R_z with the remainders R_z.
+    Remainders are of fourth degree in the inputs. Each R_z is distributed over the inputs in
+    proportion to the squares of their coefficients of first and second degree in z.
+    """
+    data = bounds.data
+    d = data.linear.shape[1]
     slope = np.zeros(len(data.linear))  # of the response by each intervening variable
-    response_and_gradient(bounds.at[node], node, bounds.side, data, slope)
-    upper = np.zeros((len(slope), d, d))
-    upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
-    size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2
+    response_and_gradient(bounds.model_inputs[node], node, bounds.side, data, slope)
+
+    # The quadratic coefficients are packed by rows i ≤ j; each counts for both of its inputs.
+    upper_triangle = np.zeros((len(slope), d, d))
+    row, column = np.triu_indices(d)
+    upper_triangle[:, row, column] = np.abs(data.quadratic)
+    of_inputs = np.abs(data.linear) + upper_triangle.sum(axis=1) + upper_triangle.sum(axis=2)
+    weights = of_inputs**2
+
     by_variable = np.abs(slope) * data.remainder
-    shares = (by_variable / np.maximum(size.sum(1), 1e-300)) @ size
-    least = float(bounds.constant[1, node] + by_variable.sum())
-    return least, np.asarray(shares / max(float(shares.sum()), 1e-300))
+    by_input = (by_variable / np.maximum(weights.sum(axis=1), 1e-300)) @ weights
+    return RemainderAddition(
+        least=float(bounds.constant[1, node] + by_variable.sum()),
+        input_fractions=np.asarray(by_input / max(float(by_input.sum()), 1e-300)),
+    )

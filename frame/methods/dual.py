@@ -127,7 +127,7 @@ class DualProof:
             goal: Which bounds are needed, and what is known.
         """
         answers: list[Answer] = []
-        wider = np.full(goal.outer.shape[1:], np.inf)
+        wider = np.full(goal.known_upper.shape[1:], np.inf)
         for k, (low, high) in enumerate(zip(boxes.lower, boxes.upper, strict=True)):
             box = Box(flow.system, boxes.names, flow.time, low, high)
             try:
@@ -136,7 +136,7 @@ class DualProof:
                 else:
                     found = _exact_bounds(box)
                 answers.append(found)
-                wider = found.outer  # a narrower box lies inside the wider one
+                wider = found.upper  # a narrower box lies inside the wider one
             except UnprovedError as error:
                 answers.append(error)
         return answers
@@ -155,7 +155,7 @@ class DualProof:
                 outputs, 2).
         """
         needed = goal.needed[k]
-        outer = np.minimum(goal.outer[k], wider)
+        upper = np.minimum(goal.known_upper[k], wider)
         nodes = np.flatnonzero(needed.any(axis=(1, 2)))
         outputs = np.flatnonzero(needed.any(axis=(0, 2)))
         is_complete = bool(needed.all())
@@ -165,7 +165,7 @@ class DualProof:
         for o, s in zip(*np.nonzero(needed.any(axis=0)), strict=True):
             index = int(np.searchsorted(outputs, o))
             problem = OutputBounds.initial(level, index, int(s), gap[o], goal.incumbent[k, o, s])
-            problem.out[0] = outer[nodes, o, s]
+            problem.upper[:] = upper[nodes, o, s]
             problems[o, s] = problem
 
         n_levels = len(goal.needed)
@@ -178,48 +178,48 @@ class DualProof:
                 self._minimise_peaks(problems, pool, needed=needed[nodes])
             unit = np.zeros((*needed.shape, len(box.active)))
             for (o, s), problem in problems.items():
-                outer[nodes, o, s] = problem.out[0]
-                unit[nodes, o, s] = problem.at
+                upper[nodes, o, s] = problem.upper
+                unit[nodes, o, s] = problem.model_inputs
 
             # 2. The exact responses at these inputs attain values, which raise the incumbents.
-            inner, attained_error = _attained_values(box, needed, unit=unit)
+            attained, attained_error = _attained_values(box, needed, unit=unit)
             for (o, s), problem in problems.items():
                 problem.wanted_gap = self.peaks * goal.peak[o]
-                problem.reached = max(problem.reached, inner[:, o, s].max())
+                problem.attained = max(problem.attained, attained[:, o, s].max())
 
             # 3. Prune ends of the box that contain no peak above the incumbent and the gap.
             shape = (*needed.shape[1:], len(box.low))
             fractions = np.zeros(shape)
             remaining = np.empty((2, *shape))
             remaining[:] = np.stack([box.low, box.high])[:, np.newaxis, np.newaxis]
-            pruned = outer.copy()
+            pruned = upper.copy()
             jobs = []
             for (o, s), problem in problems.items():
-                above = problem.nodes_above(np.flatnonzero(needed[nodes, o, s]))
+                above = problem.nodes_above_peak(np.flatnonzero(needed[nodes, o, s]))
                 if len(above):
                     job = pool.submit(prune_ends, level, problem, above)
                     jobs.append((o, s, nodes[above], job))
             for o, s, nodes_above, job in jobs:
-                low, high, bounds_over_pruned, gap_fractions = job.result()
-                fractions[o, s, box.active] = gap_fractions
-                remaining[:, o, s] = box.inputs(np.stack([low, high]))
-                pruned[nodes_above, o, s] = bounds_over_pruned
+                found = job.result()
+                fractions[o, s, box.active] = found.gap_fractions
+                remaining[:, o, s] = box.inputs(np.stack([found.low, found.high]))
+                pruned[nodes_above, o, s] = found.upper
 
             # 4. Bound the smallest peaks.
             between = np.zeros(needed.shape[:2])
             least_peaks = None
             if is_complete:
-                between = level.line_deviation()
+                between = level.interpolation_error()
                 least_peaks = _least_peaks(flow, box, level, between=between, pool=pool)
         return BoxBounds(
-            outer=outer,
-            inner=inner,
-            at=box.inputs(unit),
-            between=between,
-            shares=fractions,
+            upper=upper,
+            attained=attained,
+            attained_at=box.inputs(unit),
+            between_nodes=between,
+            gap_fractions=fractions,
             attained_error=attained_error,
             remaining=remaining,
-            pruned=pruned,
+            pruned_upper=pruned,
             least_peaks=least_peaks,
             facts={"single_modes": len(level.models.oscillators)},
         )
@@ -270,19 +270,19 @@ class DualProof:
             jobs = []
             for problem in problems.values():
                 effort = problem.effort(1, 1)._replace(ascents=0)
-                jobs.append((problem, np.flatnonzero(np.isinf(problem.out[0])), effort))
+                jobs.append((problem, np.flatnonzero(np.isinf(problem.upper)), effort))
             improve_all(jobs, pool, lambda done: None)
             midpoint = box.inputs(np.zeros((1, len(box.active))))
             response = flow.values(midpoint)[0]
             for (o, _), problem in problems.items():
-                problem.out[1] = response[:, o] * problem.side
-                problem.at[:] = 0.0
+                problem.model_value[:] = response[:, o] * problem.side
+                problem.model_inputs[:] = 0.0
 
         alone = self.bounds_peaks_alone
         self._improve(
             problems, pool, 1, 1, slack=float(alone), tick=subprogress(progress, 0.0, 0.05)
         )
-        if not goal.last:
+        if not goal.is_last:
             self._require_accurate(problems, box, goal.peak)
         self._improve(
             problems,
@@ -342,10 +342,11 @@ class DualProof:
         """
         for (o, _), problem in problems.items():
             fractions = np.zeros(len(box.low))
-            highest = int(problem.out[1].argmax())
-            addition, fractions[box.active] = remainder_addition(problem, highest)
-            if addition > numbers.WIDE * peak[o] and halvings(fractions, self.parts) >= 1:
-                what = f"the remainders of the modes are {addition / peak[o]:.2g} of a peak"
+            highest = int(problem.model_value.argmax())
+            addition = remainder_addition(problem, highest)
+            fractions[box.active] = addition.input_fractions
+            if addition.least > numbers.WIDE * peak[o] and halvings(fractions, self.parts) >= 1:
+                what = f"the remainders of the modes are {addition.least / peak[o]:.2g} of a peak"
                 raise UnprovedError(what, "take narrower inputs", int(fractions.argmax()))
 
 
@@ -363,17 +364,17 @@ def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Arr
     """
     node, output, side = np.nonzero(needed)
     points = unit[needed]
-    value, error = (x[node, output] for x in box.centre_motion())
+    value, error = (x[node, output] for x in box.midpoint_response())
     # Most points may be the midpoint of the box, whose response is known.
     is_moved = points.any(axis=1)
     if is_moved.any():
-        moved = box.reached(points[is_moved], node[is_moved], output[is_moved])
+        moved = box.exact_values(points[is_moved], node[is_moved], output[is_moved])
         value[is_moved], error[is_moved] = moved
-    inner = np.full(needed.shape, -np.inf)
-    inner[needed] = np.where(side, value, -value) - error
+    attained = np.full(needed.shape, -np.inf)
+    attained[needed] = np.where(side, value, -value) - error
     attained_error = np.zeros(needed.shape[:2])
     np.maximum.at(attained_error, (node, output), 2 * error)
-    return inner, attained_error
+    return attained, attained_error
 
 
 def _least_peaks(
@@ -392,7 +393,7 @@ def _least_peaks(
     Returns:
         A lower bound, and the peak of a response that has a small one, shape (outputs,) each.
     """
-    count = len(level.structure.order)
+    count = len(level.structure.derivative_orders)
     found = [*pool.map(partial(least_peak, level), range(count))]
     lower = np.array([bound for bound, _ in found])
     unit = np.stack([point for _, point in found])
@@ -413,17 +414,17 @@ def _least_peaks(
 
 def _exact_bounds(box: Box) -> BoxBounds:
     """Return the bounds over a box without width: the exact response and its rounding."""
-    value, error = box.centre_motion()
+    value, error = box.midpoint_response()
     sides = np.stack([-value, value], axis=-1)
     margin = error[..., np.newaxis]
-    between = box.centre_straying()
+    between = box.midpoint_interpolation_error()
     no_coordinates = np.zeros(0)
     return BoxBounds(
-        outer=sides + margin,
-        inner=sides - margin,
-        at=np.broadcast_to(box.low, (*sides.shape, len(box.low))).copy(),
-        between=between,
-        shares=np.zeros((*sides.shape[1:], len(box.low))),
+        upper=sides + margin,
+        attained=sides - margin,
+        attained_at=np.broadcast_to(box.low, (*sides.shape, len(box.low))).copy(),
+        between_nodes=between,
+        gap_fractions=np.zeros((*sides.shape[1:], len(box.low))),
         attained_error=2 * error,
         least_peaks=Ends(
             (np.abs(value) - error).max(axis=0), box.peak_over_time(no_coordinates, between)

@@ -292,16 +292,16 @@ def bound_levels(
     fractions = np.broadcast_to(_error_fractions(model), (*shape[1:], len(model.boxes.names)))
     attained_error = error + rounding
     bounds = []
-    outer = np.full(2 * error.size, np.inf)
+    upper = np.full(2 * error.size, np.inf)
     for optima, proved in zip(reversed(all_optima), reversed(all_proved), strict=True):
-        outer = np.minimum(outer, proved)  # a narrower box lies inside the wider ones
-        inner = optima.value.reshape(shape) - attained_error[..., np.newaxis]
+        upper = np.minimum(upper, proved)  # a narrower box lies inside the wider ones
+        attained = optima.value.reshape(shape) - attained_error[..., np.newaxis]
         box_bounds = BoxBounds(
-            outer=(outer.reshape(shape) + error[..., np.newaxis]) * scale[:, np.newaxis],
-            inner=inner * scale[:, np.newaxis],
-            at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
-            between=between,
-            shares=fractions,
+            upper=(upper.reshape(shape) + error[..., np.newaxis]) * scale[:, np.newaxis],
+            attained=attained * scale[:, np.newaxis],
+            attained_at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
+            between_nodes=between,
+            gap_fractions=fractions,
             attained_error=2 * attained_error * scale,
             facts=facts,
         )

@@ -1,15 +1,15 @@
 """Invariant subspaces K X = M X L over the whole box, with proved bounds of what series miss.
 
 A block is one mode, or several whose frequencies meet somewhere in the box, apart from the others
-(Davis, Kahan 1970; Stewart 1973). In coordinates in which the middle of the box has diagonal M and
-K, its columns X have a rotation R, given, in the p rows b of the block, which makes them smooth,
-however the block's own modes cross. Perturbation theory gives polynomials X̃(u) and L̃(u) of some
-degree N, which need no proof; `enclosed_block` bounds what they miss.
+(Davis, Kahan 1970; Stewart 1973). In coordinates in which M and K are diagonal at the midpoint of
+the box, its columns X are a given rotation R in the p rows b of the block. This makes them smooth
+functions of the inputs, however the block's own modes cross. Perturbation theory gives polynomials
+X̃(u) and L̃(u) of some degree, which need no proof; `enclosed_block` bounds what they miss.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from math import comb
@@ -23,29 +23,10 @@ from alphacut.frame.calculus.monomials import matmul, monomials, product_part
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 
-MAX_MONOMIALS = 33_000
-"""Monomials of the series' highest degree, at most."""
-DEGREES = (4, 10)
-"""Least and greatest degree of the series."""
-FINE = 3e-4
-"""Relative error bound of L and N at which no higher degree is tried."""
-ROUGH = 0.05
-"""Relative error bound above which a block counts as not enclosed."""
-MAX_SHAPE = 10.0
-"""Bound of an entry of X, which is 1 in the block's own row, above which none is found."""
-ROUNDS = 60
-"""Most rounds in which the bounds of a block are widened until they hold."""
-SLACK = 1.001
-"""Factor by which bounds must hold, so that rounding of the systems they solve does not matter."""
-
+MIN_DEGREE, MAX_DEGREE = 4, 10
+"""Degrees of the series that are tried; boxes that are too wide for the highest are bisected."""
 MAX_KEPT = 8_000_000
-"""Numbers of enclosures that are kept: 64 MB; one of 12 inputs takes half a million."""
-REFINEMENTS = 8
-"""Rounds that improve bounds of single entries by those of the others."""
-CORNERS = 10
-"""Inputs whose signs are all tried together, 2^9 corners."""
-SMALL = 0.1
-"""Norm of scaled linear terms up to which their sum of absolute values is sharp enough."""
+"""Most numbers in all enclosures that are kept: 64 MB; one of 12 inputs takes half a million."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,133 +34,188 @@ class Block:
     """p modes over the box as one invariant subspace; vectors are rows."""
 
     modes: Ints  # their numbers from below, from 0, rising, (p,)
-    rate: TaylorModel  # Lᵀ: K x_j = Σ_i rate_ji M x_i, (p, p), in 1/s²
-    shape: TaylorModel  # x_j, (p, n)
-    mass_shape: TaylorModel  # M x_j, (p, n)
-    norm: TaylorModel  # N, x_iᵀ M x_j, (p, p)
+    eigenvalue_block: TaylorModel  # Lᵀ: K x_j = Σ_i Lᵀ_ji M x_i, (p, p), in 1/s²
+    shapes: TaylorModel  # x_j, (p, n)
+    mass_times_shapes: TaylorModel  # M x_j, (p, n)
+    modal_mass: TaylorModel  # N, x_iᵀ M x_j, (p, p)
 
     @property
     def relative_error(self) -> float:
-        """Largest error bound of the diagonals of L and N, relative to their middle values."""
-        rate, norm = (np.diag(x.remainder) / np.diag(x.value) for x in (self.rate, self.norm))
-        return float(max(rate.max(), norm.max()))
+        """Largest error bound of the diagonals of L and N, relative to their midpoint values."""
+        of_eigenvalues = np.diag(self.eigenvalue_block.remainder) / np.diag(
+            self.eigenvalue_block.value
+        )
+        of_mass = np.diag(self.modal_mass.remainder) / np.diag(self.modal_mass.value)
+        return float(max(of_eigenvalues.max(), of_mass.max()))
 
     def truncated(self, order: int) -> Block:
-        """Block with its Taylor models cut to a lower order."""
-        parts = (x.truncated(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
-        return Block(self.modes, *parts)
+        """Return the block with its Taylor models truncated to a lower order."""
+        return Block(
+            modes=self.modes,
+            eigenvalue_block=self.eigenvalue_block.truncated(order),
+            shapes=self.shapes.truncated(order),
+            mass_times_shapes=self.mass_times_shapes.truncated(order),
+            modal_mass=self.modal_mass.truncated(order),
+        )
 
     def embedded(self, used: Ints, inputs: int) -> Block:
-        """The same as functions of all inputs, of which those at `used` are its own."""
-        parts = (
-            x.embedded(used, inputs) for x in (self.rate, self.shape, self.mass_shape, self.norm)
+        """Return the block as functions of all inputs, of which those at `used` are its own."""
+        return Block(
+            modes=self.modes,
+            eigenvalue_block=self.eigenvalue_block.embedded(used, inputs),
+            shapes=self.shapes.embedded(used, inputs),
+            mass_times_shapes=self.mass_times_shapes.embedded(used, inputs),
+            modal_mass=self.modal_mass.embedded(used, inputs),
         )
-        return Block(self.modes, *parts)
 
 
 @dataclass(frozen=True, eq=False)
 class CentredMatrices:
-    """M and K over the box in coordinates in which its middle has both diagonal."""
+    """M and K over the box in coordinates in which both are diagonal at its midpoint."""
 
     mass: TaylorModel  # M, (n, n), as functions of the inputs that M and K depend on
-    stiffness: TaylorModel  # K, the same
+    stiffness: TaylorModel  # K, (n, n), as functions of the same inputs
     basis: Array  # displacements are basis @ x, (n, n)
-    modes: int  # number of modes; the other coordinates, which follow, have no mass
+    mode_count: int  # number of modes; the other coordinates, which follow, have no mass
 
     @property
-    def squared(self) -> Array:
-        """λ of the modes in the middle, rising, shape (modes,), in 1/s²."""
-        return np.diag(self.stiffness.value)[: self.modes]
+    def eigenvalues(self) -> Array:
+        """λ of the modes at the midpoint, rising, shape (modes,), in 1/s²."""
+        return np.diag(self.stiffness.value)[: self.mode_count]
 
     @property
     def has_mass(self) -> Array:
-        """1 of coordinates with mass, 0 of others, shape (n,): the diagonal of M in the middle."""
-        return np.asarray(np.arange(len(self.basis)) < self.modes, float)
+        """1 for coordinates with mass, 0 for others, shape (n,): the diagonal of M(0)."""
+        return np.asarray(np.arange(len(self.basis)) < self.mode_count, float)
 
     @cached_property
     def digest(self) -> bytes:
-        """What tells both matrices from others."""
-        parts = (y for x in (self.mass, self.stiffness) for y in (*x.parts, x.remainder))
-        return sha256(b"".join(part.tobytes() for part in parts)).digest()
+        """Digest that tells both matrices from others."""
+        arrays = []
+        for matrix in (self.mass, self.stiffness):
+            arrays += [*matrix.parts, matrix.remainder]
+        return sha256(b"".join(array.tobytes() for array in arrays)).digest()
 
 
-Series = list[list[Array]]
-"""Coefficients by degree of Lᵀ (monomials, p, p), of x_j and M x_j (monomials, p, n)."""
+@dataclass(eq=False)
+class SubspaceSeries:
+    """Series of an invariant subspace: coefficients by degree, one array for each."""
+
+    eigenvalue_block: list[Array]  # of Lᵀ, (monomials, p, p)
+    shapes: list[Array]  # of x_j, (monomials, p, n)
+    mass_times_shapes: list[Array]  # of M x_j, (monomials, p, n)
+
+
+@dataclass(eq=False)
+class _KeptEnclosures:
+    """Series of a block to the highest degree so far, and its enclosure by that of each degree."""
+
+    series: SubspaceSeries | None = None
+    blocks: list[Block | None] = field(default_factory=list)  # from `MIN_DEGREE` on
+
+    def size(self) -> int:
+        """Return about how many numbers are kept."""
+        if self.series is None:
+            return 0
+        series = self.series
+        arrays = series.eigenvalue_block + series.shapes + series.mass_times_shapes
+        return (2 + len(self.blocks)) * sum(array.size for array in arrays)
+
+
+KEPT: dict[tuple[bytes, bytes], _KeptEnclosures] = {}
+"""Enclosures by the digest of the matrices and the numbers of the modes; those used last stand at
+the end."""
+KEPT_LOCK = Lock()
 
 
 def narrowest_block(
     block: Ints, rotation: Array, centre: CentredMatrices, tolerance: float
 ) -> Block | None:
-    """Enclosure of a block (p,) of modes by series of the least degree that meets the tolerance.
+    """Enclose a block of modes by series of the lowest degree that meets a tolerance.
 
-    `tolerance` is the relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2];
-    of the last degree tried if none meets it. None if its error bound exceeds `ROUGH`. Enclosures
-    are kept: those of the same matrices serve all levels and records that differ in damping.
+    Enclosures are kept: those of the same matrices serve all levels and records that differ in
+    damping or loads alone.
+
+    Args:
+        block: Numbers of its modes, shape (p,).
+        rotation: Rotation of the shapes in the rows of the block, shape (p, p).
+        centre: M and K.
+        tolerance: Relative error bound of L and N that suffices.
+
+    Returns:
+        The enclosure, that of the last degree tried if none meets the tolerance. None if its
+        relative error exceeds .05, a tuned number.
     """
-    found, tolerance = None, min(max(tolerance, FINE), ROUGH / 2)
-    max_degree, d = DEGREES[0], centre.mass.inputs
-    while max_degree < DEGREES[1] and comb(d + max_degree, max_degree + 1) <= MAX_MONOMIALS:
+    largest_error = 0.05
+    # With a relative error of 3e-4 no higher degree is tried; this is tuned.
+    tolerance = min(max(tolerance, 3e-4), largest_error / 2)
+    # A series has at most 33,000 monomials of its highest degree.
+    inputs = centre.mass.inputs
+    max_degree = MIN_DEGREE
+    while max_degree < MAX_DEGREE and comb(inputs + max_degree, max_degree + 1) <= 33_000:
         max_degree += 1
+    found = None
     key = (centre.digest, block.tobytes())
     with KEPT_LOCK:
-        series, enclosures = KEPT[key] = KEPT.pop(key, ([], []))  # the last one used
-        for degree in range(DEGREES[0], max_degree + 1):
-            if len(enclosures) == degree - DEGREES[0]:
-                series[:] = subspace_series(block, degree, centre, series)
-                enclosures.append(enclosed_block(block, rotation, series, centre))
-            found = enclosures[degree - DEGREES[0]]
-            if found is None and degree > DEGREES[0]:
+        kept = KEPT.pop(key, _KeptEnclosures())
+        KEPT[key] = kept  # now the last one
+        for degree in range(MIN_DEGREE, max_degree + 1):
+            if len(kept.blocks) == degree - MIN_DEGREE:
+                kept.series = subspace_series(block, degree, centre, kept.series)
+                kept.blocks.append(enclosed_block(block, rotation, kept.series, centre))
+            found = kept.blocks[degree - MIN_DEGREE]
+            if found is None and degree > MIN_DEGREE:
                 break  # sums of coefficients over all degrees are too large; more only add to them
             if found is not None and found.relative_error < tolerance:
                 break
-        while sum(_numbers(*kept) for kept in KEPT.values()) > MAX_KEPT:
+        while sum(x.size() for x in KEPT.values()) > MAX_KEPT:
             del KEPT[next(iter(KEPT))]
-    return found if found is not None and found.relative_error < ROUGH else None
+    return found if found is not None and found.relative_error < largest_error else None
 
 
-def _numbers(series: Series, enclosures: list[Block | None]) -> int:
-    """About how many numbers a series and its enclosures hold."""
-    return (2 + len(enclosures)) * sum(part.size for parts in series for part in parts)
+def subspace_series(
+    block: Ints, degree: int, centre: CentredMatrices, lower: SubspaceSeries | None = None
+) -> SubspaceSeries:
+    """Return the perturbation series of an invariant subspace K X = M X L.
 
+    X is the identity in the rows of the block. Let Λ and M₀ be the diagonals of K and M at the
+    midpoint. In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees; the rows
+    of the block give L, and the others x_j.
 
-KEPT: dict[tuple[bytes, bytes], tuple[Series, list[Block | None]]] = {}
-"""Of matrices and numbers of modes the series of highest degree so far, and the enclosures by those
-of each degree from `DEGREES` on; the pair used last stands at the end."""
-KEPT_LOCK = Lock()
-
-
-def subspace_series(block: Ints, degree: int, centre: CentredMatrices, lower: Series) -> Series:
-    """Perturbation series of an invariant subspace K X = M X L, X the identity on the block.
-
-    In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees, Λ and M₀ the
-    diagonals of K and M in the middle: the block's own rows give L, the others x_j. `lower` is the
-    same to a lower degree, or empty.
+    Args:
+        block: Numbers of its modes, shape (p,).
+        degree: Degree of the series.
+        centre: M and K.
+        lower: The same series to a lower degree, which need not be made anew.
     """
-    mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
-    middle = centre.squared[block]
-    gaps = np.diag(stiffness.value) - middle[:, None] * centre.has_mass
+    mass = centre.mass
+    stiffness = centre.stiffness
+    d = mass.inputs
+    eigenvalues = centre.eigenvalues[block]
+    gaps = np.diag(stiffness.value) - eigenvalues[:, np.newaxis] * centre.has_mass
     gaps[:, block] = np.inf  # no correction inside the block
-    if not lower:
+    if lower is None:
         unit = np.eye(len(centre.basis))[block][None]
-        lower = [[np.diag(middle)[None]], [unit], [unit]]
-    rate, shape, mass_shape = (list(parts) for parts in lower)
-    for m in range(len(rate), degree + 1):
-        of_mass, of_stiffness = (
-            product_part(shape, x.parts, m, d, matmul) for x in (mass, stiffness)
-        )
-        right = middle[:, None] * of_mass - of_stiffness
-        right += product_part(rate, mass_shape, m, d, matmul, lowest=(1, 1))
-        rate.append(-right[:, :, block])
-        shape.append(right / gaps)
-        mass_shape.append(of_mass + shape[m] * centre.has_mass)
-    return [rate, shape, mass_shape]
+        lower = SubspaceSeries([np.diag(eigenvalues)[None]], [unit], [unit])
+    eigenvalue_block = list(lower.eigenvalue_block)
+    shapes = list(lower.shapes)
+    mass_times_shapes = list(lower.mass_times_shapes)
+    for m in range(len(eigenvalue_block), degree + 1):
+        of_mass = product_part(shapes, mass.parts, m, d, matmul)
+        of_stiffness = product_part(shapes, stiffness.parts, m, d, matmul)
+        right = eigenvalues[:, np.newaxis] * of_mass - of_stiffness
+        right += product_part(eigenvalue_block, mass_times_shapes, m, d, matmul, lowest=(1, 1))
+        eigenvalue_block.append(-right[:, :, block])
+        shapes.append(right / gaps)
+        mass_times_shapes.append(of_mass + shapes[m] * centre.has_mass)
+    return SubspaceSeries(eigenvalue_block, shapes, mass_times_shapes)
 
 
 class RightSides(NamedTuple):
     """Bounds of the right sides of the equations of `enclosed_block`."""
 
-    of_shape: Array  # of the equation of Z, its rows the modes of the block, (p, n)
-    of_rate: Array  # of the transposed equation of N D, (p, p)
+    of_shapes: Array  # of the equation of Z, its rows the modes of the block, (p, n)
+    of_eigenvalues: Array  # of the transposed equation of N D, (p, p)
 
 
 class SubspaceEquations(NamedTuple):
@@ -189,192 +225,249 @@ class SubspaceEquations(NamedTuple):
     """
 
     residual: Array  # |Rᵀ|, (p, n)
-    shape: Array  # |X̃ᵀ|, (p, n)
-    mass_shape: Array  # |(M X̃)ᵀ|, (p, n)
+    shapes: Array  # |X̃ᵀ|, (p, n)
+    mass_times_shapes: Array  # |(M X̃)ᵀ|, (p, n)
     mass: Array  # |M|, (n, n)
     coupling: Array  # |Fᵀ|, L̃ᵀ off its diagonal, (p, p)
     difference: Array  # |L̃_jj − L̃_ii|, (p, p)
 
     def right_sides(self, Y: Array, E: Array) -> RightSides:
-        """Bounds for all Z and D with |Zᵀ| ≤ `Y` (p, n) and |Dᵀ| ≤ `E` (p, p).
+        """Return bounds for all Z and D with |Zᵀ| ≤ `Y` (p, n) and |Dᵀ| ≤ `E` (p, p).
 
-        They also bound how fast the right sides change: where Z and D change by θ Y and θ E at
-        most, the right sides change by θ times the bounds at most. This takes twice the products of
+        They also bound how fast the right sides change: where Z and D change by at most θ Y and
+        θ E, the right sides change by at most θ times the bounds. This takes twice the products of
         the unknowns, since |D Z − D′ Z′| ≤ |D − D′| |Z| + |D′| |Z − Z′|.
         """
         R, X, MX, M, F, difference = self
-        of_shape = R + E @ MX + (F + 2 * E) @ Y @ M
+        of_shapes = R + E @ MX + (F + 2 * E) @ Y @ M
         W = Y @ MX.T
-        # L̃ᵀW − W L̃ by its diagonal, |L̃_jj − L̃_ii| W, and by F
-        of_rate = R @ X.T + Y @ R.T + difference * W + W @ F.T + F @ W + 2 * E @ W
-        return RightSides(of_shape, of_rate)
+        # L̃ᵀW − W L̃ is bounded by the diagonal of L̃, |L̃_jj − L̃_ii| W, and by F.
+        of_eigenvalues = R @ X.T + Y @ R.T + difference * W + W @ F.T + F @ W + 2 * E @ W
+        return RightSides(of_shapes, of_eigenvalues)
 
 
 def enclosed_block(
-    block: Ints, rotation: Array, series: Series, centre: CentredMatrices
+    block: Ints, rotation: Array, series: SubspaceSeries, centre: CentredMatrices
 ) -> Block | None:
     """Enclose a block's invariant subspace K X = M X L over the box by Brouwer's theorem.
 
-    With the residual R = K X̃ − M X̃ L̃ of the series X̃, L̃ the subspace X = X̃ + Z, Z zero in the
-    rows b of the block, with L = L̃ + D obeys, o being all other rows,
+    Let R = K X̃ − M X̃ L̃ be the residual of the series X̃, L̃. The subspace X = X̃ + Z, with Z zero
+    in the rows b of the block, and L = L̃ + D obeys, o being all other rows,
 
         (K − L̃_jj M)_oo Z_j = −R_j + Σ_i D_ij (M X̃_i)_o + Σ_i (D_ij + F_ij) M_oo Z_i,
         N D = X̃ᵀR + RᵀZ + L̃ᵀW − W L̃ − W D,    N = X̃ᵀM X̃,  W = X̃ᵀM Z,  F = L̃ off its diagonal.
 
-    1. The matrices on the left are bounded away from singular (`Comparison`).
+    1. The matrices on the left are bounded away from singular (`SolutionBounds`).
     2. Where bounds |Z| ≤ Y and |D| ≤ E give themselves back through these equations, Brouwer's
        theorem gives a subspace there, at every u of the box (as Rump 2001). Products of the
        unknowns count twice (`SubspaceEquations.right_sides`), so the map contracts: the subspace
        is the only one there and continuous in u.
     3. The equations' derivative is then regular, which it would not be if L shared an eigenvalue
        with the modes outside. So no mode of a block ever meets another of outside: a block holds
-       the same numbers of modes, counted from below, as in the middle, and blocks are M-orthogonal.
+       the same numbers of modes, counted from below, as at the midpoint, and blocks are
+       M-orthogonal.
 
     Args:
         block: Numbers of its modes, shape (p,).
-        rotation: Rotation R of X̃ in the rows of the block, shape (p, p).
+        rotation: Rotation of X̃ in the rows of the block, shape (p, p).
         series: That of `subspace_series`.
         centre: M and K.
 
     Returns:
         The block with proved remainders; None if K − L̃_jj M may be singular or no bounds hold.
     """
-    mass, stiffness, p = centre.mass, centre.stiffness, len(block)
-    o = np.setdiff1d(np.arange(len(centre.basis)), block)
-    L = _polynomial([rotation.T @ part @ rotation for part in series[0]], mass.inputs)
-    x = _polynomial([rotation.T @ part for part in series[1]], mass.inputs)
+    mass = centre.mass
+    stiffness = centre.stiffness
+    p = len(block)
+    others = np.setdiff1d(np.arange(len(centre.basis)), block)
+    rotated = [rotation.T @ part @ rotation for part in series.eigenvalue_block]
+    L = _polynomial(rotated, mass.inputs)
+    x = _polynomial([rotation.T @ part for part in series.shapes], mass.inputs)
+
+    # 1. Regular matrices on the left.
     systems = []
     for j in range(p):
         shifted = stiffness.truncated(2) - mass.truncated(2) * L[j, j].truncated(2)
-        systems.append(Comparison.over_box(shifted[o[:, None], o]))
-        if not systems[-1].regular:
+        systems.append(SolutionBounds.over_box(shifted[others[:, np.newaxis], others]))
+        if not systems[-1].is_regular:
             return None
     Mx = x @ mass
-    norm = x @ Mx.T
-    inverse_norm = inverse_bound(norm)
-    if inverse_norm is None:
+    modal_mass = x @ Mx.T
+    inverse_modal_mass = inverse_bound(modal_mass)
+    if inverse_modal_mass is None:
         return None
+
+    # 2. Bounds that give themselves back. They are widened until they do, by a factor of 1.02 a
+    # round; the factor 1.001 makes rounding of the linear systems harmless.
     diagonal = L[np.arange(p), np.arange(p)]
     equations = SubspaceEquations(
         residual=(x @ stiffness - L @ Mx).magnitude(),
-        shape=x.magnitude(),
-        mass_shape=Mx.magnitude(),
+        shapes=x.magnitude(),
+        mass_times_shapes=Mx.magnitude(),
         mass=mass.magnitude(),
         coupling=L.magnitude() * (1.0 - np.eye(p)),
         difference=(diagonal[:, None] - diagonal[None, :]).magnitude(),
     )
-    Y, E = np.zeros_like(equations.residual), np.zeros_like(equations.coupling)
-    for _ in range(ROUNDS):
+    Y = np.zeros_like(equations.residual)
+    E = np.zeros_like(equations.coupling)
+    for _ in range(60):
         right = equations.right_sides(Y, E)
         new_Y = np.zeros_like(Y)
         for j, system in enumerate(systems):
-            new_Y[j, o] = system.solution_bounds(right.of_shape[j, o])
-        new_E = right.of_rate @ inverse_norm
-        if not (new_Y.max() < MAX_SHAPE and np.isfinite(new_E).all()):
+            new_Y[j, others] = system.solution_bounds(right.of_shapes[j, others])
+        new_E = right.of_eigenvalues @ inverse_modal_mass
+        # Entries of X are 1 in the block's own row; far larger bounds do not converge.
+        if not (new_Y.max() < 10.0 and np.isfinite(new_E).all()):
             return None
-        if (SLACK * new_Y <= Y).all() and (SLACK * new_E <= E).all():
+        if (1.001 * new_Y <= Y).all() and (1.001 * new_E <= E).all():
             break
-        Y, E = 1.02 * np.maximum(new_Y, Y), 1.02 * np.maximum(new_E, E)
+        Y = 1.02 * np.maximum(new_Y, Y)
+        E = 1.02 * np.maximum(new_E, E)
     else:
         return None
-    norm_error = Y @ equations.mass_shape.T
-    M = equations.mass
-    norm = norm.widened(norm_error + norm_error.T + Y @ M @ Y.T)
-    return Block(block, L.widened(E), x.widened(Y), Mx.widened(Y @ M), norm)
+    of_products = Y @ equations.mass_times_shapes.T
+    error = of_products + of_products.T + Y @ equations.mass @ Y.T
+    return Block(
+        modes=block,
+        eigenvalue_block=L.widened(E),
+        shapes=x.widened(Y),
+        mass_times_shapes=Mx.widened(Y @ equations.mass),
+        modal_mass=modal_mass.widened(error),
+    )
 
 
 def _polynomial(parts: list[Array], inputs: int) -> TaylorModel:
+    """Return polynomials with given coefficients by degree as Taylor models without remainders."""
     return TaylorModel(tuple(parts), np.zeros(parts[0].shape[1:]), inputs, len(parts) - 1)
 
 
-def eigenvalue_drop(matrix: TaylorModel, scale: Array, sign: float) -> float:
-    """Bound over the box of how far eigenvalues of sign × S (A(u) − A(0)) S fall below 0.
+def max_eigenvalue_decrease(matrix: TaylorModel, scale: Array, *, sign: float) -> float:
+    """Bound over the box how far eigenvalues of sign × S (A(u) − A(0)) S fall below 0.
 
-    `matrix` is A (n, n), symmetric, and `scale` the diagonal of S (n,).
+    Args:
+        matrix: A, symmetric, shape (n, n).
+        scale: Diagonal of S, shape (n,).
+        sign: 1 or −1.
     """
     if not len(scale):
         return 0.0
-    weight, low = sign * np.outer(scale, scale), matrix.truncated(2)
-    linear, quadratic = low.homogeneous_part(1) * weight, low.homogeneous_part(2) * weight
-    lists = monomials(matrix.inputs, 2)
-    norm_1 = min(_norm_of_sizes(linear), _linear_norm(linear))
-    norm_2 = min(_norm_of_sizes(quadratic), _norm_of_terms(quadratic, lists[:, 0] == lists[:, 1]))
-    norm_3 = float(np.linalg.norm(np.abs(weight) * low.remainder, 2))
-    return norm_1 + norm_2 + norm_3 + gamma(100 * len(scale))
+    weight = sign * np.outer(scale, scale)
+    low_order = matrix.truncated(2)
+    linear = low_order.homogeneous_part(1) * weight
+    quadratic = low_order.homogeneous_part(2) * weight
+    factors = monomials(matrix.inputs, 2)
+    is_square = factors[:, 0] == factors[:, 1]
+    of_linear = min(_norm_of_magnitudes(linear), _norm_over_box(linear))
+    of_quadratic = min(_norm_of_magnitudes(quadratic), _norm_of_terms(quadratic, is_square))
+    of_remainder = float(np.linalg.norm(np.abs(weight) * low_order.remainder, 2))
+    return of_linear + of_quadratic + of_remainder + gamma(100 * len(scale))
 
 
-def _norm_of_sizes(terms: Array) -> float:
-    """Bound of ‖Σ_α u^α V_α‖₂ by that of the matrix of sums of magnitudes."""
-    return float(np.linalg.norm(np.abs(terms).sum(0), 2))
+def _norm_of_magnitudes(terms: Array) -> float:
+    """Bound ‖Σ_α u^α V_α‖₂ for |u_i| ≤ 1 and V_α = `terms` (K, n, n) by the norm of Σ |V_α|.
+
+    |V| is taken entry by entry.
+    """
+    return float(np.linalg.norm(np.abs(terms).sum(axis=0), 2))
 
 
-def _linear_norm(terms: Array) -> float:
-    """Bound of ‖Σ_i u_i V_i‖₂ over the box |u_i| ≤ 1, for symmetric V_i = `terms` (d, n, n)."""
+def _norm_over_box(terms: Array) -> float:
+    """Bound ‖Σ_i u_i V_i‖₂ over the box |u_i| ≤ 1, for symmetric V_i = `terms` (d, n, n).
+
+    The norm is convex in u, so its maximum is at a corner. All signs of the ten largest V_i are
+    tried, 2⁹ corners; the other V_i count by their absolute values.
+    """
     by_sum = _norm_of_terms(terms, np.zeros(len(terms), bool))
-    if by_sum <= SMALL:
+    if by_sum <= 0.1:  # sharp enough: only its distance from 1 matters
         return by_sum
-    # the norm is convex, so that corners suffice; those of the largest V_i are tried
     terms = terms[np.argsort(-np.linalg.norm(terms, axis=(1, 2)))]
-    first, further_terms = terms[:CORNERS], terms[CORNERS:]
-    # all corners but for a common sign, which does not change the norm
-    signs = 1 - 2 * (np.arange(2 ** (len(first) - 1))[:, None] >> np.arange(len(first)) & 1)
+    first = terms[:10]
+    others = terms[10:]
+    # The bits of a corner's number are its signs. A common sign does not change the norm, so that
+    # half of the corners suffice.
+    corners = np.arange(2 ** (len(first) - 1))[:, np.newaxis]
+    signs = 1 - 2 * (corners >> np.arange(len(first)) & 1)
     at_corners = np.abs(np.linalg.eigvalsh(np.tensordot(signs, first, 1))).max()
-    return float(at_corners) + _norm_of_terms(further_terms, np.zeros(len(further_terms), bool))
+    return float(at_corners) + _norm_of_terms(others, np.zeros(len(others), bool))
 
 
-def _norm_of_terms(terms: Array, squares: Mask) -> float:
-    """Norm of Σ_α |V_α|, |V| the absolute value of a symmetric matrix (its eigenvalues')."""
-    some = terms.any((1, 2))
-    if not some.any():
+def _norm_of_terms(terms: Array, is_square: Mask) -> float:
+    """Return ‖Σ_α |V_α|‖₂ of symmetric V_α = `terms` (K, n, n).
+
+    |V| has the absolute values of the eigenvalues of V and its eigenvectors. Where `is_square` (K,)
+    is true, u^α is a square u_i² ≥ 0: only the negative part of V lowers eigenvalues then, and is
+    taken instead.
+    """
+    is_nonzero = terms.any(axis=(1, 2))
+    if not is_nonzero.any():
         return 0.0
-    value, vector = np.linalg.eigh(terms[some])
-    # of a square u_i² ≥ 0 only the negative part of V lowers eigenvalues
-    lowers = np.where(squares[some, None], np.maximum(-value, 0.0), np.abs(value))
-    total = np.einsum("aij,aj,akj->ik", vector, lowers, vector, optimize=True)
+    values, vectors = np.linalg.eigh(terms[is_nonzero])
+    of_square = is_square[is_nonzero, np.newaxis]
+    magnitudes = np.where(of_square, np.maximum(-values, 0.0), np.abs(values))
+    total = np.einsum("aij,aj,akj->ik", vectors, magnitudes, vectors, optimize=True)
     return float(np.linalg.norm(total, 2))
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """Bounds of solutions of A y = r: by Ostrowski's comparison matrix (1937), or in √Σ D y².
+class SolutionBounds:
+    """Bounds over a box of inputs of the solutions y of A y = r, for a symmetric matrix A (n, n).
 
-    With B = D^-½ A D^-½ and J = diag ±1, as A_jj is positive or negative, (J y)·B y has no part of
-    the blocks that join rows with A_jj > 0 to those with A_jj < 0. So |B y| ≥ least |y| where no
-    eigenvalue of either block, the second with its sign turned, falls below `least`.
+    Two bounds are computed, each of which may fail: by Ostrowski's comparison matrix (1937), entry
+    by entry, and in the norm √Σ D y² with the magnitudes D of the diagonal at the midpoint.
     """
 
-    distance: Array  # D = |A_jj| in the middle of the box, (n,)
-    spread: Array  # bound of |A − A(0)|, (n, n)
-    inverse: Array | None  # of the comparison matrix, a bound of |A⁻¹|; None where there is none
-    least: float  # bound of both blocks of J B from below
+    abs_diagonal: Array  # D = |A_jj| at the midpoint of the box, (n,)
+    radius: Array  # bound of |A − A(0)|, (n, n)
+    inverse_bound: Array | None  # bound of |A⁻¹|, (n, n); None where Neumann's series may diverge
+    min_eigenvalue: float  # a number b with |D^-½ r| ≥ b |D^½ y|; useful if positive
 
     @classmethod
-    def over_box(cls, matrix: TaylorModel) -> Comparison:
-        """Comparison of a matrix that is diagonal in the middle of the box."""
-        middle = np.diag(matrix.value)
-        distance, drops = np.abs(middle), [0.0]
-        for sign, rows in ((1.0, middle > 0), (-1.0, middle <= 0)):
-            o = np.flatnonzero(rows)
-            drops.append(eigenvalue_drop(matrix[o[:, None], o], distance[o] ** -0.5, sign))
-        return cls(distance, matrix.deviation(), inverse_bound(matrix), 1 - max(drops))
+    def over_box(cls, matrix: TaylorModel) -> SolutionBounds:
+        """Prepare the bounds for a matrix that is diagonal at the midpoint, without zeros there.
+
+        Raises:
+            numpy.linalg.LinAlgError: The matrix is singular at the midpoint.
+        """
+        diagonal = np.diag(matrix.value)
+        abs_diagonal = np.abs(diagonal)
+        # Scale A to B = D^-½ A D^-½, which at the midpoint is the diagonal matrix J of the signs ±1
+        # of the diagonal of A. Let P and N be the rows with the sign 1 and −1. In
+        #     (J y)·B y = y_P·B_PP y_P − y_N·B_NN y_N
+        # the blocks B_PN and B_NP = B_PNᵀ cancel. If no eigenvalue of B_PP and of −B_NN is below b,
+        # then b |y|² ≤ (J y)·B y ≤ |y| |B y|, hence |B y| ≥ b |y|. At the midpoint both blocks are
+        # the identity, so b is 1 minus the largest decrease of an eigenvalue over the box.
+        largest_decrease = 0.0
+        for sign, has_sign in ((1.0, diagonal > 0), (-1.0, diagonal <= 0)):
+            rows = np.flatnonzero(has_sign)
+            block = matrix[rows[:, np.newaxis], rows]
+            decrease = max_eigenvalue_decrease(block, abs_diagonal[rows] ** -0.5, sign=sign)
+            largest_decrease = max(largest_decrease, decrease)
+        return cls(
+            abs_diagonal=abs_diagonal,
+            radius=matrix.deviation(),
+            inverse_bound=inverse_bound(matrix),
+            min_eigenvalue=1 - largest_decrease,
+        )
 
     @property
-    def regular(self) -> bool:
+    def is_regular(self) -> bool:
         """True if A is singular nowhere in the box."""
-        return self.inverse is not None or self.least > 0
+        return self.inverse_bound is not None or self.min_eigenvalue > 0
 
     def solution_bounds(self, right: Array) -> Array:
-        """Bounds of |y|, entry by entry, for all solutions of A y = r with |r| ≤ `right` (n,)."""
-        scale = self.distance**-0.5
+        """Return bounds of |y|, (n,), for all solutions of A y = r with |r| ≤ `right`, (n,)."""
         y: Array = np.full(len(right), np.inf)
-        if self.least > 0:
-            y = np.asarray(scale * np.linalg.norm(scale * right) / self.least)
-        if self.inverse is not None:
-            y = np.minimum(y, self.inverse @ right)
-        diagonal = self.distance - np.diag(self.spread)
-        off = self.spread - np.diag(np.diag(self.spread))
-        positive = diagonal > 0
-        divisor = np.where(positive, diagonal, 1.0)
-        for _ in range(REFINEMENTS):  # |y_j| ≤ (r_j + Σ_l |A_jl| |y_l|) / |A_jj|
-            y = np.where(positive, np.minimum(y, (right + off @ y) / divisor), y)
+        if self.min_eigenvalue > 0:
+            scale = self.abs_diagonal**-0.5
+            y = np.asarray(scale * np.linalg.norm(scale * right) / self.min_eigenvalue)
+        if self.inverse_bound is not None:
+            y = np.minimum(y, self.inverse_bound @ right)
+        # Each row gives a bound by those of the other entries, |y_j| ≤ (r_j + Σ_l |A_jl| |y_l|) /
+        # |A_jj|, where |A_jj| cannot be zero. Eight rounds suffice; more change little.
+        min_diagonal = self.abs_diagonal - np.diag(self.radius)
+        off_diagonal = self.radius - np.diag(np.diag(self.radius))
+        is_positive = min_diagonal > 0
+        divisor = np.where(is_positive, min_diagonal, 1.0)
+        for _ in range(8):
+            y = np.where(is_positive, np.minimum(y, (right + off_diagonal @ y) / divisor), y)
         return y

@@ -10,21 +10,13 @@ from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.blocks import Block, CentredMatrices, eigenvalue_drop, narrowest_block
+from alphacut.frame.modes.blocks import (
+    Block,
+    CentredMatrices,
+    max_eigenvalue_decrease,
+    narrowest_block,
+)
 from alphacut.frame.structures.linear import undamped_modes
-
-NEAR = 2.0
-"""First-order change of the distance of two λ over the box, as a share of that distance, from which
-they are a block without an attempt to enclose them alone, which fails at some number between 1 and
-2."""
-LEAST_NEAR = 0.4
-"""The same from which a mode joins a block that is not enclosed without it."""
-MAX_BLOCK = 12
-"""Most modes of a block."""
-EQUAL = 1e-9
-"""Relative distance up to which two λ count as equal: that of their rounding and some more."""
-SWEEPS = 12
-"""Sweeps of Jacobi rotations at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,42 +26,60 @@ class Subspaces:
     blocks: list[Block]  # functions of the inputs at `used`
     used: Ints  # inputs that mass and stiffness depend on
     centre: CentredMatrices  # mass and stiffness in the coordinates of the blocks
-    low: Array  # least λ of all modes by number from below, (modes,), in 1/s²
-    high: Array  # greatest
-    # bounds of how far M and K fall below M(0) and K(0), as shares of these
-    variation: tuple[float, float]
-    # input whose bisection parts the closest pair that is not enclosed; None if all are
-    along: int | None
+    # range of the eigenvalue of every mode, by number from below, (modes,), in 1/s²
+    eigenvalue_low: Array
+    eigenvalue_high: Array
+    # bounds μ and κ of M ≥ (1 − μ) M(0) and K ≥ (1 − κ) K(0) over the box
+    mass_decrease: float
+    stiffness_decrease: float
+    # input whose bisection separates the closest pair that is not enclosed; None if all are
+    bisection_input: int | None
 
     @property
-    def others(self) -> Ints:
+    def truncated_modes(self) -> Ints:
         """Numbers of the modes that are not enclosed, rising."""
-        taken = [block.modes for block in self.blocks]
-        return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
+        enclosed = [block.modes for block in self.blocks]
+        return np.setdiff1d(np.arange(self.centre.mode_count), np.concatenate([[], *enclosed]))
 
 
 def enclose_subspaces(
-    centre: CentredMatrices, used: Ints, wanted: int, tolerances: Array | None = None
+    centre: CentredMatrices, used: Ints, count: int, tolerances: Array | None = None
 ) -> Subspaces:
     """Enclose the lowest modes over the box, in blocks, from below until one is not enclosed.
 
     A block that cannot be enclosed is joined by the mode nearest to it, and tried again.
 
-    `wanted` is the number of modes to enclose, `used` are the inputs of M and K among all, and
-    `tolerances` relative errors of each mode's λ that suffice; 0 unless given.
+    Args:
+        centre: Mass and stiffness as functions of the inputs that they depend on.
+        used: Which of all inputs these are.
+        count: Number of modes to enclose.
+        tolerances: Relative errors of the eigenvalue of each mode that suffice, shape (modes,); 0
+            unless given.
 
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
-    tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
-    couplings = _couplings(centre, np.arange(centre.modes))
-    slopes = np.diagonal(couplings, axis1=1, axis2=2).T  # ∂λ_j/∂u_i in the middle, (modes, d)
-    steepest = int((np.abs(slopes) / centre.squared[:, None]).max(0).argmax())  # input, of λ
-    low, high, variation = _ranges(centre, int(used[steepest]))
-    near, blocks, along = _nearness(centre, couplings), list[Block](), None
-    free: Ints = np.arange(centre.modes)
-    while len(free) and free[0] < wanted and along is None:
-        modes, block = _linked(near > NEAR, free[:1], free), None
+    tolerances = np.zeros(centre.mode_count) if tolerances is None else tolerances
+    couplings = _couplings(centre, np.arange(centre.mode_count))
+    slopes = np.diagonal(couplings, axis1=1, axis2=2).T  # ∂λ_j/∂u_i at the midpoint, (modes, d)
+    relative_slopes = np.abs(slopes) / centre.eigenvalues[:, np.newaxis]
+    steepest_input = int(used[relative_slopes.max(axis=0).argmax()])
+    mass_decrease, stiffness_decrease = _decreases(centre, steepest_input)
+    # Rayleigh quotients φᵀKφ / φᵀMφ, with K between (1 ± κ) K(0) and M between (1 ± μ) M(0), and
+    # Courant's minimum principle.
+    low_factor = (1 - gamma(4)) * (1 - stiffness_decrease) / (1 + mass_decrease)
+    high_factor = (1 + gamma(4)) * (1 + stiffness_decrease) / (1 - mass_decrease)
+
+    nearness = _nearness(centre, couplings)
+    # From a nearness of 2 on modes are one block without an attempt to enclose them alone, which
+    # fails at some number between 1 and 2.
+    is_linked = nearness > 2.0
+    blocks = list[Block]()
+    bisection_input = None
+    free: Ints = np.arange(centre.mode_count)
+    while len(free) and free[0] < count and bisection_input is None:
+        modes = _linked(is_linked, free[:1], free)
+        block = None
         while block is None:
             tolerance = float(tolerances[modes].min())
             block = narrowest_block(modes, rotation(centre, modes), centre, tolerance)
@@ -77,105 +87,157 @@ def enclose_subspaces(
                 blocks.append(block)
                 free = np.setdiff1d(free, modes)
                 break
-            outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
+            outside = nearness[np.ix_(modes, free)] * ~np.isin(free, modes)
             inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
-            if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
+            # Both limits are tuned: the nearness from which a mode may be what hinders the
+            # enclosure, and the number of modes of a block, with which the effort grows.
+            if outside[inner, outer] < 0.4 or len(modes) >= 12:
                 drift = slopes[modes[inner]] - slopes[free[outer]]
-                along = int(used[np.abs(drift).argmax()])
+                bisection_input = int(used[np.abs(drift).argmax()])
                 break
-            modes = _linked(near > NEAR, np.append(modes, free[outer]), free)
-    return Subspaces(blocks, used, centre, low, high, variation, along)
+            modes = _linked(is_linked, np.append(modes, free[outer]), free)
+    return Subspaces(
+        blocks=blocks,
+        used=used,
+        centre=centre,
+        eigenvalue_low=low_factor * centre.eigenvalues,
+        eigenvalue_high=high_factor * centre.eigenvalues,
+        mass_decrease=mass_decrease,
+        stiffness_decrease=stiffness_decrease,
+        bisection_input=bisection_input,
+    )
 
 
-def _ranges(centre: CentredMatrices, along: int) -> tuple[Array, Array, tuple[float, float]]:
-    """Bounds of all λ over the box from M ≥ (1 − μ) M(0), K ≥ (1 − κ) K(0) and such, with μ, κ."""
-    scales = centre.has_mass, np.diag(centre.stiffness.value) ** -0.5
-    mass, stiffness = (
-        max(eigenvalue_drop(matrix, scale, sign) for sign in (1.0, -1.0))
-        for matrix, scale in zip((centre.mass, centre.stiffness), scales, strict=True)
+def _decreases(centre: CentredMatrices, steepest_input: int) -> tuple[float, float]:
+    """Return μ and κ with |M − M(0)| ≤ μ M(0) and |K − K(0)| ≤ κ K(0) as quadratic forms.
+
+    Raises:
+        UnprovedError: One of both is not below 1; `steepest_input` is named as the one to bisect.
+    """
+    mass_scale = centre.has_mass
+    stiffness_scale = np.diag(centre.stiffness.value) ** -0.5
+    mass = max(
+        max_eigenvalue_decrease(centre.mass, mass_scale, sign=1.0),
+        max_eigenvalue_decrease(centre.mass, mass_scale, sign=-1.0),
+    )
+    stiffness = max(
+        max_eigenvalue_decrease(centre.stiffness, stiffness_scale, sign=1.0),
+        max_eigenvalue_decrease(centre.stiffness, stiffness_scale, sign=-1.0),
     )
     if not (mass < 1 and stiffness < 1):
         what = "the structure may lose its stiffness"
-        raise UnprovedError(what, "take narrower inputs", along)
-    # Rayleigh quotients φᵀKφ / φᵀMφ and Courant's minima and maxima
-    low = (1 - gamma(4)) * (1 - stiffness) / (1 + mass) * centre.squared
-    high = (1 + gamma(4)) * (1 + stiffness) / (1 - mass) * centre.squared
-    return low, high, (mass, stiffness)
+        raise UnprovedError(what, "take narrower inputs", steepest_input)
+    return mass, stiffness
 
 
 def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Ints]:
-    """M and K in coordinates that make both diagonal in the middle of the box.
+    """Return M and K in coordinates that make both diagonal at the midpoint of the box.
 
     Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
-    of their own, in which K is as large as the greatest λ.
+    of their own, in which K is as large as the largest eigenvalue.
 
-    Rows of M, shape (n, n), are zero where unknowns have no mass.
+    Args:
+        mass: M, shape (n, n). Its rows are zero where unknowns have no mass.
+        stiffness: K, shape (n, n).
 
     Returns:
         The matrices as functions of the inputs that M or K depends on, and the numbers of these.
 
     Raises:
-        UnprovedError: The structure can move rigidly, or is unstable, in the middle.
+        UnprovedError: The structure can move rigidly, or is unstable, at the midpoint.
     """
-    massive = np.asarray(mass.magnitude().any(1))
-    M, K, n = mass.value, stiffness.value, len(massive)
-    a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
+    is_massive = np.asarray(mass.magnitude().any(axis=1))
+    M = mass.value
+    K = stiffness.value
+    n = len(is_massive)
+    a = np.flatnonzero(is_massive)
+    b = np.flatnonzero(~is_massive)
     massless_values, massless_vectors = np.linalg.eigh(K[np.ix_(b, b)])
     _require_stiff(massless_values, K)
     follow = -(massless_vectors / massless_values) @ massless_vectors.T @ K[np.ix_(b, a)]
-    squared, shapes = undamped_modes(M[np.ix_(a, a)], K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow)
-    _require_stiff(squared, squared)
+    condensed_stiffness = K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow
+    eigenvalues, shapes = undamped_modes(M[np.ix_(a, a)], condensed_stiffness)
+    _require_stiff(eigenvalues, eigenvalues)
     basis: Array = np.zeros((n, n))
     basis[a, : len(a)] = shapes
     basis[b, : len(a)] = follow @ shapes
-    basis[b, len(a) :] = massless_vectors * np.sqrt(squared[-1] / massless_values)
+    basis[b, len(a) :] = massless_vectors * np.sqrt(eigenvalues[-1] / massless_values)
+
     used = np.union1d(mass.active_inputs(), stiffness.active_inputs())
-    used = used if len(used) else np.arange(1)
-    heavy, stiff = (basis.T @ matrix.restricted_to(used) @ basis for matrix in (mass, stiffness))
-    weight = (np.arange(n) < len(a)).astype(float)
-    diagonals = _diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value))
-    return CentredMatrices(*diagonals, basis, len(a)), used
+    if not len(used):
+        used = np.arange(1)
+    modal_mass = basis.T @ mass.restricted_to(used) @ basis
+    modal_stiffness = basis.T @ stiffness.restricted_to(used) @ basis
+    has_mass = (np.arange(n) < len(a)).astype(float)
+    centre = CentredMatrices(
+        mass=_with_midpoint(modal_mass, has_mass),
+        stiffness=_with_midpoint(modal_stiffness, np.diag(modal_stiffness.value)),
+        basis=basis,
+        mode_count=len(a),
+    )
+    return centre, used
 
 
-def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
-    """The same with a diagonal in the middle, which it has but for rounding, put into the rest."""
-    middle = np.diag(diagonal)
-    remainder = matrix.remainder + np.abs(matrix.value - middle)
-    return TaylorModel((middle[None], *matrix.parts[1:]), remainder, matrix.inputs, matrix.order)
+def _with_midpoint(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
+    """Return a matrix that is diagonal at the midpoint, where it was so but for rounding.
+
+    The difference, shape (n, n), is added to the remainder.
+    """
+    midpoint = np.diag(diagonal)
+    remainder = matrix.remainder + np.abs(matrix.value - midpoint)
+    return TaylorModel((midpoint[None], *matrix.parts[1:]), remainder, matrix.inputs, matrix.order)
 
 
-def _require_stiff(values: Array, like: Array) -> None:
-    if len(values) and values.min() <= 1e-12 * np.abs(like).max():
+def _require_stiff(eigenvalues: Array, scale: Array) -> None:
+    """Raise UnprovedError unless all eigenvalues are positive by more than rounding of `scale`."""
+    if len(eigenvalues) and eigenvalues.min() <= 1e-12 * np.abs(scale).max():
         what = "the structure may move rigidly or lose its stiffness"
         raise UnprovedError(what, "take the method improved-graph-follower")
 
 
-def _couplings(centre: CentredMatrices, some: Ints) -> Array:
-    """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
-    stiff, heavy = (
-        x.homogeneous_part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass)
-    )
-    mean = (centre.squared[some, None] + centre.squared[some]) / 2
-    return np.asarray(stiff - mean * heavy)
+def _couplings(centre: CentredMatrices, modes: Ints) -> Array:
+    """Return first-order changes over the box of K − λ M between some modes, shape (d, p, p).
+
+    λ is the mean of the eigenvalues of both modes.
+    """
+    pairs = modes[:, np.newaxis], modes
+    stiffness = centre.stiffness.homogeneous_part(1)[:, *pairs]
+    mass = centre.mass.homogeneous_part(1)[:, *pairs]
+    eigenvalues = centre.eigenvalues[modes]
+    mean = (eigenvalues[:, np.newaxis] + eigenvalues) / 2
+    return np.asarray(stiffness - mean * mass)
 
 
 def _nearness(centre: CentredMatrices, couplings: Array) -> Array:
-    """First-order change of λ_j − λ_k over the box, over that distance in its middle, a matrix."""
-    # from 1 on two modes may meet at complex inputs of sizes up to 1, where their series diverge
+    """Return how near any two modes come over the box, shape (modes, modes); 0 on the diagonal.
+
+    It is the first-order change of λ_j − λ_k over the box, with their coupling, divided by the
+    distance of both at the midpoint. From 1 on two modes may meet at complex inputs of magnitude up
+    to 1, and their series diverge. It is infinite for modes of equal frequencies, which have no
+    shapes of their own, whether their frequencies separate in the box or not.
+    """
     slopes = np.diagonal(couplings, axis1=1, axis2=2).T
-    change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * np.abs(couplings).sum(0)
-    distance = np.abs(centre.squared[:, None] - centre.squared)
-    # modes of equal frequencies have no shapes of their own, whether they part in the box or not
-    equal = distance <= EQUAL * np.maximum(centre.squared[:, None], centre.squared)
-    near = np.where(equal, np.inf, change / np.where(equal, 1.0, distance))
-    near[np.diag_indices_from(near)] = 0.0
-    return near
+    of_slopes = np.abs(slopes[:, np.newaxis] - slopes).sum(axis=-1)
+    change = of_slopes + 2 * np.abs(couplings).sum(axis=0)
+    eigenvalues = centre.eigenvalues
+    distance = np.abs(eigenvalues[:, np.newaxis] - eigenvalues)
+    # A relative distance of 1e-9 is that of their rounding and some more.
+    is_equal = distance <= 1e-9 * np.maximum(eigenvalues[:, np.newaxis], eigenvalues)
+    nearness = np.where(is_equal, np.inf, change / np.where(is_equal, 1.0, distance))
+    nearness[np.diag_indices_from(nearness)] = 0.0
+    return nearness
 
 
 def _linked(pairs: Mask, modes: Ints, free: Ints) -> Ints:
-    """Numbers of the free modes that `pairs` link to `modes`, directly or through others."""
+    """Return the free modes that are linked to some modes, directly or through others, rising.
+
+    Args:
+        pairs: Which modes are linked to which, shape (modes, modes).
+        modes: Numbers of the modes to begin with.
+        free: Numbers of the free modes.
+    """
     while True:
-        neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(0)))
+        neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(axis=0)))
         extended = np.union1d(modes, neighbours)
         if len(extended) == len(modes):
             return np.sort(modes)
@@ -183,26 +245,34 @@ def _linked(pairs: Mask, modes: Ints, free: Ints) -> Ints:
 
 
 def rotation(centre: CentredMatrices, modes: Ints) -> Array:
-    """Rotation R of p modes after which K − λ M is nearly diagonal over the box, shape (p, p).
+    """Return a rotation R of p modes after which K − λ M is nearly diagonal over the box, (p, p).
 
-    Joint diagonalisation of K − λ M in the middle and of its derivatives by all inputs, by Jacobi
-    rotations (Cardoso, Souloumiac 1996). So modes that cross keep their shapes at the crossing.
+    It is the joint diagonalisation of K − λ M at the midpoint and of its derivatives by all inputs,
+    by Jacobi rotations (Cardoso, Souloumiac 1996). So modes that cross keep their shapes at the
+    crossing. Any rotation gives valid enclosures.
     """
     p = len(modes)
-    matrices = np.concatenate([np.diag(centre.squared[modes])[None], _couplings(centre, modes)])
-    total, pairs = np.eye(p), [(i, j) for i in range(p) for j in range(i)]
-    for _ in range(SWEEPS):
-        largest = 0.0
-        for i, j in pairs:
-            # matrices' parts on which a rotation by 2 × angle acts
-            h = np.stack([matrices[:, i, i] - matrices[:, j, j], 2 * matrices[:, i, j]])
-            on, off = float(h[0] @ h[0] - h[1] @ h[1]), float(2 * h[0] @ h[1])
-            angle = np.arctan2(off, on + np.hypot(on, off)) / 2
-            step = np.eye(p)
-            step[i, i] = step[j, j] = np.cos(angle)
-            step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
-            matrices, total = step.T @ matrices @ step, total @ step
-            largest = max(largest, abs(angle))
-        if largest < 1e-12:
+    at_midpoint = np.diag(centre.eigenvalues[modes])
+    matrices = np.concatenate([at_midpoint[None], _couplings(centre, modes)])
+    total = np.eye(p)
+    for _ in range(12):  # sweeps; Jacobi's method converges quadratically
+        largest_angle = 0.0
+        for i in range(p):
+            for j in range(i):
+                # A rotation by φ turns the vector (A_ii − A_jj, 2 A_ij) of each matrix by 2 φ. The
+                # sum of its squared second entries is smallest at this angle.
+                difference = matrices[:, i, i] - matrices[:, j, j]
+                coupling = 2 * matrices[:, i, j]
+                on = float(difference @ difference - coupling @ coupling)
+                off = float(2 * difference @ coupling)
+                angle = np.arctan2(off, on + np.hypot(on, off)) / 2
+                step = np.eye(p)
+                step[i, i] = step[j, j] = np.cos(angle)
+                step[j, i] = np.sin(angle)
+                step[i, j] = -np.sin(angle)
+                matrices = step.T @ matrices @ step
+                total = total @ step
+                largest_angle = max(largest_angle, abs(angle))
+        if largest_angle < 1e-12:
             break
     return total

@@ -1,14 +1,16 @@
 """Intervening variables of the modes (section 7) as Taylor models with proved remainders.
 
-Functions of the inputs of which the motion is made (Barthelemy, Haftka 1993).
+Intervening variables are functions of the inputs of which the response is made (Barthelemy, Haftka
+1993). An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity,
+start), with few numbers for each mode: its frequency ω_k, its decay g_k and its participation
+factors c_ks = (r·x)(x·M v_s)/(x·M x). Here x is the mode shape, r the row of the output, and v_s
+the pattern of the ground or the initial state. These numbers bend little over the box, however many
+inputs it has.
 
-An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start), with
-few numbers a mode: its frequency ω_k, its decay g_k and its shares c_ks = (r·x)(x·M v_s)/(x·M x), r
-the output's row and v_s the pattern of the ground or the start. They bend little over the box,
-however many inputs it has.
-
-A block of p modes answers a e(L) β with a = r X, β = N⁻¹ Xᵀ M v. Each diagonal entry of L is an
-oscillator with the share a_j β_j, as if it were a mode; what couples them is bounded (`rest`).
+A block of p modes with the invariant subspace K X = M X L contributes a e(L) β, with a = r X and
+β = N⁻¹ Xᵀ M v, N = Xᵀ M X. Each diagonal entry of L is an oscillator with the participation factor
+a_j β_j, as if it were a mode; what couples the oscillators is bounded
+(`truncated_modes.coupling_bounds`).
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,176 +27,236 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.clusters import Subspaces
-from alphacut.frame.modes.structure import Classical
+from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid
 
-MAX_PAIRS = 100_000
-"""Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""
-DEGREES = (4, 6)
-"""Least and greatest degree of shares, before what is above the third is left to the rest."""
 Ends = tuple[float, float]
-Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
-"""The loads by name, the nodes, and the names of what moves the structure."""
+"""Lower and upper end of a range."""
+
+
+class Excitation(NamedTuple):
+    """What moves a structure, and when its response is wanted."""
+
+    loads: Mapping[str, History]  # histories of loads and forces by name
+    time: Array  # time nodes, (T,), in s
+    sources: Sequence[str]  # names of the loads, and "velocity", "start"
 
 
 @dataclass(frozen=True, eq=False)
 class Oscillator:
     """Intervening variables of one mode, or of one diagonal entry of a block."""
 
-    omega: TaylorModel  # ω, a scalar, in rad/s
+    omega: TaylorModel  # damped frequency ω, a scalar, in rad/s
     decay: TaylorModel  # g, a scalar, in 1/s
     quotient: TaylorModel  # g/ω, a scalar
-    share: TaylorModel  # c, (sources, m)
-    omega_range: Ends  # least and greatest ω
-    quotient_range: Ends  # least and greatest g/ω
+    participation: TaylorModel  # participation factors c, (sources, m)
+    omega_range: Ends  # range of ω over the box, which may be narrower than that of the model
+    quotient_range: Ends  # range of g/ω
 
     @property
     def models(self) -> list[TaylorModel]:
         """All its models: ω, g, g/ω, c."""
-        return [self.omega, self.decay, self.quotient, self.share]
+        return [self.omega, self.decay, self.quotient, self.participation]
 
-    def on_part(self, models: Sequence[TaylorModel]) -> Oscillator:
-        """The same over a part of the box, with its models there."""
-        omega, decay, quotient, share = models
-        ends = _overlap(_ends(omega), self.omega_range)
-        quotients = _overlap(_ends(quotient), self.quotient_range)
-        return Oscillator(omega, decay, quotient, share, ends, quotients)
+    def on_subbox(self, models: Sequence[TaylorModel]) -> Oscillator:
+        """Return the oscillator over a sub-box, given its `models` there."""
+        omega, decay, quotient, participation = models
+        return Oscillator(
+            omega=omega,
+            decay=decay,
+            quotient=quotient,
+            participation=participation,
+            omega_range=_overlap(_range(omega), self.omega_range),
+            quotient_range=_overlap(_range(quotient), self.quotient_range),
+        )
 
-    def places(self, grid: Grid) -> tuple[int, ...]:
-        """First and last points of a grid that enclose ω, and those that enclose g/ω."""
-        return _places(grid.omega, self.omega_range) + _places(grid.quotient, self.quotient_range)
+    def table_cell(self, grid: Grid) -> tuple[int, int, int, int]:
+        """Return the first and last points of a grid that enclose ω, and those that enclose g/ω."""
+        first, last = _enclosing_points(grid.omega, self.omega_range)
+        low, high = _enclosing_points(grid.quotient, self.quotient_range)
+        return first, last, low, high
 
 
 @dataclass(frozen=True, eq=False)
-class BlockShares:
-    """What a block takes from sources and gives to outputs, without the outputs' factors."""
+class BlockParticipation:
+    """How a block of p modes takes part in the response, without the factors of the outputs."""
 
-    block: Block  # in the inputs of the shares
-    read: TaylorModel  # a, (p, m)
-    source_forces: TaylorModel  # Xᵀ M v, (p, sources)
-    participation: TaylorModel  # β = N⁻¹ Xᵀ M v, (p, sources)
+    block: Block  # X, L and N as functions of the inputs of the other fields
+    output_modes: TaylorModel  # a, output rows times mode shapes, (p, m)
+    modal_forces: TaylorModel  # Xᵀ M v, (p, sources)
+    source_participation: TaylorModel  # β = N⁻¹ Xᵀ M v, (p, sources)
 
     @classmethod
     def from_block(
-        cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Ints
-    ) -> BlockShares:
-        """Shares of a block: r X, Xᵀ M v and N⁻¹ Xᵀ M v, of outputs r and sources v, N = Xᵀ M X.
+        cls, block: Block, rows: TaylorModel, patterns: TaylorModel, used: Ints
+    ) -> BlockParticipation:
+        """Return the participation of a block.
 
-        In the block's coordinates, `rows` r (m, n) are constant but for rounding; `excited` v
-        (sources, n) are functions of all inputs, of which the block's are at `used`.
+        Args:
+            block: The block, as a function of the inputs of mass and stiffness alone.
+            rows: Rows r of the outputs in the coordinates of the block, shape (m, n). They are
+                constant but for rounding.
+            patterns: Vectors v of the sources in the same coordinates, shape (sources, n), as
+                functions of all inputs.
+            used: Which of all inputs are those of the block.
         """
-        degree, d = DEGREES[0], block.norm.inputs
-        while degree < DEGREES[1] and comb(2 * d + degree + 1, degree + 1) <= MAX_PAIRS:
+        # The degree is the largest for which a product of two polynomials has at most 100,000 pairs
+        # of coefficients, at 3 ns each. Degrees above 6 are not worth it: what is above the third
+        # degree ends in the remainder.
+        d = block.modal_mass.inputs
+        degree = 4
+        while degree < 6 and comb(2 * d + degree + 1, degree + 1) <= 100_000:
             degree += 1
-        block = block.truncated(min(degree, block.norm.order))
-        if len(excited.active_inputs()):
-            block = block.truncated(excited.order).embedded(used, excited.inputs)
+        block = block.truncated(min(degree, block.modal_mass.order))
+        if len(patterns.active_inputs()):
+            block = block.truncated(patterns.order).embedded(used, patterns.inputs)
         else:
-            excited = block.norm.like(excited.value).widened(excited.remainder)
-        read = (block.shape @ rows.value.T).widened(block.shape.magnitude() @ rows.remainder.T)
-        source_forces = block.mass_shape @ excited.T
-        return cls(block, read, source_forces, solve(block.norm, source_forces))
+            patterns = block.modal_mass.like(patterns.value).widened(patterns.remainder)
+        rounding = block.shapes.magnitude() @ rows.remainder.T
+        modal_forces = block.mass_times_shapes @ patterns.T
+        return cls(
+            block=block,
+            output_modes=(block.shapes @ rows.value.T).widened(rounding),
+            modal_forces=modal_forces,
+            source_participation=solve(block.modal_mass, modal_forces),
+        )
 
     @property
-    def share(self) -> TaylorModel:
-        """a_j β_j of each column, shape (p, sources, m)."""
-        return self.participation[:, :, None] * self.read[:, None, :]
+    def participation(self) -> TaylorModel:
+        """Participation factors a_j β_j of each oscillator j, shape (p, sources, m)."""
+        return self.source_participation[:, :, None] * self.output_modes[:, None, :]
 
     @property
-    def of_outputs(self) -> TaylorModel:
-        """Sums a N⁻¹ aᵀ of each output, shape (m,)."""
-        return column_products(self.read, solve(self.block.norm, self.read))
+    def output_sums(self) -> TaylorModel:
+        """Sums a N⁻¹ aᵀ of each output, shape (m,): Σ a_k² over modes of unit modal mass."""
+        return column_products(self.output_modes, solve(self.block.modal_mass, self.output_modes))
 
     @property
-    def of_sources(self) -> TaylorModel:
-        """β·N β of each source, shape (sources,)."""
-        return column_products(self.source_forces, self.participation)
+    def source_sums(self) -> TaylorModel:
+        """Sums β·N β of each source, shape (sources,): Σ β_k² over modes of unit modal mass."""
+        return column_products(self.modal_forces, self.source_participation)
 
 
-def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:
-    """Intervening variables of the oscillators of a block's columns, with proved ranges.
+def oscillators(
+    structure: ClassicalStructure, participation: BlockParticipation, found: Subspaces
+) -> list[Oscillator]:
+    """Return the oscillators of a block, one for each mode, with proved ranges.
 
-    With λ = L_jj they are g = a/2 + b λ/2 + ζ √λ, a and b Rayleigh's factors, ω = √(λ − g²), g/ω
-    and the shares a_j β_j times the outputs' factors.
+    With λ = L_jj their decay is g = a/2 + b λ/2 + ζ √λ with Rayleigh's factors a and b, and their
+    frequency ω = √(λ − g²).
 
     Raises:
-        UnprovedError: They have different damping ratios.
+        UnprovedError: Modes of the block have different damping ratios.
     """
-    modes, d, order = of_block.block.modes, structure.start.inputs, structure.start.order
-    share, rate = (
-        x.truncated(order).embedded(found.used, d) for x in (of_block.share, of_block.block.rate)
-    )
-    ratio = structure.ratio[modes]
-    if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
+    modes = participation.block.modes
+    inputs = structure.initial_state.inputs
+    order = structure.initial_state.order
+
+    def over_all_inputs(model: TaylorModel) -> TaylorModel:
+        return model.truncated(order).embedded(found.used, inputs)
+
+    factors = over_all_inputs(participation.participation)
+    eigenvalue_block = over_all_inputs(participation.block.eigenvalue_block)
+    ratios = structure.damping_ratios[modes]
+    if any((part[:, 1:] != part[:, :-1]).any() for part in ratios.parts):
         raise UnprovedError(
             "modes of different damping ratios may cross", "take one ratio for all modes"
         )
-    low, high = 0.0, np.inf  # of √λ
+    # Range of √λ by Rayleigh quotients, which belongs to one mode alone.
+    low = 0.0
+    high = np.inf
     if len(modes) == 1:
-        low, high = (float(np.sqrt(x[modes[0]])) for x in (found.low, found.high))
+        low = float(np.sqrt(found.eigenvalue_low[modes[0]]))
+        high = float(np.sqrt(found.eigenvalue_high[modes[0]]))
     a, b = structure.rayleigh[0], structure.rayleigh[1]
-    oscillators = list[Oscillator]()
+    result = []
     for j in range(len(modes)):
-        squared = rate[j, j]
-        decay = a * 0.5 + b * squared * 0.5 + ratio[j] * squared**0.5
-        omega = (squared - decay * decay) ** 0.5
+        eigenvalue = eigenvalue_block[j, j]
+        decay = a * 0.5 + b * eigenvalue * 0.5 + ratios[j] * eigenvalue**0.5
+        omega = (eigenvalue - decay * decay) ** 0.5
         quotient = decay * omega**-1.0
-        q_low, q_high = _ends(quotient)
-        # ω² = λ / (1 + (g/ω)²)
-        omega_range = _overlap(_ends(omega), (float(low / np.sqrt(1 + q_high**2)), high))
-        quotient_range = max(q_low, 0.0), q_high
-        shares = share[j] * structure.factor
-        oscillator = Oscillator(omega, decay, quotient, shares, omega_range, quotient_range)
-        oscillators.append(oscillator)
-    return oscillators
+        q_low, q_high = _range(quotient)
+        lowest_omega = float(low / np.sqrt(1 + q_high**2))  # ω² = λ / (1 + (g/ω)²)
+        oscillator = Oscillator(
+            omega=omega,
+            decay=decay,
+            quotient=quotient,
+            participation=factors[j] * structure.output_factors,
+            omega_range=_overlap(_range(omega), (lowest_omega, high)),
+            quotient_range=(max(q_low, 0.0), q_high),
+        )
+        result.append(oscillator)
+    return result
 
 
-def damped_range(structure: Classical, low: float, high: float, modes: Ints) -> tuple[Ends, Ends]:
-    """Ranges of ω = √(λ − g²) and of g/ω for modes whose λ lie in [low, high], g their decay.
+class DampedRanges(NamedTuple):
+    """Ranges of damped oscillators."""
+
+    omega: Ends  # of ω = √(λ − g²), in rad/s
+    quotient: Ends  # of g/ω
+
+
+def damped_ranges(
+    structure: ClassicalStructure, low: float, high: float, modes: Ints
+) -> DampedRanges:
+    """Return the ranges of ω and g/ω of some modes whose eigenvalues λ lie in [low, high].
 
     Raises:
-        UnprovedError: One may not oscillate.
+        UnprovedError: One of them may not oscillate.
     """
-    (a_low, b_low), (a, b) = (np.maximum(x, 0.0) for x in structure.rayleigh.bounds())
-    zeta_low, zeta = (np.maximum(x, 0.0) for x in structure.ratio[modes].bounds())
-    slow, fast = np.sqrt(low), np.sqrt(high)
-    # of g/√λ, which is the ratio of damping
-    greatest = float(a / (2 * slow) + b * fast / 2 + zeta.max())
-    least = float(a_low / (2 * fast) + b_low * slow / 2 + zeta_low.min())
-    if greatest >= 1:
+    rayleigh_low, rayleigh_high = structure.rayleigh.bounds()
+    a_low, b_low = np.maximum(rayleigh_low, 0.0)
+    a_high, b_high = np.maximum(rayleigh_high, 0.0)
+    ratio_low, ratio_high = structure.damping_ratios[modes].bounds()
+    slow = np.sqrt(low)
+    fast = np.sqrt(high)
+    # The ratio of damping of a mode is g/√λ = a/(2 √λ) + b √λ/2 + ζ.
+    max_damping = float(a_high / (2 * slow) + b_high * fast / 2 + np.maximum(ratio_high, 0.0).max())
+    min_damping = float(a_low / (2 * fast) + b_low * slow / 2 + np.maximum(ratio_low, 0.0).min())
+    if max_damping >= 1:
         raise UnprovedError("a mode may not oscillate", "take less damping")
-    shrinkage = np.sqrt(1 - greatest**2)  # least ω/√λ
-    return (float(slow * shrinkage), float(fast)), (least, float(greatest / shrinkage))
+    min_ratio = np.sqrt(1 - max_damping**2)  # the smallest ω/√λ
+    return DampedRanges(
+        omega=(float(slow * min_ratio), float(fast)),
+        quotient=(min_damping, float(max_damping / min_ratio)),
+    )
 
 
-def source_patterns(structure: Classical, sources: Sequence[str]) -> TaylorModel:
-    """Patterns of the sources on the unknowns, shape (sources, n), in their order."""
+def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> TaylorModel:
+    """Return the vectors v of sources on the unknowns, in the order given, (sources, n)."""
+    displacements = structure.initial_state[0]
     vectors = {
-        "load": structure.start[0] * 0.0 + structure.pattern,
-        "velocity": structure.start[1],
-        "start": structure.start[0],
-        **structure.forced,
+        "load": displacements * 0.0 + structure.ground_pattern,
+        "velocity": structure.initial_state[1],
+        "start": displacements,
+        **structure.force_accelerations,
     }
     return concatenate([vectors[name][None] for name in sources], -2)
 
 
 def column_products(a: TaylorModel, b: TaylorModel) -> TaylorModel:
-    """Σ_j a_js b_js, shape (s,)."""
+    """Return Σ_j a_js b_js of matrices of equal shape (p, s), shape (s,)."""
     return (a * b).T @ np.ones(a.shape[0])
 
 
-def _ends(x: TaylorModel) -> Ends:
+def _range(x: TaylorModel) -> Ends:
+    """Return the range of a scalar Taylor model over the box."""
     low, high = x.bounds()
     return float(low), float(high)
 
 
 def _overlap(first: Ends, second: Ends) -> Ends:
+    """Return the intersection of two ranges."""
     return max(first[0], second[0]), min(first[1], second[1])
 
 
-def _places(points: Array, ends: Ends) -> tuple[int, int]:
-    """The last point that is no more than a range's lower end, the first no less than its upper."""
-    first = int(np.searchsorted(points, ends[0], side="right")) - 1
-    last = int(np.searchsorted(points, ends[1]))
+def _enclosing_points(points: Array, ends: Ends) -> tuple[int, int]:
+    """Return the numbers of two of some rising points that enclose a range as closely as possible.
+
+    A range that reaches beyond the points is enclosed up to the first or last of them.
+    """
+    low, high = ends
+    first = int(np.searchsorted(points, low, side="right")) - 1
+    last = int(np.searchsorted(points, high))
     return max(first, 0), min(last, len(points) - 1)

@@ -1,4 +1,4 @@
-"""Motion of a structure over a box: oscillators, what couples them, and all other modes."""
+"""Response of a structure over a box: oscillators, what couples them, and all other modes."""
 
 from __future__ import annotations
 
@@ -13,169 +13,236 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import (
-    BlockShares,
+    BlockParticipation,
     Excitation,
     Oscillator,
     oscillators,
     source_patterns,
 )
-from alphacut.frame.modes.rest import (
+from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.modes.truncated_modes import (
+    POWER_SQRT,
     TruncatedModes,
     coupling_bounds,
-    rest_of_modes,
-    sums_over_block,
+    modal_sums_of_block,
+    response_of_truncated_modes,
     truncated_modes,
 )
-from alphacut.frame.modes.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
 
-MAX_NODES = 500
-"""Nodes at most at which the number of modes that are worth enclosing is estimated."""
-
 
 @dataclass(frozen=True, eq=False)
-class MotionModels:
-    """A structure's motion over a box."""
+class ModalResponseModels:
+    """Models of a structure's response over a box, for T time nodes and m outputs."""
 
-    oscillators: list[Oscillator]  # one for each mode that is enclosed
+    oscillators: list[Oscillator]  # one for each mode that is enclosed as such
     # modes that are known by sums: those of a block, and all that are not enclosed
     truncated: list[TruncatedModes]
-    added: Array  # bound of what couples the oscillators of blocks, (T, m)
-    # bound of how far what blocks of several modes add strays from straight lines between nodes,
+    coupling: Array  # bound of what couples the oscillators of blocks, (T, m)
+    # bound of the distance from straight lines between nodes of what blocks of several modes add,
     # (T, m)
-    line_deviation: Array
+    interpolation_error: Array
 
-    def on_subbox(self, low: Array, high: Array) -> MotionModels:
-        """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
+    def on_subbox(self, low: Array, high: Array) -> ModalResponseModels:
+        """Return the models over the sub-box low ≤ u ≤ high, in its own unit coordinates."""
         models = [x for mode in self.oscillators for x in mode.models]
-        models += [x for rest in self.truncated for x in (rest.share, rest.amplitude)]
+        for modes in self.truncated:
+            models += [modes.participation, modes.amplitude]
         restricted = iter(all_on_subbox(models, low, high))  # in the same order
-        return replace(
-            self,
-            oscillators=[x.on_part([next(restricted) for _ in x.models]) for x in self.oscillators],
-            truncated=[
-                replace(x, share=next(restricted), amplitude=next(restricted))
-                for x in self.truncated
-            ],
-        )
+        oscillators = []
+        for mode in self.oscillators:
+            own_models = [next(restricted) for _ in mode.models]
+            oscillators.append(mode.on_subbox(own_models))
+        truncated = []
+        for modes in self.truncated:
+            participation = next(restricted)
+            amplitude = next(restricted)
+            truncated.append(replace(modes, participation=participation, amplitude=amplitude))
+        return replace(self, oscillators=oscillators, truncated=truncated)
 
     @classmethod
     def from_structure(
-        cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
-    ) -> MotionModels:
-        """Models of a structure's motion over its box.
+        cls,
+        structure: ClassicalStructure,
+        excitation: Excitation,
+        truncation_tolerance: Array | None = None,
+    ) -> ModalResponseModels:
+        """Return models of a structure's response over its box.
 
         The lowest modes are enclosed in blocks. A block of one mode is an oscillator. A larger one
         is an oscillator for each mode and a bound of their coupling or, where that is narrower,
         modes known by their sums, as all modes are that are not enclosed.
 
-        `allowed` is the truncation error of each output that is allowed, (m,); none unless given.
+        Args:
+            structure: The structure over the box.
+            excitation: Loads, time nodes and sources.
+            truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). All
+                modes are enclosed, as precisely as possible, unless it is given.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
-        excited = (
-            source_patterns(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
-        )
-        wanted, tolerances = centre.modes, np.asarray(np.zeros(centre.modes))  # all, closely
-        if allowed is not None:
-            wanted, tolerances = modes_wanted(structure, centre, excited, excitation, allowed)
-        found = enclose_subspaces(centre, used, wanted, tolerances)
+        to_centred = inverse_with_rounding(centre.basis, like=structure.initial_state)
+        patterns = source_patterns(structure, excitation.sources) @ to_centred.T
+        selection = ModeSelection(centre.mode_count, np.zeros(centre.mode_count))
+        if truncation_tolerance is not None:
+            selection = required_modes(
+                structure, centre, patterns, excitation, tolerance=truncation_tolerance
+            )
+        found = enclose_subspaces(centre, used, selection.count, selection.eigenvalue_tolerances)
         if not found.blocks:
             raise UnprovedError(
-                "no mode keeps clear of the others", "take narrower inputs", found.along
+                "no mode keeps clear of the others", "take narrower inputs", found.bisection_input
             )
-        rows = structure.start.like(structure.rows) @ centre.basis
-        shares = [BlockShares.from_block(block, rows, excited, used) for block in found.blocks]
-        single, truncated = list[Oscillator](), list[TruncatedModes]()
-        added, deviation = np.zeros((2, len(excitation[1]), len(structure.order)))
-        for of_block in shares:
+        rows = structure.initial_state.like(structure.output_rows) @ centre.basis
+        participations = [
+            BlockParticipation.from_block(block, rows, patterns, used) for block in found.blocks
+        ]
+
+        all_oscillators = list[Oscillator]()
+        truncated = list[TruncatedModes]()
+        shape = (len(excitation.time), len(structure.derivative_orders))
+        coupling: Array = np.zeros(shape)
+        interpolation_error: Array = np.zeros(shape)
+        for of_block in participations:
             of_modes = oscillators(structure, of_block, found)
             if len(of_modes) > 1:
-                more, straying, ends = coupling_bounds(structure, of_block, found, excitation)
-                sums = sums_over_block(of_block)
-                by_sums = truncated_modes(sums, ends, structure, found, excitation)
-                scale = np.maximum(more.max(0) if allowed is None else allowed, 1e-300)
-                is_narrower = (by_sums.width / scale).max() < (more.max(0) / scale).max()
-                if is_narrower and (single or of_block is not shares[-1]):  # one oscillator is left
+                bounds = coupling_bounds(structure, of_block, found, excitation)
+                sums = modal_sums_of_block(of_block)
+                by_sums = response_of_truncated_modes(
+                    sums, bounds.ranges, structure, found, excitation
+                )
+                # The narrower of both is taken, in comparison with what is allowed. One oscillator
+                # at least must be left.
+                by_coupling = bounds.at_nodes.max(axis=0)
+                allowed = by_coupling if truncation_tolerance is None else truncation_tolerance
+                scale = np.maximum(allowed, 1e-300)
+                is_narrower = (by_sums.radius / scale).max() < (by_coupling / scale).max()
+                if is_narrower and (all_oscillators or of_block is not participations[-1]):
                     truncated.append(by_sums)
                     continue
-                added, deviation = added + more, deviation + straying
-            single += of_modes
-        others = rest_of_modes(structure, found, shares, (rows, excited), excitation)
-        truncated += [] if others is None else [others]
-        return cls(single, truncated, np.asarray(added), np.asarray(deviation))
+                coupling = coupling + bounds.at_nodes
+                interpolation_error = interpolation_error + bounds.interpolation_error
+            all_oscillators += of_modes
+        others = truncated_modes(structure, found, participations, rows, patterns, excitation)
+        if others is not None:
+            truncated.append(others)
+        return cls(all_oscillators, truncated, coupling, interpolation_error)
 
 
-def inverse(basis: Array, like: TaylorModel) -> TaylorModel:
-    """The inverse of a matrix of numbers with its rounding, of the inputs of a model `like`."""
-    found, n = np.linalg.inv(basis), len(basis)
-    left = np.abs(np.eye(n) - basis @ found) + gamma(n + 1) * (np.abs(basis) @ np.abs(found))
-    # B⁻¹ − C = C (I − B C) + …, of which the terms beyond the first are far below a tenth
-    return like.like(found).widened(1.1 * np.abs(found) @ left)
+def inverse_with_rounding(basis: Array, *, like: TaylorModel) -> TaylorModel:
+    """Return the inverse of a matrix of numbers with a bound of its rounding, shape (n, n).
+
+    It is a constant Taylor model of the inputs of the model `like`.
+    """
+    found = np.linalg.inv(basis)
+    n = len(basis)
+    residual = np.abs(np.eye(n) - basis @ found)
+    residual += gamma(n + 1) * (np.abs(basis) @ np.abs(found))
+    # With the computed inverse C, B⁻¹ − C = C (I − B C) + C (I − B C)² + …, where the terms beyond
+    # the first are far below a tenth of it.
+    return like.like(found).widened(1.1 * np.abs(found) @ residual)
 
 
-def modes_wanted(
-    structure: Classical,
+@dataclass(frozen=True, eq=False)
+class ModeSelection:
+    """How many of the lowest modes must be enclosed, and how precisely."""
+
+    count: int
+    # relative error of each eigenvalue that changes some output by its tolerance, (modes,)
+    eigenvalue_tolerances: Array
+
+
+def required_modes(
+    structure: ClassicalStructure,
     centre: CentredMatrices,
-    excited: TaylorModel,
+    patterns: TaylorModel,
     excitation: Excitation,
-    allowed: Array,
-) -> tuple[int, Array]:
-    """Least number of lowest modes to enclose, so that what truncating the others errs is allowed.
+    *,
+    tolerance: Array,
+) -> ModeSelection:
+    """Estimate how many of the lowest modes must be enclosed, and how precisely.
 
-    It is an estimate by the bounds of `TruncatedModes`, with sums and responses in the middle of
-    the box. Sources `excited` (sources, n) are in the coordinates of `centre`.
+    The count is the smallest one for which the estimated error of truncating all higher modes stays
+    below the tolerance of every output. The estimate takes sums and responses at the midpoint of
+    the box; it only chooses the count and proves nothing.
 
-    Returns:
-        The number, and the relative error of each mode's λ that changes an output by its allowed
-        error, shape (n,).
+    Args:
+        structure: The structure over the box.
+        centre: Its mass and stiffness in coordinates that are modal at the midpoint.
+        patterns: Vectors of the sources in these coordinates, shape (sources, n).
+        excitation: Loads, time nodes and sources.
+        tolerance: Largest allowed error of each output in its own unit, shape (m,).
     """
     loads, time, sources = excitation
-    time = time[:: -(-len(time) // MAX_NODES)]
-    squared, n = centre.squared, centre.modes
-    rows = structure.rows @ centre.basis
-    read = rows[:, :n] * structure.factor.value[:, None]
-    participation = excited.value[:, :n]
-    reads_massless = np.any(rows[:, n:], axis=1)
+    time = time[:: -(-len(time) // 500)]  # 500 nodes at most, which suffice for an estimate
+    eigenvalues = centre.eigenvalues
+    n = centre.mode_count
+    rows = structure.output_rows @ centre.basis
+    output_modes = rows[:, :n] * structure.output_factors.value[:, np.newaxis]
+    participation = patterns.value[:, :n]
+    takes_massless = np.any(rows[:, n:], axis=1)
     a, b = structure.rayleigh.value
-    decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
-    omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
-    sigma = (-decay + 1j * omega)[:, None]
-    error, sensitivity = np.zeros((2, n, len(allowed)))
+    decay = (a + b * eigenvalues) / 2 + structure.damping_ratios.value[:n] * np.sqrt(eigenvalues)
+    omega = np.sqrt(np.maximum(eigenvalues - decay**2, 1e-6 * eigenvalues))
+    sigma = (-decay + 1j * omega)[:, np.newaxis]
+    error = np.zeros((n, len(tolerance)))  # of truncating mode k and all above it
+    sensitivity = np.zeros((n, len(tolerance)))  # of outputs to ln λ_k
     for s, source in enumerate(sources):
-        if source in loads:  # ρ and its derivative by σ, (modes, T) each
+        # ρ and its derivative by σ, (2, modes, T)
+        if source in loads:
             rho = responses_at_nodes(sigma[:, 0], loads[source], time, 1)[0].swapaxes(1, 2)
         else:
             rho = np.stack([np.exp(sigma * time), time * np.exp(sigma * time)])
-        for o, order in enumerate(structure.order):
+        for o, order in enumerate(structure.derivative_orders):
             response = read_response(source, sigma, sigma**order * rho[0])
             response = response + feedthrough(source, loads, int(order), time)
             # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
-            slope = np.abs(rho[1]).max(1) * omega ** (order + (source == "start")) / 2
-            sensitivity[:, o] += np.abs(read[o] * participation[s]) * slope
+            slope = np.abs(rho[1]).max(axis=1) * omega ** (order + (source == "start")) / 2
+            sensitivity[:, o] += np.abs(output_modes[o] * participation[s]) * slope
             errors = [
-                _truncation_error(read[o], participation[s], response, squared, x) for x in POWERS
+                _truncation_error(
+                    output_modes[o], participation[s], response, eigenvalues, power=power
+                )
+                for power in POWERS
             ]
-            # the first power needs Σ read², which is unknown where massless unknowns are read
-            error[:, o] += np.min(errors[int(reads_massless[o]) :], axis=0)
-    sufficient = np.flatnonzero((error <= allowed).all(1))
-    wanted = max(int(sufficient[0]), 1) if len(sufficient) else n
-    return wanted, np.min(allowed / np.maximum(sensitivity, 1e-300), axis=1)
+            # The power 0 needs Σ a², which is unknown where outputs take massless unknowns.
+            if takes_massless[o]:
+                errors = errors[POWER_SQRT:]
+            error[:, o] += np.min(errors, axis=0)
+    sufficient = np.flatnonzero((error <= tolerance).all(axis=1))
+    count = max(int(sufficient[0]), 1) if len(sufficient) else n
+    relative_errors = tolerance / np.maximum(sensitivity, 1e-300)
+    return ModeSelection(count, np.min(relative_errors, axis=1))
 
 
 def _truncation_error(
-    read: Array, participation: Array, response: Array, squared: Array, power: float
+    output_modes: Array, participation: Array, response: Array, eigenvalues: Array, *, power: float
 ) -> Array:
-    """Error of an output without the modes from k on, for each k, shape (n,)."""
-    # √(Σ a² Σ β²) times half the range of λ^power e (Cauchy, Schwarz); from power ½ on a² is over λ
-    outputs = np.cumsum((read**2 / squared ** float(power > 0))[::-1])[::-1]
-    sources = np.cumsum((participation**2 / squared ** float(power == 1))[::-1])[::-1]
-    scaled = response * squared[:, None] ** power
-    high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
-    half = np.maximum(high, low)
-    if power != POWERS[1]:  # ranges reach down to the mode below, as frequencies vary
-        half = (high + low)[np.maximum(np.arange(len(high)) - 1, 0)] / 2
-    return np.asarray(np.sqrt(outputs * sources) * half.max(1))
+    """Estimate the error of an output without the modes from k on, for each k, shape (n,).
+
+    By Cauchy and Schwarz it is √(Σ a² Σ β²) times the radius of the range of λ^κ e over these
+    modes, where the terms of the sums are divided by λ so that together they have λ^(−2κ).
+
+    Args:
+        output_modes: Output row times mode shape a, shape (n,).
+        participation: Participation factors β, shape (n,).
+        response: Responses e of the modes, shape (n, T).
+        eigenvalues: λ, shape (n,).
+        power: κ: 0, ½ or 1. At ½ the sum Σ a² is over λ, at 1 both sums are.
+    """
+    output_terms = output_modes**2 / eigenvalues ** float(power > 0)
+    source_terms = participation**2 / eigenvalues ** float(power == 1)
+    output_sums = np.cumsum(output_terms[::-1])[::-1]  # over modes k and above
+    source_sums = np.cumsum(source_terms[::-1])[::-1]
+    scaled = response * eigenvalues[:, np.newaxis] ** power
+    high = np.maximum.accumulate(scaled[::-1])[::-1]
+    minus_low = np.maximum.accumulate(-scaled[::-1])[::-1]
+    if power == POWERS[POWER_SQRT]:  # the range must be centred at zero
+        radius = np.maximum(high, minus_low)
+    else:  # ranges reach down to the mode below, as frequencies vary
+        mode_below = np.maximum(np.arange(len(high)) - 1, 0)
+        radius = (high + minus_low)[mode_below] / 2
+    return np.asarray(np.sqrt(output_sums * source_sums) * radius.max(axis=1))

@@ -1,8 +1,9 @@
 """Structures with classical modes as Taylor models over the unit box: M(u), K(u), rows, damping.
 
 Covered is M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M,
-whose undamped modes uncouple the motion; what else a structure has is refused with the word why.
-A structure of one unknown has one mode, whatever its damping and the factors of its outputs.
+whose undamped modes uncouple the equations of motion. Other structures are refused, with the
+reason. A structure of one unknown has one mode, whatever its damping and the factors of its
+outputs.
 """
 
 from __future__ import annotations
@@ -19,62 +20,83 @@ from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, 
 
 
 @dataclass(frozen=True, eq=False)
-class Classical:
+class ClassicalStructure:
     """A structure with classical modes over a box of d inputs; n unknowns, m outputs."""
 
     mass: TaylorModel  # M, (n, n)
     stiffness: TaylorModel  # K, (n, n)
-    rows: Array  # what outputs take of the displacements, (m, n)
-    factor: TaylorModel  # what they are multiplied by, (m,)
-    # which derivative of the motion they take it of, (m,); of order 2 with the ground's
-    # acceleration added
-    order: Ints
-    start: TaylorModel  # initial displacements and velocities, (2, n)
-    pattern: Array  # ι, how the unknowns move with the ground, (n,)
+    output_rows: Array  # rows of the outputs on the displacements or a derivative, (m, n)
+    output_factors: TaylorModel  # what the outputs are multiplied by, (m,)
+    # derivative of the displacements that each output takes, (m,): 0, 1, or 2 for the absolute
+    # acceleration
+    derivative_orders: Ints
+    initial_state: TaylorModel  # initial displacements, then velocities, (2, n)
+    ground_pattern: Array  # ι, how the unknowns move with the ground, (n,)
     rayleigh: TaylorModel  # a and b, (2,)
-    ratio: TaylorModel  # ζ_k of the modes by rising frequency, (modes,), none of massless unknowns
-    forced: dict[str, TaylorModel]  # M⁻¹ b of each history of forces by its name, (n,)
+    damping_ratios: TaylorModel  # ζ_k of the modes with mass by rising frequency, (modes,)
+    # accelerations M⁻¹ b by each history of forces, by its name, (n,)
+    force_accelerations: dict[str, TaylorModel]
+
+    @property
+    def unknowns(self) -> int:
+        """Number n of unknowns."""
+        return len(self.ground_pattern)
+
+    @property
+    def distinct_orders(self) -> list[int]:
+        """Derivatives of the displacements that some output takes, rising."""
+        return [int(order) for order in np.unique(self.derivative_orders)]
 
 
-def classical_structure(system: LinearSystem, parameters: Mapping[str, TaylorModel]) -> Classical:
-    """Matrices, rows and damping of a structure, of parameters by name, each a scalar Taylor model.
+def classical_structure(
+    system: LinearSystem, parameters: Mapping[str, TaylorModel]
+) -> ClassicalStructure:
+    """Return the structure whose parameters are scalar Taylor models, by name.
 
     Raises:
-        UnprovedError: Its modes are not known to be classical.
+        UnprovedError: Its modes are not known to be classical, or an output takes displacements by
+            coefficients that depend on the inputs.
     """
     assembly = system.assembly(parameters)
     if len(assembly.pattern) == 1:
         assembly = _with_damping_by_mass(_with_unit_rows(assembly))
     _require_classical(assembly)
-    q0, v0 = assembly.q0, assembly.v0
+    displacements = assembly.q0
+    velocities = assembly.v0
     if assembly.static is not None:
-        q0 = q0 + solve(assembly.stiffness, assembly.static)[:, 0]
+        displacements = displacements + solve(assembly.stiffness, assembly.static)[:, 0]
     if assembly.impulse is not None:
-        v0 = v0 + _accelerations(assembly, assembly.impulse)[:, 0]
-    forced, names = dict[str, TaylorModel](), [x for x in histories(system) if x != "load"]
+        velocities = velocities + _accelerations(assembly, assembly.impulse)[:, 0]
+    force_accelerations = {}
     if assembly.forces is not None:
         accelerations = _accelerations(assembly, assembly.forces)
-        forced = {name: accelerations[:, k] for k, name in enumerate(names)}
-    displacements, velocities = _constant_rows(assembly)
+        names = [name for name in histories(system) if name != "load"]
+        force_accelerations = {name: accelerations[:, k] for k, name in enumerate(names)}
+    displacement_rows, velocity_rows = _constant_rows(assembly)
+    takes_velocity = velocity_rows.any(axis=1)
+    takes_acceleration = assembly.accelerated.any(axis=1)
     ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
-    return Classical(
+    if len(ratios) == 1:
+        ratios = ratios * len(assembly.massive)
+    return ClassicalStructure(
         mass=assembly.mass,
         stiffness=assembly.stiffness,
-        rows=displacements + velocities + assembly.accelerated,
-        factor=assembly.row_factors,
-        order=np.where(assembly.accelerated.any(1), 2, velocities.any(1).astype(int)),
-        start=stack([q0, v0]).T,
-        pattern=assembly.pattern,
+        output_rows=displacement_rows + velocity_rows + assembly.accelerated,
+        output_factors=assembly.row_factors,
+        derivative_orders=np.where(takes_acceleration, 2, takes_velocity.astype(int)),
+        initial_state=stack([displacements, velocities]).T,
+        ground_pattern=assembly.pattern,
         rayleigh=stack(list(assembly.rayleigh)),
-        ratio=stack(ratios * len(assembly.massive) if len(ratios) == 1 else ratios),
-        forced=forced,
+        damping_ratios=stack(ratios),
+        force_accelerations=force_accelerations,
     )
 
 
 def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
-    """The same structure of one unknown whose dashpots are damping by the mass.
+    """Return the same structure of one unknown with its dashpots as damping by the mass.
 
-    With D = d + a M + b K_springs and K = K_springs − W it is D = (a + (d + b W)/M) M + b K.
+    With the dashpots d and the weights W, D = d + a M + b K_springs, and K = K_springs − W. Hence
+    D = (a + (d + b W)/M) M + b K.
     """
     a, b = assembly.rayleigh
     dashpots = assembly.dashpots
@@ -90,28 +112,33 @@ def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorMod
 
 
 def _with_unit_rows(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
-    """The same structure of one unknown, whose outputs' rows depend on no input.
+    """Return the same structure of one unknown with output rows that depend on no input.
 
-    An output that takes r(u) of the displacement, or of the velocity, is r(u) times a unit of it.
+    An output that takes r(u) of the displacement, or of the velocity, is r(u) times a unit of it;
+    r(u) becomes a part of its factor.
     """
     if isinstance(assembly.rows, np.ndarray):
         return assembly
     takes_acceleration = (assembly.accelerated[:, 0] != 0).astype(float)
-    coefficients = assembly.rows @ np.ones((2, 1))  # one of the two is zero
+    # The sum of the coefficients of displacement and velocity, one of which is zero.
+    coefficients = (assembly.rows @ np.ones((2, 1)))[:, 0]
     return replace(
         assembly,
         rows=(assembly.rows.magnitude() > 0).astype(float),
-        row_factors=assembly.row_factors * (coefficients[:, 0] + takes_acceleration),
+        row_factors=assembly.row_factors * (coefficients + takes_acceleration),
     )
 
 
 def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
-    """Accelerations M⁻¹ b by forces b, shape (n, k); zero for unknowns without mass."""
-    a, n = assembly.massive, len(assembly.pattern)
-    return np.eye(n)[:, a] @ solve(assembly.mass[a[:, None], a], forces[a])
+    """Return accelerations M⁻¹ b by forces b, shape (n, k); zero for unknowns without mass."""
+    massive = assembly.massive
+    mass = assembly.mass[massive[:, np.newaxis], massive]
+    selection = np.eye(len(assembly.pattern))[:, massive]
+    return selection @ solve(mass, forces[massive])
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
+    """Raise UnprovedError where dashpots, or damping by the springs alone, couple the modes."""
     if assembly.dashpots.magnitude().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
@@ -124,11 +151,15 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
 
 
 def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
-    """What outputs take of displacements and of velocities, not of both, shape (m, n) each."""
+    """Return the rows of the outputs on displacements and on velocities, shape (m, n) each.
+
+    Raises:
+        UnprovedError: Rows depend on inputs, or an output takes displacements and velocities.
+    """
     if not isinstance(assembly.rows, np.ndarray):
         cure = "take the method proof with few inputs, or leave the overturning moment out"
         raise UnprovedError("the overturning moment adds storeys by factors of inputs", cure)
     displacements, velocities = np.split(assembly.rows, 2, axis=1)
-    if (displacements.any(1) & velocities.any(1)).any():
+    if (displacements.any(axis=1) & velocities.any(axis=1)).any():
         raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
     return displacements, velocities

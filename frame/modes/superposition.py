@@ -1,219 +1,312 @@
 """Responses of a structure with classical modes at single inputs, and bounds of their rounding.
 
-An output is Σ_k r_k c_k e(λ_k), over modes of unit mass: r the output's coefficient of mode k,
-c the mode's participation in a source, e the response of its oscillator. Computed modes X and λ
-are the exact ones of a pencil near by: Xᵀ K X = diag λ + E and Xᵀ M X = I + F, whose entries are
-bounded by the computed residuals and their γ_n (Higham 2002, section 3.5). With
-G = |E| + |F| diag λ the outputs are off, to first order, by
+An output is Σ_k r_k c_k e(λ_k) over modes k of unit modal mass: r_k is the output's row times the
+mode shape, c_k the mode's participation factor for a source, and e the response of its oscillator.
+Computed modes X and λ are the exact ones of a pencil nearby: Xᵀ K X = diag λ + E and Xᵀ M X = I +
+F, where the entries of E and F are bounded by the computed residuals and their γ_n (Higham 2002,
+section 3.5). With G = |E| + |F| diag λ the outputs are off, to first order, by at most
 
     Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k|,
 
-e[·, ·] a divided difference, which holds for close modes too. The entry of the slowest mode in G is
-some n ε ω_max², so that its frequency is off by a share of n ε (ω_max/ω₁)². Rounding of the
-response itself comes from the recursion over the record.
+where e[·, ·] is a divided difference; this holds for close modes too. The entry of the slowest mode
+in G is some n ε ω_max², so that its frequency has a relative error of n ε (ω_max/ω₁)². Rounding of
+the response itself comes from the recursion over the record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.rest import response_slopes
-from alphacut.frame.modes.structure import Classical
+from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.modes.truncated_modes import response_slopes
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.oscillators import read_response
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories, undamped_modes
 
 
+class RoundedValues(NamedTuple):
+    """Computed values, and bounds of their rounding in the same shape."""
+
+    value: Array
+    error: Array
+
+
 @dataclass(frozen=True, eq=False)
-class Modal:
+class PointModes:
     """Modes of a structure at S points, with bounds of what rounding leaves of the pencil."""
 
-    squared: Array  # λ, (S, n), rising, in 1/s²
+    eigenvalues: Array  # λ, (S, n), rising, in 1/s²
     sigma: Array  # exponents −g + iω, (S, n), in 1/s
-    is_alike: Mask  # whether all modes of a point have one ratio of damping, (S,)
-    shape: Array  # displacements of the modes, of unit mass, (S, n, n)
-    share: dict[str, Array]  # c of each source, by its name, (S, n)
-    share_error: dict[str, Array]  # bounds of their rounding
+    has_one_ratio: Mask  # whether all modes of a point have one damping ratio, (S,)
+    shapes: Array  # displacements of the modes, of unit modal mass, (S, unknowns n, modes n)
+    participation: dict[str, RoundedValues]  # c of each source, by its name, (S, n)
     stiffness_error: Array  # G, (S, n, n)
     mass_error: Array  # |F|, (S, n, n)
-    rows: Array  # rows of all outputs on the state, (S, m, 2 n)
-    structure: Classical  # the structure over the box
+    output_rows: Array  # rows of all outputs on the state, (S, m, 2 n)
+    structure: ClassicalStructure  # the structure over the box
     entry_roundings: int  # of an entry of M, K and of output rows; see `LinearSystem`
 
     @property
     def sigma_slope(self) -> Array:
-        """Bound of |dσ/dλ|, shape (S, n), in s; see `rest.response_slopes`."""
+        """Bound of |dσ/dλ|, shape (S, n), in s; see `truncated_modes.response_slopes`."""
         return np.asarray(1 / (2 * self.sigma.imag))
 
-    def output_coefficients(self, point: Ints, output: Ints) -> tuple[Array, Array]:
-        """Coefficients r of modes in outputs (N,) at points (N,), and their rounding, (N, n)."""
-        n, order = self.shape.shape[-1], self.structure.order[output][:, None]
-        rows, shape = self.rows[point, output], self.shape[point]
-        row = np.where(order == 1, rows[:, n:], rows[:, :n])
-        # accelerations are read of structures whose unknowns all have mass
-        row = np.where(order == 2, self.structure.rows[output, :n], row)
-        size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
-        return np.einsum("si,sik->sk", row, shape), gamma(n + self.entry_roundings) * size
+    def output_coefficients(self, point: Ints, output: Ints) -> RoundedValues:
+        """Return the coefficients r of all modes in outputs (N,) at points (N,), shape (N, n)."""
+        n = self.shapes.shape[-1]
+        order = self.structure.derivative_orders[output][:, np.newaxis]
+        on_state = self.output_rows[point, output]
+        rows = np.where(order == 1, on_state[:, n:], on_state[:, :n])
+        # Accelerations are outputs of structures whose unknowns all have mass.
+        rows = np.where(order == 2, self.structure.output_rows[output, :n], rows)
+        shapes = self.shapes[point]
+        value = np.einsum("si,sik->sk", rows, shapes)
+        magnitude = np.einsum("si,sik->sk", np.abs(rows), np.abs(shapes))
+        return RoundedValues(value, gamma(n + self.entry_roundings) * magnitude)
 
 
 def modes_at(
-    system: LinearSystem, structure: Classical, names: Sequence[str], points: Array, unit: Array
-) -> Modal:
-    """Modes of a structure at S values of its inputs `names`, with bounds of their rounding.
+    system: LinearSystem,
+    structure: ClassicalStructure,
+    names: Sequence[str],
+    points: Array,
+    unit: Array,
+) -> PointModes:
+    """Return the modes of a structure at S values of its inputs, with bounds of their rounding.
 
-    The values are `points` (S, inputs) in SI units, and `unit` (S, d) in the unit coordinates of
-    the box of `structure`, from which damping is taken, but for that of a single mode.
+    Args:
+        system: The structure.
+        structure: The structure over the box. Damping is taken from it, but for a single mode.
+        names: Names of the inputs.
+        points: Values of the inputs, shape (S, inputs), in SI units.
+        unit: The same values in the unit coordinates of the box, shape (S, d).
 
     Raises:
         UnprovedError: A mode does not oscillate.
     """
     matrices, rows = evaluate(system, names, points, derivatives=False, by_ratios=False)
-    M, K = matrices.mass.value, matrices.stiffness.value
-    squared, shape = undamped_modes(M, K)
-    a, b = structure.rayleigh.at(unit).T[:, :, None]
-    ratio, positive = structure.ratio.at(unit), np.maximum(squared, 1e-300)
-    decay = (a + b * squared) / 2
-    if M.shape[-1] == 1:  # where a has the dashpots over the mass, and is no polynomial of inputs
+    M = matrices.mass.value
+    K = matrices.stiffness.value
+    n = M.shape[-1]
+    eigenvalues, shapes = undamped_modes(M, K)
+    a, b = structure.rayleigh.at(unit).T[:, :, np.newaxis]
+    decay = (a + b * eigenvalues) / 2
+    if n == 1:
+        # The factor a contains the dashpots over the mass, and is no polynomial of the inputs.
         decay = matrices.damping.value[..., 0] / M[..., 0] / 2
-    decay = decay + ratio * np.sqrt(positive)
-    if not (squared > decay**2).all():
+    ratios = structure.damping_ratios.at(unit)
+    decay = decay + ratios * np.sqrt(np.maximum(eigenvalues, 1e-300))
+    if not (eigenvalues > decay**2).all():
         raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
-    n, (q0, v0) = M.shape[-1], np.split(matrices.start.value[..., 0], 2, axis=-1)
-    patterns, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
+
+    # What each source sets in motion: displacements or velocities v, with c = φ·M v.
+    q0, v0 = np.split(matrices.start.value[..., 0], 2, axis=-1)
+    patterns = {"velocity": v0, "start": q0}
+    impulses = matrices.pushes(ground=False).value
     forces = [name for name in histories(system) if name != "load"]
-    patterns |= {name: pushes[..., k] for k, name in enumerate(forces)}
+    for k, name in enumerate(forces):
+        patterns[name] = impulses[..., k]
     if system.ground is not None:
-        patterns["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
-    share, share_error, product = {}, {}, "sik,sij,sj->sk"
+        patterns["load"] = np.broadcast_to(matrices.rigid[:, 0], eigenvalues.shape)
     entry_roundings = system.entry_roundings
-    for name, x in patterns.items():
-        share[name] = np.einsum(product, shape, M, x, optimize=True)
-        size = np.einsum(product, *(np.abs(part) for part in (shape, M, x)), optimize=True)
-        share_error[name] = gamma(2 * n + 2 * entry_roundings) * size
-    of_stiffness = _residual(shape, K, squared, entry_roundings=entry_roundings)
-    of_mass = _residual(shape, M, np.ones_like(squared), entry_roundings=entry_roundings)
-    of_stiffness += of_mass * squared[:, None]
-    of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
-    return Modal(
-        squared=squared,
-        sigma=-decay + 1j * np.sqrt(squared - decay**2),
-        is_alike=(ratio == ratio[:, :1]).all(1),
-        shape=shape,
-        share=share,
-        share_error=share_error,
-        stiffness_error=of_stiffness,
-        mass_error=of_mass,
-        rows=rows.value,
+    participation = {}
+    for name, v in patterns.items():
+        value = np.einsum("sik,sij,sj->sk", shapes, M, v, optimize=True)
+        magnitude = np.einsum("sik,sij,sj->sk", np.abs(shapes), np.abs(M), np.abs(v), optimize=True)
+        error = gamma(2 * n + 2 * entry_roundings) * magnitude
+        participation[name] = RoundedValues(value, error)
+
+    unit_masses = np.ones_like(eigenvalues)
+    mass_error = _residual(shapes, M, unit_masses, entry_roundings=entry_roundings)
+    stiffness_error = _residual(shapes, K, eigenvalues, entry_roundings=entry_roundings)
+    stiffness_error += mass_error * eigenvalues[:, np.newaxis]
+    stiffness_error += gamma(8) * eigenvalues[:, np.newaxis] * np.eye(n)  # of σ from λ
+    return PointModes(
+        eigenvalues=eigenvalues,
+        sigma=-decay + 1j * np.sqrt(eigenvalues - decay**2),
+        has_one_ratio=(ratios == ratios[:, :1]).all(axis=1),
+        shapes=shapes,
+        participation=participation,
+        stiffness_error=stiffness_error,
+        mass_error=mass_error,
+        output_rows=rows.value,
         structure=structure,
         entry_roundings=entry_roundings,
     )
 
 
-def _residual(shape: Array, matrix: Array, diagonal: Array, *, entry_roundings: int) -> Array:
-    """Bound of |Xᵀ A X − diag| for the exact A, with the rounding of its product, (S, n, n)."""
-    n, across = shape.shape[-1], shape.swapaxes(-1, -2)
-    residual = across @ matrix @ shape - diagonal[:, None] * np.eye(n)
-    size = np.abs(across) @ np.abs(matrix) @ np.abs(shape)
-    return np.asarray(np.abs(residual) + gamma(2 * n + entry_roundings) * size)
+def _residual(shapes: Array, matrix: Array, diagonal: Array, *, entry_roundings: int) -> Array:
+    """Bound |Xᵀ A X − diag d| for the exact matrix A, entry by entry, shape (S, n, n).
+
+    Args:
+        shapes: X, shape (S, n, n), one mode in each column.
+        matrix: A with rounded entries, shape (S, n, n).
+        diagonal: d, shape (S, n).
+        entry_roundings: Number of roundings of an entry of A.
+    """
+    n = shapes.shape[-1]
+    transposed = shapes.swapaxes(-1, -2)
+    residual = transposed @ matrix @ shapes - diagonal[:, np.newaxis] * np.eye(n)
+    magnitude = np.abs(transposed) @ np.abs(matrix) @ np.abs(shapes)
+    return np.asarray(np.abs(residual) + gamma(2 * n + entry_roundings) * magnitude)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadAtNodes:
-    """Responses ρ of oscillators to a load, each row at a node."""
+    """Responses ρ = ∫ exp(σ (t − s)) f(s) ds of n oscillators to a load f, each row at a node."""
 
     rho: Array  # ρ and its derivative ρ′ by σ, (2, N, n)
     error: Array  # bounds of the rounding of ρ, (N, n)
-    impulse: Array  # bound of |ρ| at any σ that does not grow, ∫ |f| up to the node, (N,)
+    impulse: Array  # bound of |ρ| for any σ that does not grow, ∫ |f| up to the node, (N,)
     value: Array  # f, (N,)
 
 
 def load_at_nodes(
     sigma: Array, load: History, time: Array, node: Ints | None = None
 ) -> LoadAtNodes:
-    """Responses of oscillators σ (N, n) to a load, each row at its node (N,); (n,) at all nodes."""
-    at, impulse = slice(None) if node is None else node, absolute_moments(0.0, load, time)[0]
-    responses = responses_at_nodes(sigma, load, time, 1, node=node)
-    return LoadAtNodes(*responses, impulse[at], load.values(time[at]))
+    """Return responses of oscillators to a load.
+
+    Args:
+        sigma: Exponents σ, shape (N, n), each row for its node; (n,) for all nodes.
+        load: The load.
+        time: All nodes, shape (T,), in s.
+        node: Number of the node of each row, shape (N,); all nodes unless given.
+    """
+    at = slice(None) if node is None else node
+    impulse = absolute_moments(0.0, load, time)[0]
+    rho, error = responses_at_nodes(sigma, load, time, 1, node=node)
+    return LoadAtNodes(rho, error, impulse[at], load.values(time[at]))
 
 
 def outputs_at(
-    modal: Modal, point: Ints, output: Ints, time: Array, loads: Mapping[str, LoadAtNodes]
-) -> tuple[Array, Array]:
-    """Exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
+    modes: PointModes, point: Ints, output: Ints, time: Array, loads: Mapping[str, LoadAtNodes]
+) -> RoundedValues:
+    """Return exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
 
-    Each value has a point of `modal`, an output and a node `time` in s, (N,) each.
+    Args:
+        modes: Modes at all points.
+        point: Number of the point of each value, shape (N,).
+        output: Number of the output of each value, shape (N,).
+        time: Node of each value, shape (N,), in s.
+        loads: Responses to each load at these points and nodes, by the name of the load.
     """
-    sigma, slope, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
-    exp = np.exp(sigma * t)
-    rounding = (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(exp)
-    unit_load = np.ones_like(time)
-    free = LoadAtNodes(np.stack([exp, t * exp]), rounding, unit_load, 0 * unit_load)
-    read = modal.output_coefficients(point, output)
-    total, error = np.zeros((2, len(point)))
+    sigma = modes.sigma[point]
+    t = time[:, np.newaxis]
+    exponential = np.exp(sigma * t)
+    # A free response is ρ = exp(σ t), that to a unit impulse at the start.
+    free = LoadAtNodes(
+        rho=np.stack([exponential, t * exponential]),
+        error=(gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(exponential),
+        impulse=np.ones_like(time),
+        value=np.zeros_like(time),
+    )
+    coefficients = modes.output_coefficients(point, output)
+    orders = modes.structure.derivative_orders[output]
+    total = np.zeros(len(point))
+    error = np.zeros(len(point))
     for source, load in {"velocity": free, "start": free, **loads}.items():
-        order = modal.structure.order[output]
-        response = _mode_responses(sigma, order, source, load, t)
-        share = modal.share[source][point], modal.share_error[source][point]
-        total += (read[0] * share[0] * response[0]).sum(-1)
-        error += _superposition_error(modal, point, read, share, response)
-    # terms of second order in the residuals are at most this fraction of those of first order
-    diagonal = np.einsum("skk->sk", modal.stiffness_error[point])
-    return total, error / np.maximum(1 - (diagonal * slope * t).max(-1), 1e-300)
+        response = _mode_responses(sigma, orders, source, load, t)
+        of_source = modes.participation[source]
+        participation = RoundedValues(of_source.value[point], of_source.error[point])
+        total += (coefficients.value * participation.value * response.value).sum(axis=-1)
+        error += _superposition_error(modes, point, coefficients, participation, response)
+    # Terms of second order in the residuals are at most this fraction of those of first order.
+    diagonal = np.einsum("skk->sk", modes.stiffness_error[point])
+    fraction = (diagonal * modes.sigma_slope[point] * t).max(axis=-1)
+    return RoundedValues(total, error / np.maximum(1 - fraction, 1e-300))
+
+
+class _ModeResponses(NamedTuple):
+    """Responses e of n oscillators at N points and nodes, shape (N, n) each."""
+
+    value: Array  # e
+    error: Array  # bound of its rounding
+    slope: Array  # bound of |de/dλ| at the eigenvalue of the mode
+    slope_anywhere: Array  # bound of |de/dλ| at any eigenvalue of the same damping
 
 
 def _mode_responses(
     sigma: Array, orders: Ints, source: str, load: LoadAtNodes, time: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Responses e, their rounding, and bounds of |de/dλ| at the modes and at any λ, (N, n) each."""
-    omega, size, order = sigma.imag, np.abs(sigma), orders[:, None]
-    power, power_slope = size**order, order * size ** np.maximum(order - 1, 0)
+) -> _ModeResponses:
+    """Return the responses of oscillators to a source.
+
+    Args:
+        sigma: Exponents σ of the oscillators, shape (N, n).
+        orders: Derivative of the displacements that the output takes, shape (N,).
+        source: Name of a load or force, "velocity" or "start".
+        load: ρ of the source.
+        time: Nodes, shape (N, 1).
+    """
+    omega = sigma.imag
+    magnitude = np.abs(sigma)
+    order = orders[:, np.newaxis]
+    # The response is read off G = σ^ν ρ, where ν is the order.
+    power = magnitude**order
+    power_slope = order * magnitude ** np.maximum(order - 1, 0)
     G = sigma**order * load.rho[0]
     error = power * load.error + gamma(2 * order.max() + 6) * np.abs(G)
-    direct = np.zeros_like(time)
+    feedthrough = np.zeros_like(time)
     if source.startswith("force"):  # of the relative acceleration
-        direct = np.where(order == 2, load.value[:, None], 0.0)
-    # |G| and |dG/dσ| at the modes, and anywhere, where |ρ| ≤ ∫ |f| and |ρ′| ≤ t ∫ |f|
-    impulse, quotient = load.impulse[:, None], -sigma.real / omega
-    slopes = [
-        response_slopes(source, power * rho, power_slope * rho + power * rho_slope, omega, quotient)
-        for rho, rho_slope in (np.abs(load.rho), (impulse, time * impulse))
-    ]
+        feedthrough = np.where(order == 2, load.value[:, np.newaxis], 0.0)
+
+    # Bounds of |G| and |dG/dσ| at the mode, and at any σ that does not grow, where |ρ| ≤ ∫ |f| and
+    # |ρ′| ≤ t ∫ |f|.
+    quotient = -sigma.real / omega
+
+    def slope_bound(rho: Array, rho_slope: Array) -> Array:
+        G_slope = power_slope * rho + power * rho_slope
+        return response_slopes(source, power * rho, G_slope, omega, quotient)
+
+    impulse = load.impulse[:, np.newaxis]
     error = error * (1 + quotient) if source == "start" else error / omega
-    error = error + gamma(8) * np.abs(direct)
-    return read_response(source, sigma, G) + direct, error, slopes[0], slopes[1]
+    return _ModeResponses(
+        value=read_response(source, sigma, G) + feedthrough,
+        error=error + gamma(8) * np.abs(feedthrough),
+        slope=slope_bound(np.abs(load.rho[0]), np.abs(load.rho[1])),
+        slope_anywhere=slope_bound(impulse, time * impulse),
+    )
 
 
 def _superposition_error(
-    modal: Modal,
+    modes: PointModes,
     point: Ints,
-    read: tuple[Array, Array],
-    share: tuple[Array, Array],
-    response: tuple[Array, Array, Array, Array],
+    coefficients: RoundedValues,
+    participation: RoundedValues,
+    response: _ModeResponses,
 ) -> Array:
-    """Bound of the rounding of Σ_k r_k c_k e_k, (N,), by r, c and e with their errors, (N, n)."""
-    (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
-    value, e_error, slope, anywhere = response
-    e, n = np.abs(value), value.shape[-1]
-    error = (r * c * e_error + (r_error * c + r * c_error) * e).sum(-1)
-    error += gamma(n + 6) * (r * c * e).sum(-1)
-    # e[λ_j, λ_k] is no more than (|e_j| + |e_k|) / |λ_j − λ_k|, nor than sup |de/dλ| between modes
-    # of one damping ratio
-    squared = modal.squared[point]
-    gaps = np.abs(squared[:, :, None] - squared[:, None])
-    of_ratios = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
-    cap = of_ratios + np.maximum(anywhere[:, :, None], anywhere[:, None])
-    unlimited = np.full_like(gaps, np.inf)
-    quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)
-    diagonal = np.eye(n, dtype=bool)
-    divided_differences = np.where(diagonal, slope[:, None], np.minimum(quotient, cap))
-    couplings = modal.stiffness_error[point] * divided_differences
+    """Bound the rounding of Σ_k r_k c_k e_k, shape (N,); r, c and e have the shape (N, n)."""
+    r = np.abs(coefficients.value)
+    c = np.abs(participation.value)
+    e = np.abs(response.value)
+    n = e.shape[-1]
+    error = r * c * response.error
+    error += (coefficients.error * c + r * participation.error) * e
+    error = error.sum(axis=-1)
+    error += gamma(n + 6) * (r * c * e).sum(axis=-1)
+
+    # The divided difference e[λ_j, λ_k] is at most (|e_j| + |e_k|) / |λ_j − λ_k|, and between modes
+    # of one damping ratio at most sup |de/dλ|.
+    eigenvalues = modes.eigenvalues[point]
+    gaps = np.abs(eigenvalues[:, :, np.newaxis] - eigenvalues[:, np.newaxis])
+    sums = e[:, :, np.newaxis] + e[:, np.newaxis]
+    by_gap = np.divide(sums, gaps, out=np.full_like(gaps, np.inf), where=gaps > 0)
+    anywhere = response.slope_anywhere
+    by_slope = np.maximum(anywhere[:, :, np.newaxis], anywhere[:, np.newaxis])
+    has_one_ratio = modes.has_one_ratio[point][:, np.newaxis, np.newaxis]
+    by_slope = np.where(has_one_ratio, by_slope, np.inf)
+    is_diagonal = np.eye(n, dtype=bool)
+    of_mode = response.slope[:, np.newaxis]
+    divided_differences = np.where(is_diagonal, of_mode, np.minimum(by_gap, by_slope))
+
+    couplings = modes.stiffness_error[point] * divided_differences
     error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
-    error += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
+    error += np.einsum("sj,sjk,sk->s", r * e, modes.mass_error[point], c, optimize=True)
     return np.asarray(error)

@@ -85,7 +85,7 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
     (proof,) = bound_levels(model, np.zeros(values.shape), np.ones(1), gap=1e-2)
     fine = LinearFlow(frame, ("E",), 3.7, 3.7 / 200, Exact()).values(np.array([[1e-6 / 24]]))[0]
     line = np.linspace(fine[0], fine[-1], len(fine))
-    assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
+    assert 1 <= proof.between_nodes[1, 0] / np.abs(fine - line).max() <= 1.8
 
 
 def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() -> None:
@@ -95,8 +95,8 @@ def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() 
     fine = np.cos(np.sqrt(1.1) * np.linspace(0, 6, 6001))  # of the fastest of the box
     line = np.interp(np.linspace(0, 6, 6001), model.flow.time, fine[::200])
     off = np.abs(fine - line).max()
-    assert proof.between[1:, 0].min() / off >= 1
-    assert proof.between.max() / off <= 1.3
+    assert proof.between_nodes[1:, 0].min() / off >= 1
+    assert proof.between_nodes.max() / off <= 1.3
 
 
 def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
@@ -104,7 +104,7 @@ def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
     model = spring(1.0, None, 6.0, 0.1)
     error = np.full((61, 1), 0.004)
     (proof,) = bound_levels(model, error, np.ones(1), gap=0.01)
-    gap = (proof.outer - proof.inner).max()
+    gap = (proof.upper - proof.attained).max()
     assert 2 * 0.004 < gap <= 0.01
     with pytest.raises(UnprovedError, match="take the method dual"):
         bound_levels(model, error, np.ones(1), gap=0.0079)
@@ -118,7 +118,7 @@ def test_an_error_that_rises_and_falls_within_a_step_is_in_what_is_between() -> 
     error = np.zeros((7, 1))
     error[3] = 1e-3 * np.exp(-0.5)
     plain, kicked = (
-        bound_levels(model, x, np.ones(1), gap=1e-2)[0].between for x in (0 * error, error)
+        bound_levels(model, x, np.ones(1), gap=1e-2)[0].between_nodes for x in (0 * error, error)
     )
     assert 1 - 1e-12 <= (kicked - plain)[3, 0] / 1e-3 <= 1.01
 

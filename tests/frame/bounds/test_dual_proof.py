@@ -144,10 +144,10 @@ def test_any_multipliers_bound_any_motion(rng):
     level, centre, radius = level_of(model, fuzzy, time)
     unit = rng.uniform(-1, 1, (200, 7)).round(rng.integers(0, 2))
     values = exact_motions(model, centre + radius * unit, fuzzy, 4.0, 0.5)
-    for o in range(len(level.structure.order)):
+    for o in range(len(level.structure.derivative_orders)):
         for s, side in enumerate((-1.0, 1.0)):
             problem = OutputBounds.initial(level, o, s, 1.0)
-            columns, rows = problem.data.points.astype(int)
+            columns, rows = problem.data.grid_points.astype(int)
             whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.models.oscillators), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)

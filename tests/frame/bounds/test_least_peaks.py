@@ -38,7 +38,7 @@ def test_the_peak_of_a_motion_holds_between_nodes(rng):
     low, high = np.array([number.cut(0.0) for number in FUZZY.values()]).T
     unit = rng.uniform(-1, 1, len(low))
     box = Box(MODEL, tuple(FUZZY), np.linspace(0.0, 4.0, 81), low, high)
-    bound = box.peak_over_time(unit, box.level().line_deviation())
+    bound = box.peak_over_time(unit, box.level().interpolation_error())
     fine = exact_motions(MODEL, box.inputs(unit)[None], FUZZY, 4.0, 0.001)[0]
     peak = np.abs(fine).max(0)
     assert (peak <= bound).all()

@@ -40,7 +40,7 @@ def test_models_over_a_part_bound_motions_there(box, rng):
         level.models.oscillators, part.models.oscillators, part.grids, strict=True
     ):
         assert narrow.omega.at(own) == pytest.approx(whole.omega.at(unit), rel=1e-12)
-        first, last = narrow.places(grid)[:2]
+        first, last = narrow.table_cell(grid)[:2]
         inside = (grid.omega[first] <= narrow.omega.at(own)) & (
             narrow.omega.at(own) <= grid.omega[last]
         )
@@ -49,7 +49,7 @@ def test_models_over_a_part_bound_motions_there(box, rng):
     for o in range(2):
         problem = OutputBounds.initial(part, o, SIDE, 1e-9)
         problem.improve(np.arange(len(TIME)), problem.effort(4, 20))
-        assert (values[:, :, o].max(0) <= problem.out[0] + 1e-12).all()
+        assert (values[:, :, o].max(0) <= problem.upper + 1e-12).all()
 
 
 def test_what_is_pruned_is_bounded(box):
@@ -58,8 +58,8 @@ def test_what_is_pruned_is_bounded(box):
     level, above = box.level(), np.flatnonzero(most > 0.8 * top)
     problem = OutputBounds.initial(level, 0, SIDE, 0.05 * top, top)
     problem.improve(np.arange(len(TIME)), problem.effort(24, 40, 1.0))
-    low, high, pruned, shares = prune_ends(level, problem, above)
-    assert shares.sum() == pytest.approx(1.0)
+    low, high, pruned, fractions = prune_ends(level, problem, above)
+    assert fractions.sum() == pytest.approx(1.0)
     assert (np.maximum(low + 1, 1 - high) > 0).sum() > 2
     assert pruned.max() <= 1.05 * top
     values, unit = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(1), 4000)

@@ -9,11 +9,12 @@ from scipy.linalg import eigh
 from alphacut.frame import StoreyFrame
 from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
-from alphacut.frame.bounds.level import LevelModels, OutputBounds, _data
+from alphacut.frame.bounds.level import LevelModels, OutputBounds, _dual_function_data
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.rest import inverse_form
+from alphacut.frame.modes.intervening import Excitation
 from alphacut.frame.modes.structure import classical_structure
+from alphacut.frame.modes.truncated_modes import inverse_form
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -50,7 +51,7 @@ def along(own, names, centre, radius, i):
 def modes(structure):
     """All blocks of a structure."""
     centre, used = centred_matrices(structure.mass, structure.stiffness)
-    return enclose_subspaces(centre, used, centre.modes)
+    return enclose_subspaces(centre, used, centre.mode_count)
 
 
 def exact_modes(own, names, centre, radius, u):
@@ -74,8 +75,8 @@ def test_half_of_a_remainder_of_eigenpairs_would_not_do():
     own, names, centre, radius, _ = frame(2, 0.1)
     first = (0, 0)
     for i, entries in (
-        (0, {"rate": first, "shape": (0, 1), "norm": first}),
-        (2, {"mass_shape": first}),
+        (0, {"eigenvalue_block": first, "shapes": (0, 1), "modal_mass": first}),
+        (2, {"mass_times_shapes": first}),
     ):
         found, u = modes(along(own, names, centre, radius, i)), np.array([-1.0, 1])
         ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
@@ -83,7 +84,12 @@ def test_half_of_a_remainder_of_eigenpairs_would_not_do():
         seen = found.centre.mass.at(u[:, None])
         for at, M, (squared, shapes) in zip(u, seen, ends, strict=True):
             x = shapes[:, :1].T
-            exact = {"rate": squared[None], "shape": x, "norm": x @ M @ x.T, "mass_shape": x @ M}
+            exact = {
+                "eigenvalue_block": squared[None],
+                "shapes": x,
+                "modal_mass": x @ M @ x.T,
+                "mass_times_shapes": x @ M,
+            }
             for name, entry in entries.items():
                 value = getattr(found.blocks[0], name).at(np.array([[at]]))[0]
                 off[name].append(abs(exact[name][entry] - value[entry]))
@@ -97,8 +103,8 @@ def test_half_of_the_range_of_eigenvalues_would_not_do():
     loose = {name: p[name].widened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
     for one in (structure, classical_structure(own, p | loose)):
         found = modes(one)
-        assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
-        assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
+        assert found.eigenvalue_low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
+        assert found.eigenvalue_high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
 
 
 def masses_on_springs(stiffness):
@@ -118,8 +124,10 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 44.01, 0.25), 4
     p = TaylorModel.variables(centre, 1e-3 * centre).widened(0.03 * centre)
     springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
-    both = springs.start.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
-    level = LevelModels.from_structure(replace(springs, start=both), ({}, time, ("velocity",)))
+    both = springs.initial_state.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
+    level = LevelModels.from_structure(
+        replace(springs, initial_state=both), Excitation({}, time, ("velocity",))
+    )
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
     for of_side in bounds:
         of_side.improve(np.arange(len(time)), of_side.effort(240, 100, 1.0, 0.25))
@@ -130,9 +138,9 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     for side, column in ((-1, 0), (1, 1)):
         most = np.maximum((1 - start) * side * waves, (1 + start) * side * waves).max(-1).sum(-1)
         off = (most - side * middle)[parts::parts]
-        assert is_tight(off, bounds[column].out[0, 1:] - side * middle[parts::parts])
+        assert is_tight(off, bounds[column].upper[1:] - side * middle[parts::parts])
     off = np.abs(middle - np.interp(fine, time, middle[::parts]))[1:].reshape(-1, parts).max(1)
-    stray = level.line_deviation()[1:, 0]
+    stray = level.interpolation_error()[1:, 0]
     assert (off <= stray).all()
     assert (off > TIGHT * stray).any()
 
@@ -141,14 +149,19 @@ def test_half_of_the_cubic_part_would_not_do():
     own, names, centre, radius, _ = frame(1, 0.1)
     structure = along(own, names, centre, radius, 1)
     data = OutputBounds.initial(
-        LevelModels.from_structure(structure, ({}, np.array([0.0, 0.1]), ("velocity",))), 0, 1, 1.0
+        LevelModels.from_structure(structure, Excitation({}, np.array([0.0, 0.1]), ("velocity",))),
+        0,
+        1,
+        1.0,
     ).data
     whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
     bound = dual_function.dual_value(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
     bound += dual_function.remainder_bound(mu, data)
-    e = data.share[0, 0] * data.table[0, 0, 1, 0] + abs(data.reach[0, 0] * data.table[0, 0, 1, 0])
-    exact = (0.9**-0.5 - 1) * data.centre[0, 0] / data.radius[0, 0]
-    assert exact <= bound - e <= exact + data.expected[0]
+    e = data.participation[0, 0] * data.table[0, 0, 1, 0] + abs(
+        data.participation_radius[0, 0] * data.table[0, 0, 1, 0]
+    )
+    exact = (0.9**-0.5 - 1) * data.midpoint[0, 0] / data.radius[0, 0]
+    assert exact <= bound - e <= exact + data.expected_cubic[0]
 
 
 RECORD = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200) * 0.47))
@@ -233,7 +246,7 @@ def test_forms_of_inverses_stay_within_their_rests(order):
 def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter(monkeypatch):
     _, _, _, _, structure = frame(2, ground=RECORD)
     time, sources = np.arange(0, 2, 0.1), ("load", "velocity")
-    level = LevelModels.from_structure(structure, ({"load": RECORD}, time, sources))
+    level = LevelModels.from_structure(structure, Excitation({"load": RECORD}, time, sources))
     unit, d = np.finfo(float).eps / 2, 4
     # a term enters sums over all variables, over pairs and single inputs, and over sources
     count = 2 * len(level.models.oscillators) * (len(sources) + 2)
@@ -247,7 +260,7 @@ def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter(monkeypatch
             assert (added >= 1.9 * count * unit * size - 1e-18).all()
             assert (added <= 2.1 * count * unit * size + 1e-18).all()
     # and variables, which multipliers enter too
-    with_rounding = _data(level, 0, 1.0)[0].remainder
+    with_rounding = _dual_function_data(level, 0, 1.0)[0].remainder
     monkeypatch.setattr("alphacut.frame.bounds.level.gamma", lambda _: 0.0)
-    added = with_rounding - _data(level, 0, 1.0)[0].remainder
+    added = with_rounding - _dual_function_data(level, 0, 1.0)[0].remainder
     assert (added >= 7.9 * count * unit).all()

@@ -87,13 +87,13 @@ def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
     frame, box, rng = drawn(int(np.log10(stiff)), stiff, ground, **start)
     unit = np.vstack([np.zeros((4, 6)), rng.uniform(-1, 1, (8, 6))])
     node, output = rng.integers(1, 61, 12), np.arange(12) % 4
-    value, error = box.reached(unit, node, output)
-    motion = box.centre_motion()
+    value, error = box.exact_values(unit, node, output)
+    motion = box.midpoint_response()
     values, errors = (
         np.append(x, of_all[node[:4], output[:4]])
         for x, of_all in zip((value, error), motion, strict=True)
     )
-    points = np.vstack([box.inputs(unit), np.tile(box.centre, (4, 1))])
+    points = np.vstack([box.inputs(unit), np.tile(box.midpoint, (4, 1))])
     shares = []
     with mp.workdps(40):
         for i, point in enumerate(points):
@@ -112,7 +112,7 @@ def test_eigenvalues_move_with_squared_frequencies_as_far_as_stated():
     )
     unit = np.array([[-1e-5], [0.0], [1e-5]])
     found = modes_at(frame, box.structure, ("k1",), box.inputs(unit), unit)
-    slope = np.abs(np.ptp(found.sigma.real) / np.ptp(found.squared))
+    slope = np.abs(np.ptp(found.sigma.real) / np.ptp(found.eigenvalues))
     assert slope <= found.sigma_slope[1, 0] * (1 + 1e-6) <= 1.001 * slope
 
 
@@ -120,7 +120,7 @@ def test_equal_frequencies_do_not_lift_the_rounding():
     """Two alike masses on two alike springs: the modes of the pair are any two of a plane."""
     centre, time = np.array([3.0, 3.0, 7.0]), np.arange(0, 9.01, 0.5)
     box = Box(masses_on_springs(centre), ("a", "b", "c"), time, 0.9 * centre, 1.1 * centre)
-    value, error = box.centre_motion()
+    value, error = box.midpoint_response()
     exact = np.sum(np.sin(np.sqrt(centre) * time[:, None]) / np.sqrt(centre), 1)
     assert (np.abs(value[:, 0] - exact) <= error[:, 0] + 4e-16).all()
     assert error.max() < 1e-12
@@ -143,8 +143,8 @@ def test_rounding_of_attained_bounds_is_declared():
 def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
     """In 1e-9 of each input, what the series leave out is far below rounding."""
     frame, box, rng = drawn(1, stiff, RECORD)
-    radius = 1e-9 * box.centre
-    narrow = Box(frame, box.names, box.time, box.centre - radius, box.centre + radius)
+    radius = 1e-9 * box.midpoint
+    narrow = Box(frame, box.names, box.time, box.midpoint - radius, box.midpoint + radius)
     single = narrow.level().models.oscillators
     assert len(single) == 3
     ends = [
@@ -158,7 +158,7 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
             for mode, squared, x in zip(single, *exact_modes(p[:3], p[3:]), strict=True):
                 omega = mp.sqrt(squared * (1 - mp.mpf(frame.damping_ratio) ** 2))
                 share = x[2] * mp.fsum(x[i] * p[3 + i] for i in range(3))
-                pairs = ("omega", mode.omega, omega), ("share", mode.share[0, 0], share)
+                pairs = ("omega", mode.omega, omega), ("share", mode.participation[0, 0], share)
                 for name, model, true in pairs:
                     off = abs(exact_value(model, unit) - true)
                     shares[name].append(float(off) / float(model.remainder))

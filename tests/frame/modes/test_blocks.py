@@ -6,12 +6,25 @@ from scipy.linalg import eigh, expm
 
 from alphacut.frame import MatrixStructure
 from alphacut.frame.bounds.box import over_box, sources
-from alphacut.frame.modes import rest
+from alphacut.frame.modes import truncated_modes
 from alphacut.frame.modes.blocks import SubspaceEquations
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.intervening import BlockShares, oscillators, source_patterns
-from alphacut.frame.modes.models import MotionModels, inverse
-from alphacut.frame.modes.rest import coupling_bounds, response_slopes
+from alphacut.frame.modes.intervening import (
+    BlockParticipation,
+    Excitation,
+    oscillators,
+    source_patterns,
+)
+from alphacut.frame.modes.models import (
+    ModalResponseModels,
+    ModeSelection,
+    inverse_with_rounding,
+)
+from alphacut.frame.modes.truncated_modes import (
+    WeightedSums,
+    coupling_bounds,
+    response_slopes,
+)
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import (
     Oscillators,
@@ -71,10 +84,10 @@ def exact_block(block, K, M, basis):
     """L, X and N of a block's modes in the coordinates `basis`, X with the rotation of `block`."""
     squared, shape = eigh(K, M)
     b, seen = block.modes, np.linalg.solve(basis, shape)
-    turn = np.linalg.solve(seen[np.ix_(b, b)], block.shape.value[:, b].T)
+    turn = np.linalg.solve(seen[np.ix_(b, b)], block.shapes.value[:, b].T)
     X = seen[:, b] @ turn
     rate = np.linalg.solve(turn, squared[b, None] * turn)
-    return {"rate": rate.T, "shape": X.T, "norm": X.T @ basis.T @ M @ basis @ X}
+    return {"eigenvalue_block": rate.T, "shapes": X.T, "modal_mass": X.T @ basis.T @ M @ basis @ X}
 
 
 @pytest.mark.parametrize("coupling", [0.0, 0.05])
@@ -89,8 +102,8 @@ def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
     for u in draws(3):
         K, M = pencil(own, widths, centre + radius * u)
         squared = eigh(K, M, eigvals_only=True)
-        assert (found.low <= squared * (1 + 1e-12)).all()
-        assert (squared <= found.high * (1 + 1e-12)).all()
+        assert (found.eigenvalue_low <= squared * (1 + 1e-12)).all()
+        assert (squared <= found.eigenvalue_high * (1 + 1e-12)).all()
         for block in found.blocks:
             for name, exact in exact_block(block, K, M, middle.basis).items():
                 model = getattr(block, name)
@@ -112,7 +125,7 @@ def test_half_of_a_remainder_of_a_block_would_not_do():
     middle, used = centred_matrices(structure.mass, structure.stiffness)
     block = enclose_subspaces(middle, used, 3).blocks[0]
     assert len(block.modes) == 2
-    off = {name: np.zeros(getattr(block, name).shape) for name in ("rate", "shape")}
+    off = {name: np.zeros(getattr(block, name).shape) for name in ("eigenvalue_block", "shapes")}
     for side in (-1.0, 1.0):
         u = np.array([0, 0, side])
         K, M = pencil(own, "abc", centre + radius * u)
@@ -151,12 +164,15 @@ def crossing_pair(widths, ratio, source, read=0):
 def coupled(own, structure, time):
     """The only block of a structure: its oscillators and the bounds of what couples them."""
     middle, used = centred_matrices(structure.mass, structure.stiffness)
-    found, excitation = enclose_subspaces(middle, used, 2), ({}, time, sources(own, structure))
-    excited = source_patterns(structure, excitation[2]) @ inverse(middle.basis, structure.start).T
-    rows = structure.start.like(structure.rows) @ middle.basis
-    shares = BlockShares.from_block(found.blocks[0], rows, excited, used)
-    bounds = coupling_bounds(structure, shares, found, excitation)
-    return oscillators(structure, shares, found), bounds[0][:, 0], bounds[1][:, 0]
+    found = enclose_subspaces(middle, used, 2)
+    excitation = Excitation({}, time, sources(own, structure))
+    to_modal = inverse_with_rounding(middle.basis, like=structure.initial_state)
+    patterns = source_patterns(structure, excitation.sources) @ to_modal.T
+    rows = structure.initial_state.like(structure.output_rows) @ middle.basis
+    of_block = BlockParticipation.from_block(found.blocks[0], rows, patterns, used)
+    bounds = coupling_bounds(structure, of_block, found, excitation)
+    single = oscillators(structure, of_block, found)
+    return single, bounds.at_nodes[:, 0], bounds.interpolation_error[:, 0]
 
 
 NARROW, WIDE = (1.0, 1.0, 0.2), (12.0, 12.0, 10.0)
@@ -188,7 +204,7 @@ def test_what_couples_a_block_holds_and_half_would_not_do(ratio, source, widths,
             wave = (
                 np.cos(omega * time) + decay * wave / omega if source == "start" else wave / omega
             )
-            total = total - mode.share.at(u[None])[0, 0, 0] * np.exp(-decay * time) * wave
+            total = total - mode.participation.at(u[None])[0, 0, 0] * np.exp(-decay * time) * wave
         assert (np.abs(total) <= added + 1e-9).all()
         reached = np.maximum(reached, np.abs(total))
     assert (reached[1:] > (TIGHT if ratio < 0.1 else 0.3) * added[1:])[-40:].any()
@@ -219,7 +235,7 @@ def test_a_block_strays_from_lines_between_nodes_as_far_as_stated():
     time, parts = np.linspace(0, 4, 81), 10
     own, (structure, centre, radius) = crossing_pair(WIDE, 0.002, "velocity")
     single, _, deviation = coupled(own, structure, time)
-    assert max(mode.share.magnitude().max() for mode in single) < 1e-12
+    assert max(mode.participation.magnitude().max() for mode in single) < 1e-12
     fine, reached = np.linspace(0, 4, 80 * parts + 1), np.zeros(80)
     for u in (np.array([0, 0, 1.0]), *draws(3, 10)):
         K, _ = pencil(own, "abc", centre + radius * u)
@@ -244,15 +260,21 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
     )
     structure, centre, radius = over(own, {"a": 0.05, "b": 0.05})
     time = np.linspace(0, 3, 61)
-    least = rest._with_best_powers
+    best = truncated_modes._with_best_weights
 
-    def chosen(structure, bounds, ranges):
-        narrow = [(C, size if k == power else size + 1e6) for k, (C, size) in enumerate(bounds)]
-        return least(structure, narrow, ranges)
+    def chosen(structure, sums, ranges):
+        narrow = [
+            WeightedSums(C, size if k == power else size + 1e6) for k, (C, size) in enumerate(sums)
+        ]
+        return best(structure, narrow, ranges)
 
-    monkeypatch.setattr(rest, "_with_best_powers", chosen)
-    monkeypatch.setattr("alphacut.frame.modes.models.modes_wanted", lambda *_: (1, np.zeros(9)))
-    models = MotionModels.from_structure(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
+    monkeypatch.setattr(truncated_modes, "_with_best_weights", chosen)
+    monkeypatch.setattr(
+        "alphacut.frame.modes.models.required_modes",
+        lambda *_, **__: ModeSelection(1, np.zeros(9)),
+    )
+    excitation = Excitation({"load": RECORD}, time, ("load",))
+    models = ModalResponseModels.from_structure(structure, excitation, np.ones(1))
     (others,) = models.truncated
     assert len(models.oscillators) == 1
     ratios = np.zeros(len(time))
@@ -263,10 +285,10 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         point = grid_over((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
         wave = Oscillators(point, {"load": RECORD}, time, {0}).responses("load", 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
-        share, size = (x.at(u[None])[0, 0, 0] for x in (others.share, others.amplitude))
-        width = (size + others.amplitude.remainder[0, 0]) * others.half[0, 0]
-        off = np.abs(motion - share * others.middle[0, 0])
-        slack = others.share.remainder[0, 0] * np.abs(others.middle[0, 0])
+        share, size = (x.at(u[None])[0, 0, 0] for x in (others.participation, others.amplitude))
+        width = (size + others.amplitude.remainder[0, 0]) * others.response_radius[0, 0]
+        off = np.abs(motion - share * others.response_midpoint[0, 0])
+        slack = others.participation.remainder[0, 0] * np.abs(others.response_midpoint[0, 0])
         assert (off <= width + slack + 1e-12).all()
         ratios = np.maximum(ratios, off / np.maximum(width + slack, 1e-300))
     assert ratios[1:].max() > TIGHT
@@ -323,8 +345,8 @@ def test_right_sides_of_a_subspace_are_bounded_and_so_is_how_fast_they_change(ki
 
     bounds = SubspaceEquations(
         residual=np.abs(R[0]),
-        shape=np.abs(X[0]),
-        mass_shape=np.abs(MX[0]),
+        shapes=np.abs(X[0]),
+        mass_times_shapes=np.abs(MX[0]),
         mass=np.abs(M[0]),
         coupling=np.abs(F[0]),
         difference=np.abs(diagonal[:, :, None] - diagonal[:, None, :]).max(0),

@@ -7,9 +7,9 @@ from scipy.linalg import eigh
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.blocks import (
     CentredMatrices,
-    Comparison,
-    eigenvalue_drop,
+    SolutionBounds,
     enclosed_block,
+    max_eigenvalue_decrease,
     subspace_series,
 )
 
@@ -27,16 +27,21 @@ def test_remainders_of_a_mode_are_nearly_attained(degree, rng):
         mass=TaylorModel((np.eye(2)[None],), nothing, inputs=1, order=6),
         stiffness=TaylorModel((middle[None], change[None]), nothing, inputs=1, order=6),
         basis=np.eye(2),
-        modes=2,
+        mode_count=2,
     )
     lowest = np.array([0])
-    series = subspace_series(lowest, degree, centre, [])
+    series = subspace_series(lowest, degree, centre)
     block = enclosed_block(lowest, np.eye(1), series, centre)
-    attained = dict.fromkeys(("rate", "shape", "mass_shape", "norm"), 0.0)
+    attained = dict.fromkeys(("eigenvalue_block", "shapes", "mass_times_shapes", "modal_mass"), 0.0)
     for u in (-1.0, 1.0):
         squared, shapes = eigh(middle + u * change)
         shape = shapes[:, 0] / shapes[0, 0]
-        exact = {"rate": squared[:1], "shape": shape, "mass_shape": shape, "norm": shape @ shape}
+        exact = {
+            "eigenvalue_block": squared[:1],
+            "shapes": shape,
+            "mass_times_shapes": shape,
+            "modal_mass": shape @ shape,
+        }
         for name in attained:
             model = getattr(block, name)
             off = np.abs(model.at(np.array([[u]]))[0] - exact[name])
@@ -53,7 +58,7 @@ def test_eigenvalues_drop_by_all_parts_of_a_model(sign, rng):
     bend = -sign * bend  # a square that lowers sign × the number
     parts = tuple(np.full((1, 1, 1), x) for x in (2.0, slope, bend))
     model = TaylorModel(parts, np.full((1, 1), remainder), inputs=1, order=2)
-    drop = eigenvalue_drop(model, np.array([scale]), sign)
+    drop = max_eigenvalue_decrease(model, np.array([scale]), sign=sign)
     assert drop == pytest.approx(scale**2 * (slope + abs(bend) + remainder), rel=1e-9)
 
 
@@ -61,7 +66,7 @@ def test_solutions_are_bounded_by_those_of_the_comparison_matrix(rng):
     """All solutions of A y = r, and that of the matrix whose entries all hinder the most."""
     distance, spread = rng.uniform(1.0, 3.0, 3), rng.uniform(0.0, 0.3, (3, 3))
     hindering = np.diag(distance) - spread
-    comparison = Comparison(distance, spread, np.linalg.inv(hindering), least=0.0)
+    comparison = SolutionBounds(distance, spread, np.linalg.inv(hindering), min_eigenvalue=0.0)
     right = rng.uniform(0.5, 2.0, 3)
     bound = comparison.solution_bounds(right)
     np.testing.assert_allclose(bound, np.linalg.solve(hindering, right), rtol=1e-9)

@@ -7,7 +7,8 @@ from scipy.linalg import eigh
 from alphacut.frame import Accelerogram, DualProof, Force, History, MatrixStructure, Proof, envelope
 from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.modes.models import MotionModels
+from alphacut.frame.modes.intervening import Excitation
+from alphacut.frame.modes.models import ModalResponseModels
 from alphacut.frame.structures.linear import histories, modal_damping
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, require_inside
@@ -84,8 +85,8 @@ def test_an_oscillator_is_left_where_all_blocks_are_narrower_by_sums():
     )
     names, time = ("rb", "l", "g3", "g0", "ra"), 1.533 * np.arange(41)
     structure = over_box(system, names, np.full(5, 0.92), np.full(5, 1.06))
-    excitation = histories(system), time, sources(system, structure)
-    assert MotionModels.from_structure(structure, excitation, np.full(2, 1e-2)).oscillators
+    excitation = Excitation(histories(system), time, sources(system, structure))
+    assert ModalResponseModels.from_structure(structure, excitation, np.full(2, 1e-2)).oscillators
 
 
 def test_damping_by_ratios_is_smooth_where_modes_of_one_ratio_meet(rng):

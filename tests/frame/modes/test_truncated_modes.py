@@ -7,8 +7,8 @@ import pytest
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.blocks import Block
-from alphacut.frame.modes.intervening import BlockShares
-from alphacut.frame.modes.rest import coupling_bounds, inverse_form
+from alphacut.frame.modes.intervening import BlockParticipation, Excitation
+from alphacut.frame.modes.truncated_modes import coupling_bounds, inverse_form
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -21,7 +21,7 @@ def test_remainder_of_an_inverse_form_is_that_of_a_geometric_series(order, rng):
     parts = np.full((1, 1, 1), value), np.full((1, 1, 1), value * variation)
     matrix = TaylorModel(parts, np.zeros((1, 1)), inputs=1, order=order)
     left, right = (matrix.like(rng.uniform(-3, 3, (count, 1))) for count in (2, 3))
-    found = inverse_form(matrix, left, right, least=1 - variation)
+    found = inverse_form(matrix, left, right, min_eigenvalue=1 - variation)
     middle = left.value @ right.value.T / value
     for u in (-1.0, 1.0):
         exact = middle / (1 + variation * u)
@@ -58,20 +58,24 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
     rate = matrix([[constant * squared, constant * off], [constant * off, constant * squared]])
     norm = matrix([[mass, nothing], [nothing, mass]])
     block = Block(np.arange(2), rate, rate, rate, norm)
-    of_block = BlockShares(
+    of_block = BlockParticipation(
         block,
-        read=matrix([[nothing], [read]]),
-        source_forces=matrix([[mass], [nothing]]),
-        participation=matrix([[constant], [nothing]]),
+        output_modes=matrix([[nothing], [read]]),
+        modal_forces=matrix([[mass], [nothing]]),
+        source_participation=matrix([[constant], [nothing]]),
     )
     structure = SimpleNamespace(
-        order=np.zeros(1, int),
-        factor=constant,
+        derivative_orders=np.zeros(1, int),
+        distinct_orders=[0],
+        output_factors=constant,
         rayleigh=zero.like(np.zeros(2)),
-        ratio=zero.like(np.zeros(2)),
+        damping_ratios=zero.like(np.zeros(2)),
     )
-    found = SimpleNamespace(low=np.full(2, squared - off), high=np.full(2, squared + off))
-    added, straying, _ = coupling_bounds(structure, of_block, found, ({}, time, ("start",)))
+    found = SimpleNamespace(
+        eigenvalue_low=np.full(2, squared - off), eigenvalue_high=np.full(2, squared + off)
+    )
+    excitation = Excitation({}, time, ("start",))
+    added, straying, _ = coupling_bounds(structure, of_block, found, excitation)
     largest_read = 1 + variation / 2
 
     def coupled(t):

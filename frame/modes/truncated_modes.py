@@ -1,0 +1,488 @@
+"""What an output has beside its oscillators: modes that are not enclosed, and coupling in blocks.
+
+Modes known by sums. With a_k = r·φ_k and β_k = φ_k·M v, sums over all modes are known without the
+modes: Σ a β = r·v, Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with the eigenvalue λ_k in the denominator
+r·K⁻¹ M v, r·K⁻¹ r and (M v)·K⁻¹ M v. What the enclosed modes leave of them is C = Σ a β, A = Σ a²
+and B = Σ β² over the truncated modes, with or without λ in the denominator. Let e_k(t) be the
+response of an oscillator with λ_k. By Cauchy and Schwarz the truncated modes add
+
+    C m ± √(A B) r          with C, A and B without λ: m ± r contains e_k of all truncated modes;
+    ± √(A B) sup |λ^½ e|    with A over λ and B without λ;
+    C m ± √(A B) r          with C, A and B over λ: m ± r contains λ_k e_k, and C m is the static
+                            response.
+
+The smallest of the three is taken. √(A B) is replaced by (A t + B/t)/2 with a number t, which is
+not smaller and a Taylor model: at inputs where A is large, B is often small.
+
+Coupling in a block. A block contributes a e(L) β with a = r X and β = N⁻¹ Xᵀ M v, of which the
+diagonal of L gives Σ_j a_j β_j e(L_jj). Let V be the eigenvectors of L, with N^½ V orthogonal, and
+F = L off its diagonal. Then V⁻¹ (e(L) − e(diag L)) has the entries e[λ_i, L_jj] (V⁻¹ F)_ij with
+divided differences of e (Daleckii, Krein 1965). So the coupling is at most |a N^-½| Σ_j |β_j| |N^½
+F_j| sup |de/dλ|. It is also at most twice |a N^-½| |N^½ β| times the radius of the range of e. The
+eigenvalues λ_i lie in the discs of Gershgorin about L_jj.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.base.arrays import Array
+from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
+from alphacut.frame.modes.clusters import Subspaces
+from alphacut.frame.modes.intervening import (
+    BlockParticipation,
+    DampedRanges,
+    Excitation,
+    column_products,
+    damped_ranges,
+)
+from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.response.oscillators import (
+    POWERS,
+    Oscillators,
+    Ranges,
+    grid_over,
+    response_ranges,
+)
+
+POWER_SQRT = POWERS.index(0.5)
+"""Position of the weight √λ among the weights λ^κ with the exponents κ of `POWERS`."""
+
+
+@dataclass(frozen=True, eq=False)
+class TruncatedModes:
+    """Response of modes that are known by sums: C m(t) ± R r(t) for each source and output."""
+
+    participation: TaylorModel  # C, (sources, m)
+    amplitude: TaylorModel  # R, (sources, m)
+    response_midpoint: Array  # m, (sources, m, T)
+    response_radius: Array  # r, (sources, m, T)
+    # bound of the distance of the response from straight lines between nodes, without what forces
+    # add to accelerations at once, (T, m)
+    interpolation_error: Array
+
+    @property
+    def radius(self) -> Array:
+        """Bound of Σ R r over the sources, each at the node where it is largest, shape (m,)."""
+        products = self.amplitude.magnitude()[..., np.newaxis] * self.response_radius
+        return np.asarray(products.max(axis=-1).sum(axis=0))
+
+
+class ModalSums(NamedTuple):
+    """Sums over modes, without the factors of the outputs; m outputs."""
+
+    products: TaylorModel  # Σ a β, (sources, m)
+    products_over_eigenvalue: TaylorModel  # Σ a β / λ, (sources, m)
+    output_squares: TaylorModel  # Σ a², (m,)
+    output_squares_over_eigenvalue: TaylorModel  # Σ a² / λ, (m,)
+    source_squares: TaylorModel  # Σ β², (sources,)
+    source_squares_over_eigenvalue: TaylorModel  # Σ β² / λ, (sources,)
+
+
+class WeightedSums(NamedTuple):
+    """Sums over truncated modes with a weight λ^-κ, with the factors of the outputs."""
+
+    participation: TaylorModel  # C = Σ a β λ^-κ, (sources, m); 0 where it is not known
+    amplitude: TaylorModel  # R ≥ Σ |a β| λ^-κ, (sources, m)
+
+
+def truncated_modes(
+    structure: ClassicalStructure,
+    found: Subspaces,
+    participations: Sequence[BlockParticipation],
+    rows: TaylorModel,
+    patterns: TaylorModel,
+    excitation: Excitation,
+) -> TruncatedModes | None:
+    """Bound the response of all modes that are not enclosed.
+
+    Args:
+        structure: The structure over the box.
+        found: The enclosed modes.
+        participations: How they take part in the response.
+        rows: Rows of the outputs in the coordinates of the modes, shape (m, n).
+        patterns: Vectors of the sources in these coordinates, shape (sources, n).
+        excitation: Loads, time nodes and sources.
+
+    Returns:
+        None if all modes are enclosed.
+    """
+    modes = found.truncated_modes
+    if not len(modes):
+        return None
+    order = max(x.block.modal_mass.order for x in participations)
+    sums = _sums_over_all_modes(found, rows, patterns, order)
+    for of_block in participations:
+        enclosed = modal_sums_of_block(of_block)
+        sums = ModalSums(*(x - y for x, y in zip(sums, enclosed, strict=True)))
+    low = float(found.eigenvalue_low[modes].min())
+    high = float(found.eigenvalue_high[modes].max())
+    ranges = damped_ranges(structure, low, high, modes)
+    return response_of_truncated_modes(sums, ranges, structure, found, excitation)
+
+
+def response_of_truncated_modes(
+    sums: ModalSums,
+    ranges: DampedRanges,
+    structure: ClassicalStructure,
+    found: Subspaces,
+    excitation: Excitation,
+) -> TruncatedModes:
+    """Bound the response of modes by sums over them and by the ranges of their ω and g/ω."""
+    responses = response_ranges(
+        ranges.omega,
+        ranges.quotient,
+        excitation.loads,
+        excitation.time,
+        excitation.sources,
+        structure.distinct_orders,
+    )
+    return _with_best_weights(structure, _weighted_sums(sums, structure, found), responses)
+
+
+def _sums_over_all_modes(
+    found: Subspaces, rows: TaylorModel, patterns: TaylorModel, order: int
+) -> ModalSums:
+    """Return sums over all modes by solutions of M and K, as functions of the inputs of `patterns`.
+
+    Args:
+        found: Holds M and K in coordinates that are modal at the midpoint.
+        rows: Rows r of the outputs in these coordinates, shape (m, n); constant but for rounding.
+        patterns: Vectors v of the sources, shape (sources, n).
+        order: Order of the Taylor models if `patterns` depend on no input; else it is theirs.
+    """
+    centre = found.centre
+    mass = centre.mass
+    stiffness = centre.stiffness
+    if len(patterns.active_inputs()):
+        order = patterns.order
+        mass = mass.truncated(order).embedded(found.used, patterns.inputs)
+        stiffness = stiffness.truncated(order).embedded(found.used, patterns.inputs)
+    else:
+        patterns = mass.like(patterns.value).widened(patterns.remainder)
+        mass = mass.truncated(order)
+        stiffness = stiffness.truncated(order)
+    rows = stiffness.like(rows.value).widened(rows.remainder)
+    min_mass = 1 - found.mass_decrease
+    min_stiffness = 1 - found.stiffness_decrease
+
+    massive = slice(0, centre.mode_count)
+    massive_rows = rows[:, massive]
+    output_squares = _diagonal(
+        inverse_form(mass[massive, massive], massive_rows, massive_rows, min_mass)
+    )
+    over_eigenvalue = _diagonal(inverse_form(stiffness, rows, rows, min_stiffness))
+    if centre.mode_count < len(centre.basis):
+        # What unknowns without mass move by themselves belongs to no mode. Σ a² has no bound for
+        # outputs that take them: 1e60 stands for infinity.
+        massless = slice(centre.mode_count, None)
+        massless_rows = rows[:, massless]
+        by_themselves = inverse_form(
+            stiffness[massless, massless], massless_rows, massless_rows, min_stiffness
+        )
+        over_eigenvalue = over_eigenvalue - _diagonal(by_themselves)
+        takes_massless = massless_rows.magnitude().any(axis=1)
+        output_squares = output_squares.widened(np.where(takes_massless, 1e60, 0.0))
+
+    forces = patterns @ mass  # M v
+    by_stiffness = inverse_form(stiffness, forces, forces, min_stiffness)
+    return ModalSums(
+        products=patterns @ rows.T,
+        products_over_eigenvalue=inverse_form(stiffness, forces, rows, min_stiffness),
+        output_squares=output_squares,
+        output_squares_over_eigenvalue=over_eigenvalue,
+        source_squares=_diagonal(forces @ patterns.T),
+        source_squares_over_eigenvalue=_diagonal(by_stiffness),
+    )
+
+
+def inverse_form(
+    matrix: TaylorModel, left: TaylorModel, right: TaylorModel, min_eigenvalue: float
+) -> TaylorModel:
+    """Return left A⁻¹ rightᵀ with a remainder that is quadratic in small residuals, shape (l, r).
+
+    With series x ≈ left A⁻¹ and y ≈ right A⁻¹, and their residuals e = left − x A and f = right −
+    y A, it is x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
+
+    Args:
+        matrix: A, symmetric, shape (n, n), diagonal and positive at the midpoint of the box.
+        left: Shape (l, n).
+        right: Shape (r, n).
+        min_eigenvalue: A number c with A(u) ≥ c A(0) over the box, as quadratic forms.
+    """
+    x = solution_series(matrix, left.T).T
+    y = solution_series(matrix, right.T).T
+    e = (left - x @ matrix).magnitude()
+    f = (right - y @ matrix).magnitude()
+    # |e A⁻¹ fᵀ| ≤ |e| |f| / c with the norm √(e A(0)⁻¹ eᵀ).
+    diagonal = np.diag(matrix.value)
+    e_norm = np.sqrt((e**2 / diagonal).sum(axis=1))
+    f_norm = np.sqrt((f**2 / diagonal).sum(axis=1))
+    remainder = e @ y.magnitude().T + np.outer(e_norm, f_norm) / min_eigenvalue
+    return (x @ right.T).widened(remainder)
+
+
+def modal_sums_of_block(participation: BlockParticipation) -> ModalSums:
+    """Return sums over the modes of a block, by N = Xᵀ M X and Xᵀ K X = N L."""
+    block = participation.block
+    modal_stiffness = block.modal_mass @ block.eigenvalue_block.T
+    outputs = participation.output_modes
+    forces = participation.modal_forces
+    outputs_over_stiffness = solve(modal_stiffness, outputs)
+    forces_over_stiffness = solve(modal_stiffness, forces)
+    return ModalSums(
+        products=participation.source_participation.T @ outputs,
+        products_over_eigenvalue=forces.T @ outputs_over_stiffness,
+        output_squares=participation.output_sums,
+        output_squares_over_eigenvalue=column_products(outputs, outputs_over_stiffness),
+        source_squares=participation.source_sums,
+        source_squares_over_eigenvalue=column_products(forces, forces_over_stiffness),
+    )
+
+
+def _diagonal(matrix: TaylorModel) -> TaylorModel:
+    """Return the diagonal of a square matrix, shape (n,)."""
+    at = np.arange(len(matrix.remainder))
+    return matrix[at, at]
+
+
+def _weighted_sums(
+    sums: ModalSums, structure: ClassicalStructure, found: Subspaces
+) -> list[WeightedSums]:
+    """Return C and R = (A t + B/t)/2 for each exponent in `POWERS`, over the box of all inputs."""
+    inputs = structure.initial_state.inputs
+    order = structure.initial_state.order
+    all_sums = ModalSums(*(x.truncated(order).embedded(found.used, inputs) for x in sums))
+    factors = structure.output_factors
+    without = _root_of_product(all_sums.output_squares, all_sums.source_squares)
+    mixed = _root_of_product(all_sums.output_squares_over_eigenvalue, all_sums.source_squares)
+    over_eigenvalue = _root_of_product(
+        all_sums.output_squares_over_eigenvalue, all_sums.source_squares_over_eigenvalue
+    )
+    return [
+        WeightedSums(all_sums.products * factors, without * factors),
+        WeightedSums(all_sums.products * 0.0 * factors, mixed * factors),
+        WeightedSums(all_sums.products_over_eigenvalue * factors, over_eigenvalue * factors),
+    ]
+
+
+def _root_of_product(A: TaylorModel, B: TaylorModel) -> TaylorModel:
+    """Return a bound (A t + B/t)/2 of √(A B), shape (sources, m), for A (m,) and B (sources,)."""
+    _, max_A = A.bounds()
+    _, max_B = B.bounds()
+    # Any positive t gives a bound; this one is the best for the largest A and B, which may be zero.
+    t: Array = np.sqrt(np.maximum(max_B, 1e-300)[:, np.newaxis] / np.maximum(max_A, 1e-300))
+    return A[None] * (t / 2) + B[:, None] * (0.5 / t)
+
+
+def _with_best_weights(
+    structure: ClassicalStructure,
+    sums: Sequence[WeightedSums],
+    ranges: Mapping[int, Ranges],
+) -> TruncatedModes:
+    """Bound the response of truncated modes, with the best weight for each source and output.
+
+    If all λ_k^κ e_k(t) lie in an interval with the midpoint m(t) and the radius r(t), the truncated
+    modes add C m(t) ± R r(t) with C and R of the weight λ^-κ.
+
+    Args:
+        structure: Structure whose outputs take the derivatives `derivative_orders`.
+        sums: C and R for each exponent κ in `POWERS`; C is not known for ½.
+        ranges: Bounds of λ_k^κ e_k(t), shape (exponents, sources, T), by the order of the
+            derivative.
+    """
+    # By output; the shape is then (exponents, sources, outputs, T).
+    by_output = [ranges[int(order)] for order in structure.derivative_orders]
+    low = np.stack([x.low for x in by_output], axis=2)
+    high = np.stack([x.high for x in by_output], axis=2)
+    line_errors = np.stack([x.line_deviation for x in by_output], axis=2)
+    midpoint = (low + high) / 2
+    radius = (high - low) / 2
+
+    # With the weight √λ the sum C is not known, so the midpoint cannot be used. The interval is
+    # replaced by one that contains it and is centred at zero.
+    radius[POWER_SQRT] = np.abs(midpoint[POWER_SQRT]) + radius[POWER_SQRT]
+    midpoint[POWER_SQRT] = 0.0
+
+    # The best exponent is the one with the smallest largest R r(t), shape (sources, outputs).
+    max_amplitudes = np.stack([x.amplitude.magnitude() for x in sums])
+    best = (max_amplitudes * radius.max(axis=-1)).argmin(axis=0)
+
+    # Taylor models cannot be selected entry by entry, so those of all exponents are added with
+    # weights that are 1 for the best exponent and 0 else.
+    participation = sums[0].participation * 0.0
+    amplitude = sums[0].amplitude * 0.0
+    for exponent, of_exponent in enumerate(sums):
+        weights = (best == exponent).astype(float)
+        participation = participation + of_exponent.participation * weights
+        amplitude = amplitude + of_exponent.amplitude * weights
+
+    # The distance from a straight line is at most R times that of λ^κ e for every exponent, so the
+    # smallest of these bounds holds in each step. Sources add up.
+    line_bounds = max_amplitudes[..., np.newaxis] * line_errors
+    source, output = np.indices(best.shape)
+    return TruncatedModes(
+        participation=participation,
+        amplitude=amplitude,
+        response_midpoint=midpoint[best, source, output],
+        response_radius=radius[best, source, output],
+        interpolation_error=line_bounds.min(axis=0).sum(axis=0).T,
+    )
+
+
+class CouplingBounds(NamedTuple):
+    """Bounds of what couples the oscillators of a block."""
+
+    at_nodes: Array  # bound of what the coupling adds to outputs at nodes, (T, m)
+    # bound of the distance of that from a straight line in the step before each node, (T, m)
+    interpolation_error: Array
+    ranges: DampedRanges  # of the modes of the block
+
+
+def coupling_bounds(
+    structure: ClassicalStructure,
+    participation: BlockParticipation,
+    found: Subspaces,
+    excitation: Excitation,
+) -> CouplingBounds:
+    """Bound what couples a block's oscillators, by L of K X = M X L off its diagonal."""
+    loads, time, sources = excitation
+    factors = _coupling_factors(structure, participation)
+    low, high = _eigenvalue_range(participation, found, factors.off_diagonal)
+    ranges = damped_ranges(structure, low, high, participation.block.modes)
+    low_omega, high_omega = ranges.omega
+    min_quotient, max_quotient = ranges.quotient
+
+    # The distance of the table's points is a fifth of the decay or of the inverse duration, over
+    # which responses hardly change; 120 points along an axis at most limit the time.
+    spacing = 0.2 * (min_quotient * low_omega + 2 / max(float(time[-1]), 1e-300))
+    along_omega = (high_omega - low_omega) / spacing
+    along_quotient = (max_quotient - min_quotient) * high_omega / spacing
+    points = int(np.clip(along_omega, 1, 120)) + 1, int(np.clip(along_quotient, 1, 120)) + 1
+    orders = structure.distinct_orders
+    table = Oscillators(grid_over(*ranges, points), loads, time, orders)
+
+    max_sigma = high_omega * float(np.sqrt(1 + max_quotient**2))
+    shape = (len(time), len(structure.derivative_orders))
+    at_nodes = np.zeros(shape)
+    interpolation_error = np.zeros(shape)
+    for order in orders:
+        outputs = np.flatnonzero(structure.derivative_orders == order)
+        for s, source in enumerate(sources):
+            by_slope = factors.by_slope[s, outputs]
+            by_range = factors.by_range[s, outputs]
+            response = table.responses(source, order)
+            G, G_slope = response.largest
+            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
+            radius = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
+            at_nodes[:, outputs] += np.minimum(
+                np.outer(slope, by_slope), 2 * np.outer(radius, by_range)
+            )
+            # The coupling is the block's response less that of its oscillators. Each of the two is
+            # off a straight line by the interpolation error of e at most, hence the coupling by
+            # twice that; or by twice its own largest value within the step.
+            max_force = loads[source].extremes[0] if source in loads else 0.0
+            G, G_slope = _largest_within_steps(
+                response.largest, time, max_force=max_force, max_sigma=max_sigma, order=order
+            )
+            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
+            by_line = np.outer(response.line_deviation, by_range)
+            interpolation_error[:, outputs] += 2 * np.minimum(by_line, np.outer(slope, by_slope))
+    return CouplingBounds(at_nodes, interpolation_error, ranges)
+
+
+class _CouplingFactors(NamedTuple):
+    """Factors of the bounds of the coupling in a block of p modes, for m outputs."""
+
+    by_slope: Array  # bound of the coupling over sup |de/dλ|, (sources, m)
+    by_range: Array  # bound of |a N^-½| |N^½ β|, and of Σ |a_j β_j|, (sources, m)
+    off_diagonal: Array  # bound of |F|, L off its diagonal, (p, p)
+
+
+def _coupling_factors(
+    structure: ClassicalStructure, participation: BlockParticipation
+) -> _CouplingFactors:
+    """Return the factors of the bounds of the coupling in a block over the box."""
+    block = participation.block
+    off_diagonal = block.eigenvalue_block.magnitude() * (1.0 - np.eye(len(block.modes)))
+    # N is the identity at the midpoint but for this bound of ‖N − 1‖₂, so |N^½ x| ≤ √norm |x|.
+    norm = 1 + float(np.linalg.norm(block.modal_mass.deviation(), 2))
+    outputs = np.sqrt(participation.output_sums.magnitude()) * structure.output_factors.magnitude()
+    of_columns = np.sqrt(norm) * np.linalg.norm(off_diagonal, axis=1)
+    by_source = participation.source_participation.magnitude().T @ of_columns
+    of_sources = norm * np.sqrt(participation.source_sums.magnitude())
+    return _CouplingFactors(
+        by_slope=by_source[:, np.newaxis] * outputs,
+        by_range=of_sources[:, np.newaxis] * outputs,
+        off_diagonal=off_diagonal,
+    )
+
+
+def _eigenvalue_range(
+    participation: BlockParticipation, found: Subspaces, off_diagonal: Array
+) -> tuple[float, float]:
+    """Return a range over the box of the eigenvalues of a block and of the diagonal of its L.
+
+    The eigenvalues lie in Gershgorin's discs about L_jj, whose radii are the sums of |F| =
+    `off_diagonal` over a row, and within the bounds by Rayleigh quotients in `found`.
+    """
+    block = participation.block
+    j = np.arange(len(off_diagonal))
+    low, high = block.eigenvalue_block[j, j].bounds()
+    radius = off_diagonal.sum(axis=1)
+    eigenvalue_low = max(float((low - radius).min()), float(found.eigenvalue_low[block.modes[0]]))
+    eigenvalue_high = min(
+        float((high + radius).max()), float(found.eigenvalue_high[block.modes[-1]])
+    )
+    return min(eigenvalue_low, float(low.min())), max(eigenvalue_high, float(high.max()))
+
+
+def _largest_within_steps(
+    largest: Array, time: Array, *, max_force: float, max_sigma: float, order: int
+) -> Array:
+    """Bound |G| and |dG/dσ| in the step to each node by their bounds at nodes, shape (2, T).
+
+    Here G = σ^n ρ with the order n, |exp(σ τ)| ≤ 1 for τ ≥ 0, and
+
+        G(t + τ) = exp(σ τ) G(t) + σ^n I,   I = ∫ exp(σ s) f(t + τ − s) ds over 0 ≤ s ≤ τ ≤ h.
+
+    With |f| ≤ `max_force`, |I| ≤ max_force h and |dI/dσ| ≤ max_force h²/2.
+
+    Args:
+        largest: Bounds of |G| and |dG/dσ| at the nodes, shape (2, T).
+        time: Nodes, shape (T,), in s.
+        max_force: Largest magnitude of the load f.
+        max_sigma: Largest |σ|.
+        order: n.
+    """
+    h = np.diff(time, prepend=time[0])
+    G, G_slope = np.roll(largest, 1, axis=1)  # at the beginning of each step
+    # The derivative of σ^n I is n σ^(n − 1) I + σ^n dI/dσ.
+    of_power = order * max_sigma ** (order - 1) if order else 0.0
+    of_integral = max_force * (of_power * h + max_sigma**order * h**2 / 2)
+    return np.stack([G + max_force * h * max_sigma**order, G_slope + h * G + of_integral])
+
+
+def response_slopes(
+    source: str, G: Array, G_slope: Array, omega: Array | float, quotient: Array | float
+) -> Array:
+    """Bound |de/dλ| of the responses e of oscillators to a source, in the shape of G.
+
+    With the decay g = (a + b λ)/2 + ζ √λ and ω² = λ − g², 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1,
+    since g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g.
+
+    Args:
+        source: Name of a load or force, "velocity" or "start".
+        G: Bounds of |σ^ν ρ|, where ν is the order of the derivative.
+        G_slope: Bounds of its derivative by σ.
+        omega: Smallest ω.
+        quotient: Largest g/ω.
+    """
+    if source == "start":  # e = Re G + (g/ω) Im G
+        return (1 + quotient) * G_slope / (2 * omega) + G * quotient / (2 * omega**2)
+    # e = ± Im G/ω, with |dω/dλ| ≤ |dσ/dλ|
+    return G_slope / (2 * omega**2) + G / (2 * omega**3)
