@@ -1,9 +1,9 @@
 """Sums over the square lattice that couple one particle to all its periodic images.
 
-The lattice is P = 2(m + i n) with integers m, n, not both zero: the cell has side 2. Only two
-families do not vanish by symmetry, Σ P^-n for n = 4, 8, 12, … and Σ conj(P) P^-n for n = 7, 11, 15,
-…. The conditionally convergent Σ P^-2 and Σ conj(P) P^-3 are left out, as in Weierstrass' ζ and
-Natanzon's Q; what that leaves out is linear in z and lands in the far-field terms.
+The lattice is P = 2 (m + i n) with integers m and n that are not both zero; the cell has side 2. By
+symmetry only two families of sums do not vanish: Σ P^-n for n = 4, 8, 12, … and Σ conj(P) P^-n for
+n = 7, 11, 15, …. The sums Σ P^-2 and Σ conj(P) P^-3 converge conditionally and are left out, as in
+Weierstrass' ζ and Natanzon's Q. What is left out is linear in z and part of the far field.
 """
 
 from __future__ import annotations
@@ -17,22 +17,28 @@ from scipy.special import gammaln, zeta
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
 
-# ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
 ZETA_PERIOD = np.pi / AREA
+"""Factor of conj(P) in ζ(z + P) − ζ(z), by Legendre's relation on the square lattice."""
 
 
 @dataclass(frozen=True)
 class LatticeSums:
-    """Σ p^-n and Σ conj(p) p^-n at index n, over p = P/2 so that they stay of order one."""
+    """Lattice sums over p = P/2, which are of order one.
+
+    Args:
+        plain: Σ p^-n at index n.
+        conjugate: Σ conj(p) p^-n at index n.
+    """
 
     plain: Array
     conjugate: Array
 
     @cached_property
     def natanzon_period(self) -> float:
-        """Constant g in Natanzon's Q(z + P) − Q(z) = conj(P) ℘(z) + g P with Weierstrass' ℘.
+        """Constant g in Q(z + P) − Q(z) = conj(P) ℘(z) + g P, Q Natanzon's function.
 
-        From z = −1 and P = 2, where Q is odd and ℘ even.
+        It follows at z = −1 with P = 2, since Q is odd and Weierstrass' ℘ is even:
+        2 Q(1) = 2 ℘(1) + 2 g.
         """
         n = np.arange(2, len(self.plain))
         half = 0.5**n
@@ -43,30 +49,53 @@ class LatticeSums:
 
 @cache
 def lattice_sums(highest: int) -> LatticeSums:
-    """Sums Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for n ≤ `highest`, from 60 on."""
-    plain, conjugate = np.zeros(highest + 1), np.zeros(highest + 1)
+    """Return Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for all n up to `highest`.
+
+    Sums of n < 40 follow from Riemann's ζ and Lipschitz' formula, in rows of the lattice: with
+    conj(p) = p − 2 i j, the sum Σ p^(1−n) vanishes in the second family. For larger n the points
+    near 0 are enough.
+    """
+    plain = np.zeros(highest + 1)
+    conjugate = np.zeros(highest + 1)
     for n in range(4, highest + 1, 4):
-        # Σ p^-n by Riemann's ζ and Lipschitz' formula
-        plain[n] = 2 * (zeta(n) + _lipschitz(n, 1)) if n < 40 else _near_points(n, conjugate=False)
+        if n < 40:
+            plain[n] = 2 * (zeta(n) + _lipschitz(n, 1))
+        else:
+            plain[n] = _near_points(n, conjugate=False)
     for n in range(7, highest + 1, 4):
-        # Σ conj(p) p^-n with conj(p) = p − 2 i j, where Σ p^(1−n) vanishes
-        conjugate[n] = 4 * _lipschitz(n, 2) if n < 40 else _near_points(n, conjugate=True)
+        if n < 40:
+            conjugate[n] = 4 * _lipschitz(n, 2)
+        else:
+            conjugate[n] = _near_points(n, conjugate=True)
     return LatticeSums(plain, conjugate)
 
 
 def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
-    """Taylor coefficients k of Σ (z − P)^-n over all images P ≠ 0, odd n, (len(k), len(n)).
+    """Return Taylor coefficients at 0 of Σ (z − P)^-n over all images P ≠ 0.
 
-    From `LatticeSums.plain`; from `LatticeSums.conjugate` those of Σ conj(P)/2 (z − P)^-n, even n,
-    with the opposite sign.
+    For odd n the coefficient of z^k is −binomial(n + k − 1, k) Σ P^(−n−k), with P = 2 p.
+
+    Args:
+        sums: `LatticeSums.plain`. With `LatticeSums.conjugate` and even n the result is that of
+            Σ conj(P)/2 (z − P)^-n, with the opposite sign.
+        k: Orders of the coefficients.
+        n: Orders n.
+
+    Returns:
+        Shape (len(k), len(n)).
     """
-    k, n = k[:, None], n[None, :]
+    k = k[:, None]
+    n = n[None, :]
     log_binomial = gammaln(n + k) - gammaln(n) - gammaln(k + 1)
-    return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums[n + k])  # P = 2p
+    return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums[n + k])
 
 
 def _lipschitz(n: int, power: int) -> float:
-    """Σ_q (2π)^n q^(n−1) / (n−1)! · e^(−2πq) / (1 − e^(−2πq))^power, by Lipschitz' formula."""
+    """Return Σ_q (2π)^n q^(n−1) / (n−1)! · e^(−2πq) / (1 − e^(−2πq))^power over q = 1, 2, ….
+
+    Lipschitz' formula turns the sum over all rows of the lattice into this one. Terms beyond q = 39
+    are below rounding for n < 40.
+    """
     q = np.arange(1.0, 40.0)
     logarithm = n * np.log(2 * np.pi) - gammaln(n) + (n - 1) * np.log(q) - 2 * np.pi * q
     return float(np.sum(np.exp(logarithm) / (1 - np.exp(-2 * np.pi * q)) ** power))
@@ -81,5 +110,7 @@ def _near_points(n: int, *, conjugate: bool) -> float:
     m = np.arange(-2.0, 3.0)
     p = (m[:, np.newaxis] + 1j * m).ravel()
     p = p[p != 0]
-    factors = p.conj() if conjugate else 1
-    return float(np.sum(factors * p ** -float(n)).real)
+    terms = p ** -float(n)
+    if conjugate:
+        terms = p.conj() * terms
+    return float(np.sum(terms).real)
