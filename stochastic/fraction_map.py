@@ -19,7 +19,7 @@ class FractionMap:
     Args:
         fraction: Area fraction of discs, or volume fraction of spheres.
         shape: `DISCS` or `SPHERES`.
-        distribution: Law of θ, on which nothing depends.
+        distribution: Distribution of θ, on which nothing depends.
 
     Example:
         >>> FractionMap(0.2)([-3, 0, 3])
@@ -31,6 +31,6 @@ class FractionMap:
     distribution: ThetaDistribution = field(default_factory=TruncatedNormal)
 
     def __call__(self, theta: ArrayLike) -> Array:
-        """Reduced radius at `theta`, any shape."""
+        """Return the reduced radius, in the shape of `theta`."""
         radius = self.shape.reduced_radius(self.fraction)
         return np.full(np.shape(theta), radius)

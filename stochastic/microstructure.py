@@ -3,7 +3,7 @@
 This differs from the paper in: 1. The supports of a2 and a4 are derived: they span the p-box of
 least area that contains the sample's distribution save for its own bootstrap band. 2. The bound of
 r_n for non-overlapping discs is √(4/π) for any cell and 1 for the square one, not √(π/4). 3. a1 and
-a3 are the limits themselves, not the middles of the outer two of 100 bins between them (0.13 +
+a3 are the limits themselves, not the midpoints of the outer two of 100 bins between them (0.13 +
 0.0037 and 0.87 − 0.0037 in the paper). 4. Spheres have power cells, and r_n is weighted by volume.
 Cells tighter than a cubic cell can be are cut off with their spheres; the packing is made denser
 until the map has the volume fraction of the case.
@@ -22,7 +22,14 @@ from alphacut.base.errors import require, require_numbers
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeBand, least_pbox, slope_band
+from alphacut.stochastic.fit.hermite_fit import (
+    HermiteFit,
+    PBox,
+    SlopeBand,
+    SlopeEnds,
+    least_pbox,
+    slope_band,
+)
 from alphacut.stochastic.particles.packings import Packings
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
@@ -34,26 +41,20 @@ from alphacut.stochastic.theta.quadrature import gauss_rule
 if TYPE_CHECKING:
     import xarray
 
-SHARE_WITHIN = 0.9927  # share of the area between the limits where none are set (Fig. 12)
-CONFIDENCE = 0.99  # of both bootstrap bands
 RESAMPLES = 500
-MAX_CAPPED = 0.15  # share of the area that may lie in cells tighter than `Shape.reach`
-MIN_RANGE = 1e-6  # of r_n: a smaller one is round-off
-MAX_PACKINGS = 6  # of spheres, to find the fraction at which the map has that of the case
-FRACTION_TOLERANCE = 5e-3  # relative difference of the fractions that ends the search
-FRACTION_EXPONENT = 1.5  # above 1, since the limit cuts off more than in proportion
-CRISP_TOLERANCE = 1e-6  # of a3 − a1: an end nearer to the fitted slope differs by round-off
+"""Bootstrap samples. The 99 % quantile of a band then rests on the largest five; more samples
+steady it and take as much more time."""
 
 
 @dataclass(frozen=True)
 class RadiusLimits:
-    """Between which reduced radii r_n a map is fitted.
+    """Limits of the reduced radii r_n between which a map is fitted.
 
     Args:
         shape: Kind of the particles.
-        stated: Lower and upper limit; None for those that cut off equal fractions of area or volume
-            at both ends and keep `SHARE_WITHIN` of it, up to `Shape.reach`.
-        packed_fraction: Fraction of packed particles, for a message; None of measured ones.
+        stated: Lower and upper limit; None for limits that cut off equal fractions of area or
+            volume at both ends and keep 99.27 % of it (Fig. 12), up to `Shape.reach`.
+        packed_fraction: Fraction of packed particles, for a message; None for measured ones.
     """
 
     shape: Shape
@@ -61,28 +62,37 @@ class RadiusLimits:
     packed_fraction: float | None = None
 
     def of(self, sample: AreaWeighted) -> tuple[float, float]:
-        """Return lower and upper limit of r_n for a sample."""
+        """Return the lower and the upper limit of r_n for a sample."""
         if self.stated is not None:
             return self.stated
-        lower, upper = sample.limits(SHARE_WITHIN)
+        lower, upper = sample.limits(0.9927)
         return lower, min(upper, self.shape.reach)
 
     def capped(self, sample: AreaWeighted) -> AreaWeighted:
-        """Copy of a sample with r_n of discs capped at `Shape.reach`, unless limits are stated.
+        """Return a copy of a sample with r_n of discs capped at `Shape.reach`.
 
-        Cells of spheres that are tighter are cut off by the limits instead. More than `MAX_CAPPED`
-        of the area or volume in such cells is refused.
+        With stated limits the sample is returned as it is. Cells of spheres that are tighter than
+        `Shape.reach` are cut off by the limits instead.
+
+        Raises:
+            RefusedError: More than 15 % of the area or volume is in such cells.
         """
         if self.stated is not None:
             return sample
-        shape, fraction = self.shape, self.capped_fraction(sample)
+        shape = self.shape
+        fraction = self.capped_fraction(sample)
+        max_fraction = 0.15
         value = f"{fraction:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
-        allowed = f"shares up to {MAX_CAPPED:.0%}, since particles touch at r_n = 1"
-        require(fraction <= MAX_CAPPED, "particles", value=value, allowed=allowed, cure=self._cure)
+        allowed = f"shares up to {max_fraction:.0%}, since particles touch at r_n = 1"
+        is_loose = fraction <= max_fraction
+        require(is_loose, "particles", value=value, allowed=allowed, cure=self._cure)
         return sample if shape == SPHERES else sample.capped(shape.reach)
 
     def capped_fraction(self, sample: AreaWeighted) -> float:
-        """Fraction of area or volume in cells tighter than `Shape.reach`; 0 of stated limits."""
+        """Return the fraction of area or volume in cells tighter than `Shape.reach`.
+
+        It is 0 with stated limits.
+        """
         return 0.0 if self.stated is not None else 1 - float(sample.cdf(self.shape.reach))
 
     @property
@@ -104,10 +114,10 @@ class FittedRadiusMap:
         seed: Seed of the bootstrap.
         sections: Particles and cells.
         sample: r_n of all whole cells, weighted by area or volume.
-        truncated: The part of it within the limits.
+        truncated: The values of the sample within the limits.
         pbox: Fuzzy radius map.
         slopes: Bootstrap band of the fitted slopes.
-        band: Half width of that of the distribution function, in probability.
+        band: Half-width of the bootstrap band of the distribution function, in probability.
     """
 
     rule: RadiusLimits
@@ -128,37 +138,42 @@ class FittedRadiusMap:
     def map(self) -> HermiteMap:
         """The radius map at the nominal slopes."""
         fit = self.pbox.fit
-        ends = [float(f"{end:.10g}") for end in (fit.a1, fit.a3)]
-        a2, a4 = self.triangles.values()
-        return HermiteMap(ends[0], a2[1], ends[1], a4[1], fit.distribution)
+        return HermiteMap(
+            a1=float(f"{fit.a1:.10g}"),
+            a2=self.triangles["a2"].nominal,
+            a3=float(f"{fit.a3:.10g}"),
+            a4=self.triangles["a4"].nominal,
+            distribution=fit.distribution,
+        )
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
         """The slopes "a2" and "a4" of the map as fuzzy numbers."""
-        return {
-            name: Triangular(*ends) if ends[0] < ends[2] else Crisp(ends[1])
-            for name, ends in self.triangles.items()
-        }
+        inputs: dict[str, FuzzyNumber] = {}
+        for name, ends in self.triangles.items():
+            is_fuzzy = ends.lower < ends.upper
+            inputs[name] = Triangular(*ends) if is_fuzzy else Crisp(ends.nominal)
+        return inputs
 
     @property
-    def triangles(self) -> dict[str, tuple[float, float, float]]:
-        """Lower end, nominal value and upper end of each slope, in eight digits.
+    def triangles(self) -> dict[str, SlopeEnds]:
+        """Ends and nominal values of the slopes "a2" and "a4", in eight digits.
 
-        Ends that differ from the nominal value by round-off are that value.
+        Ends that differ from the nominal value by 1e-6 of a3 − a1, which is rounding of the linear
+        program, are that value.
         """
-        fit = self.pbox.fit
-        tolerance = CRISP_TOLERANCE * (fit.a3 - fit.a1)
+        tolerance = 1e-6 * (self.pbox.fit.a3 - self.pbox.fit.a1)
         triangles = {}
-        for name, (lower, nominal, upper) in {"a2": self.pbox.a2, "a4": self.pbox.a4}.items():
-            low = nominal if abs(lower - nominal) <= tolerance else lower
-            high = nominal if abs(upper - nominal) <= tolerance else upper
-            triangles[name] = float(f"{low:.8g}"), float(f"{nominal:.8g}"), float(f"{high:.8g}")
+        for name, ends in {"a2": self.pbox.a2, "a4": self.pbox.a4}.items():
+            values = np.array(ends)
+            values[abs(values - ends.nominal) <= tolerance] = ends.nominal
+            triangles[name] = SlopeEnds(*(float(f"{value:.8g}") for value in values))
         return triangles
 
     @property
     def fraction(self) -> float:
         """Mean fraction of the cell that the particle fills, at the nominal slopes."""
-        return _fraction(self.shape, self.pbox.fit, (self.pbox.a2[1], self.pbox.a4[1]))
+        return _mean_fraction(self.shape, self.pbox.fit, self.pbox.nominal_slopes)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -166,17 +181,18 @@ class FittedRadiusMap:
         return self.pbox.fit.a1, self.pbox.fit.a3
 
     @property
-    def share_within(self) -> float:
-        """Fraction of area or volume within the limits, capped cells among it."""
-        return self.rule.capped(self.sample).share_within(*self.limits)
+    def fraction_within(self) -> float:
+        """Fraction of area or volume within the limits, in capped cells as well."""
+        return self.rule.capped(self.sample).fraction_within(*self.limits)
 
     def __str__(self) -> str:
         """Return the map and its fuzzy slopes, and how many cells they rest on."""
         cells = f"{len(self.sample.values)} cells of {self.shape.particles}"
-        words = f"{self.share_within:.2%} of their {self.shape.cells} within the limits"
-        a2, a4 = self.triangles.values()
-        slopes = f"a2 = {a2[0]:.4g} … {a2[1]:.4g} … {a2[2]:.4g}"
-        slopes += f", a4 = {a4[0]:.4g} … {a4[1]:.4g} … {a4[2]:.4g}"
+        words = f"{self.fraction_within:.2%} of their {self.shape.cells} within the limits"
+        triangles = self.triangles.items()
+        slopes = ", ".join(
+            f"{name} = {x.lower:.4g} … {x.nominal:.4g} … {x.upper:.4g}" for name, x in triangles
+        )
         ends = f"a1 = {self.limits[0]:.4g}, a3 = {self.limits[1]:.4g}"
         fraction = f"{self.shape.cells} fraction {self.fraction:.4f}"
         return f"radius map of {cells}, {words}: {ends}, {slopes}; {fraction}"
@@ -184,20 +200,25 @@ class FittedRadiusMap:
     __repr__ = __str__
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return cdf of the sample, pbox_lower, pbox_upper and fitted over 501 r_n as a dataset."""
+        """Return the distribution functions of r_n at 501 points between the limits as a dataset.
+
+        "cdf" belongs to the sample, "pbox_lower" and "pbox_upper" to the p-box, and "fitted" to the
+        map at the nominal slopes.
+        """
         import xarray
 
-        box, fit = self.pbox, self.pbox.fit
+        fit = self.pbox.fit
         radius = np.linspace(fit.a1, fit.a3, 501)
-        law = fit.distribution
-        theta = np.asarray(np.linspace(law.lower, law.upper, 5001), float)
-        low, high = box.bounds(theta)
-        probability = fit.distribution.cdf(theta)
+        distribution = fit.distribution
+        theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 5001), float)
+        smallest_radius, largest_radius = self.pbox.bounds(theta)
+        fitted_radius = fit.map(self.pbox.nominal_slopes)(theta)
+        probability = distribution.cdf(theta)
         columns = {
             "cdf": self.truncated.cdf(radius),
-            "pbox_lower": np.interp(radius, high, probability),
-            "pbox_upper": np.interp(radius, low, probability),
-            "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), probability),
+            "pbox_lower": np.interp(radius, largest_radius, probability),
+            "pbox_upper": np.interp(radius, smallest_radius, probability),
+            "fitted": np.interp(radius, fitted_radius, probability),
         }
         variables = {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()}
         dataset = xarray.Dataset(variables, {"r_n": radius})
@@ -206,14 +227,14 @@ class FittedRadiusMap:
         return dataset
 
     def numbers(self) -> dict[str, object]:
-        """All numbers by the keys of the JSON file, lengths in m."""
+        """Return all numbers by the keys of the JSON file, lengths in m."""
         packings = [section.particles for section in self.sections]
         radii = np.concatenate([packing.radii for packing in packings])
-        shape, pbox, triangles = self.shape, self.pbox, self.triangles
+        shape = self.shape
+        pbox = self.pbox
         nominal = self.map
-        law = nominal.distribution
         cell_fraction = float(self.sample.weights @ shape.fractions(self.sample.values))  # eq. 10
-        numbers: dict[str, object] = {
+        return {
             "particles": shape.particles,
             "packings": len(packings),
             shape.particles: len(radii),
@@ -224,15 +245,12 @@ class FittedRadiusMap:
             "smallest_radius": float(radii.min()),
             "largest_radius": float(radii.max()),
             "share_capped": self.rule.capped_fraction(self.sample),
-        }
-        return {
-            **numbers,
             **_neighbour_numbers(self.sections),
             "cells": len(self.sample.values),
             "mean_r_n": self.sample.mean,
             "largest_r_n": float(self.sample.values[-1]),
             "limits": list(self.limits),
-            "share_kept": self.share_within,
+            "share_kept": self.fraction_within,
             "a1": pbox.fit.a1,
             "a2": list(pbox.a2),
             "a3": pbox.fit.a3,
@@ -242,14 +260,17 @@ class FittedRadiusMap:
             "band": self.band,
             "pbox_area": pbox.area,
             "pbox_breach": pbox.excess(self.truncated),
-            "misfit": pbox.fit.misfit(self.truncated, (pbox.a2[1], pbox.a4[1])),
+            "misfit": pbox.fit.misfit(self.truncated, pbox.nominal_slopes),
             "seed": self.seed,
             "radius": {
-                "theta": [float(f"{end:g}") for end in (law.lower, law.upper)],
+                "theta": [
+                    float(f"{nominal.distribution.lower:g}"),
+                    float(f"{nominal.distribution.upper:g}"),
+                ],
                 "a1": nominal.a1,
-                "a2": list(triangles["a2"]),
+                "a2": list(self.triangles["a2"]),
                 "a3": nominal.a3,
-                "a4": list(triangles["a4"]),
+                "a4": list(self.triangles["a4"]),
             },
         }
 
@@ -270,7 +291,7 @@ def fit_radius_map(
 
     Args:
         sections: Packings as `pack` makes them, or measured sections as of `read_particles`.
-        limits: Lower and upper limit of r_n, which are a1 and a3 of the map; None for those that
+        limits: Lower and upper limit of r_n, which are a1 and a3 of the map; None for limits that
             keep 99.27 % of the area.
         seed: Seed of the bootstrap.
         workers: Processes that tessellate; the result does not depend on their number.
@@ -300,16 +321,29 @@ def fit_radius_map(
     report = progress or (lambda fraction: None)
     packed_fraction = sections.packing.fraction if isinstance(sections, Packings) else None
     rule = RadiusLimits(sections[0].shape, limits, packed_fraction)
+
+    # Particles → tessellation
     with pool(workers) as executor:
         map_function = executor.map if executor else map
         cells = list(map_function(with_cells, sections))
         report(0.5)
         if isinstance(sections, Packings) and rule.shape == SPHERES:
             cells = _repacked(rule, sections, cells, executor=executor, progress=report)
+
+    # → reduced radii → radius map
     sample = reduced_radii(cells)
-    truncated, pbox, slopes, band = fit_map(rule, sample, seed=seed)
+    fit = fit_map(rule, sample, seed=seed)
     report(1.0)
-    return FittedRadiusMap(rule, seed, cells, sample, truncated, pbox, slopes, band)
+    return FittedRadiusMap(
+        rule=rule,
+        seed=seed,
+        sections=cells,
+        sample=sample,
+        truncated=fit.truncated,
+        pbox=fit.pbox,
+        slopes=fit.slopes,
+        band=fit.band,
+    )
 
 
 def _repacked(
@@ -320,26 +354,43 @@ def _repacked(
     executor: Executor | None,
     progress: Callable[[float], None],
 ) -> list[ParticleCells]:
-    """Cells of spheres packed to the fraction at which the fitted map has that of the packings.
+    """Return cells of spheres, packed so that the fitted map has the fraction of the packings.
 
-    `cells` are those of the packings themselves. The fraction is corrected until the error is below
-    `FRACTION_TOLERANCE`, at most `MAX_PACKINGS` times; the cells of the least error are returned.
+    The limits of the map cut off the largest reduced radii, so that the map has a lower fraction
+    than the spheres. Spheres are packed anew, denser, until the relative error of the fraction is
+    below 5e-3, at most five times.
+
+    Args:
+        rule: Limits of the map.
+        packings: The packings whose fraction the map shall have.
+        cells: Their cells.
+        executor: Runs the packings and the tessellations; None for this process.
+        progress: Function that takes the completed fraction.
+
+    Returns:
+        The cells with the smallest error.
     """
+    max_packings = 6
     map_function = executor.map if executor else map
     packing = packings.packing
-    target, best, least_error = packing.fraction, cells, np.inf
-    for number in range(MAX_PACKINGS):
+    target = packing.fraction
+    best = cells
+    best_error = np.inf
+    for number in range(max_packings):
         sample = reduced_radii(cells)
         fit = HermiteFit(*rule.of(sample))
-        map_fraction = _fraction(rule.shape, fit, fit.slopes(sample.truncated(fit.a1, fit.a3)))
+        slopes = fit.slopes(sample.truncated(fit.a1, fit.a3))
+        map_fraction = _mean_fraction(rule.shape, fit, slopes)
         error = abs(map_fraction / target - 1)
-        if error < least_error:
-            best, least_error = cells, error
-        progress(0.5 + 0.2 * (number + 1) / MAX_PACKINGS)
-        correction = (target / map_fraction) ** FRACTION_EXPONENT
+        if error < best_error:
+            best = cells
+            best_error = error
+        progress(0.5 + 0.2 * (number + 1) / max_packings)
+        # The exponent is above 1, since the limit cuts off more than in proportion.
+        correction = (target / map_fraction) ** 1.5
         fraction = min(packing.fraction * correction, rule.shape.densest)
-        is_last = number == MAX_PACKINGS - 1 or fraction == packing.fraction
-        if least_error < FRACTION_TOLERANCE or is_last:
+        is_last = number == max_packings - 1 or fraction == packing.fraction
+        if best_error < 5e-3 or is_last:
             break
         packing = replace(packing, fraction=fraction)
         denser = Packings.make(packing, len(packings), seed=packings.seed, executor=executor)
@@ -347,53 +398,84 @@ def _repacked(
     return best
 
 
-def fit_map(
-    rule: RadiusLimits, sample: AreaWeighted, *, seed: int
-) -> tuple[AreaWeighted, PBox, SlopeBand, float]:
+@dataclass(frozen=True, eq=False)
+class FuzzyFit:
+    """Radius map fitted to a sample of r_n, with fuzzy slopes.
+
+    Args:
+        truncated: The values of the sample within the limits.
+        pbox: Fuzzy radius map.
+        slopes: Bootstrap band of the fitted slopes.
+        band: Half-width of the bootstrap band of the distribution function, in probability.
+    """
+
+    truncated: AreaWeighted
+    pbox: PBox
+    slopes: SlopeBand
+    band: float
+
+
+def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
     """Fit the radius map to a sample of r_n and make its slopes fuzzy.
 
-    Returns:
-        Sample within the limits, p-box, bootstrap band of the slopes, and half width of that of the
-        distribution function, in probability.
+    Args:
+        rule: Limits between which it is fitted.
+        sample: Reduced radii of all cells.
+        seed: Seed of the bootstrap.
 
     Raises:
         RefusedError: All cells have one r_n.
         FailedError: No p-box contains the sample.
     """
-    seeds = np.random.SeedSequence(seed, spawn_key=(1,)).spawn(2)
     capped = rule.capped(sample)
     lower, upper = rule.of(capped)
-    value, allowed = f"{upper:.10g} in all cells", "cells of unequal r_n"
-    cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
-    require(upper - lower >= MIN_RANGE, "r_n", value=value, allowed=allowed, cure=cure)
-    truncated, fit = capped.truncated(lower, upper), HermiteFit(lower, upper)
-    band_rng, slope_rng = map(np.random.default_rng, seeds)
-    band = truncated.band_half_width(CONFIDENCE, RESAMPLES, band_rng)
-    slopes = slope_band(fit, truncated, level=CONFIDENCE, resamples=RESAMPLES, generator=slope_rng)
+    require(
+        upper - lower >= 1e-6,  # a smaller range is rounding
+        "r_n",
+        value=f"{upper:.10g} in all cells",
+        allowed="cells of unequal r_n",
+        cure=f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0",
+    )
+    truncated = capped.truncated(lower, upper)
+    fit = HermiteFit(lower, upper)
+    band_seed, slope_seed = np.random.SeedSequence(seed, spawn_key=(1,)).spawn(2)
+    confidence = 0.99  # of both bands
+    band_generator = np.random.default_rng(band_seed)
+    band = truncated.band_half_width(confidence, RESAMPLES, band_generator)
+    slope_generator = np.random.default_rng(slope_seed)
+    slopes = slope_band(
+        fit, truncated, level=confidence, resamples=RESAMPLES, generator=slope_generator
+    )
     pbox = least_pbox(fit, truncated, band, required=slopes if rule.shape == DISCS else None)
-    return truncated, pbox, slopes, band
+    return FuzzyFit(truncated, pbox, slopes, band)
 
 
 def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
-    """Number and distances of direct neighbours, and correlation of r_n; empty for spheres."""
+    """Return number and distances of direct neighbours, and the correlation of their r_n.
+
+    The result is empty for spheres, whose cells have no diagram.
+    """
     diagrams = [section.diagram for section in sections if section.diagram]
     if not diagrams:
         return {}
     direct = [neighbours(diagram.discs) for diagram in diagrams]
-    number = np.concatenate([found.number for found in direct])
-    distance = np.concatenate([found.distances for found in direct])
-    sharing = [neighbouring_values(diagram, diagram.reduced_radii) for diagram in diagrams]
+    numbers = np.concatenate([found.number for found in direct])
+    distances = np.concatenate([found.distances for found in direct])
+    correlations = []
+    for diagram in diagrams:
+        pairs = neighbouring_values(diagram, diagram.reduced_radii)
+        correlations.append(np.corrcoef(pairs)[0, 1])
     return {
         "neighbours": {
-            "counted": len(number),
-            "mean": float(number.mean()) if len(number) else None,
-            "mean_distance": float(distance.mean()) if len(distance) else None,
+            "counted": len(numbers),
+            "mean": float(numbers.mean()) if len(numbers) else None,
+            "mean_distance": float(distances.mean()) if len(distances) else None,
         },
-        "correlation": float(np.mean([np.corrcoef(pairs)[0, 1] for pairs in sharing])),
+        "correlation": float(np.mean(correlations)),
     }
 
 
-def _fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
+def _mean_fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
     """Return the mean fraction of the cell that the particle fills, for slopes (a2, a4)."""
     rule = gauss_rule(fit.distribution, points=8)
     return float(rule.mean(shape.fractions(fit.map(slopes)(rule.nodes))))

@@ -24,12 +24,13 @@ from alphacut.stochastic.theta.distribution import (
 )
 
 RADII = "radii inside (0, 1), in halves of the cell's side"
+"""What is allowed, for messages."""
 
 
 class RadiusMap(Protocol):
-    """Random radius of the cell problem: the law of θ and the map from θ.
+    """Random radius of the cell problem: the distribution of θ, and the map from θ to the radius.
 
-    Any object with these two will do; every model of the cell calls `require_map`.
+    Any object with these two members will do; every model of the cell calls `require_map`.
 
     Example:
         >>> radius_map: RadiusMap = HermiteMap(0.2, 0.1, 0.8, 0.2)
@@ -39,18 +40,24 @@ class RadiusMap(Protocol):
 
     @property
     def distribution(self) -> ThetaDistribution:
-        """Law of θ."""
+        """Distribution of θ."""
 
     def __call__(self, theta: ArrayLike) -> Array:
-        """Radius over half the cell's side, in (0, 1), at `theta` (any shape)."""
+        """Return the radius over half the cell's side, in (0, 1), at `theta` (any shape)."""
 
 
 def require_map(radius_map: RadiusMap) -> None:
-    """Refuse a radius map whose law of θ has no support or whose radii, at 65 θ, leave (0, 1)."""
-    law = radius_map.distribution
-    require_distribution(law)
-    require_support(law.lower, law.upper)
-    theta = np.linspace(law.lower, law.upper, 65)
+    """Refuse a radius map whose θ has no bounded support, or whose radii leave (0, 1).
+
+    The radii are tested at 65 equally spaced θ.
+
+    Raises:
+        RefusedError: The map is not allowed.
+    """
+    distribution = radius_map.distribution
+    require_distribution(distribution)
+    require_support(distribution.lower, distribution.upper)
+    theta = np.linspace(distribution.lower, distribution.upper, 65)
     radii = np.asarray(radius_map(theta), float)
     allowed = f"the shape of θ, {theta.shape}"
     has_shape = radii.shape == theta.shape
@@ -69,7 +76,7 @@ class HermiteMap:
         a2: Slope dr/dξ there.
         a3: Radius at the upper end.
         a4: Slope dr/dξ there.
-        distribution: Law of θ.
+        distribution: Distribution of θ.
 
     Raises:
         RefusedError: r(θ) leaves (0, 1) somewhere on the support.
@@ -88,32 +95,39 @@ class HermiteMap:
     def __post_init__(self) -> None:
         require_distribution(self.distribution)
         values = (self.a1, self.a2, self.a3, self.a4)
-        plain = all(isinstance(value, Real) and np.isfinite(value) for value in values)
-        low, high = self.extremes() if plain else (np.nan, np.nan)
-        inside, shown = low > 0 and high < 1, f"{low:.4g} … {high:.4g}"
+        low = high = np.nan
+        if all(isinstance(value, Real) and np.isfinite(value) for value in values):
+            low, high = self.extremes()
+        shown = f"{low:.4g} … {high:.4g}"
         cure = "lower a1 or a3, or the slopes a2, a4"
-        require(inside, f"r of the map {values}", value=shown, allowed=RADII, cure=cure)
+        is_inside = low > 0 and high < 1
+        require(is_inside, f"r of the map {values}", value=shown, allowed=RADII, cure=cure)
 
     @property
     def monomials(self) -> Array:
-        """Coefficients of 1, ξ, ξ², ξ³, shape (4,)."""
-        a1, a2, a3, a4 = self.a1, self.a2, self.a3, self.a4
-        return np.array([a1, a2, 3 * (a3 - a1) - 2 * a2 - a4, 2 * (a1 - a3) + a2 + a4])
+        """Coefficients of 1, ξ, ξ², ξ³, shape (4,), from which eq. 12 is evaluated."""
+        quadratic = 3 * (self.a3 - self.a1) - 2 * self.a2 - self.a4
+        cubic = 2 * (self.a1 - self.a3) + self.a2 + self.a4
+        return np.array([self.a1, self.a2, quadratic, cubic])
 
     def xi(self, theta: ArrayLike) -> Array:
         """Return ξ = (θ − lower)/(upper − lower) in [0, 1], any shape."""
-        law = self.distribution
-        return np.asarray((np.asarray(theta, float) - law.lower) / (law.upper - law.lower))
+        width = self.distribution.upper - self.distribution.lower
+        return np.asarray((np.asarray(theta, float) - self.distribution.lower) / width)
 
     def __call__(self, theta: ArrayLike) -> Array:
-        """Reduced radius at `theta`, any shape."""
+        """Return the reduced radius at `theta`, any shape."""
         radius = np.polynomial.polynomial.polyval(self.xi(theta), self.monomials)  # eq. 12
         return np.asarray(radius, float)
 
     def extremes(self) -> tuple[float, float]:
-        """Least and greatest radius on the support of θ, at its ends or where dr/dξ = 0."""
+        """Return the smallest and the largest radius on the support of θ.
+
+        They are at its ends or where dr/dξ = 0.
+        """
         roots = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
-        inner = roots.real[(abs(roots.imag) < 1e-12) & (roots.real > 0) & (roots.real < 1)]
+        is_real = abs(roots.imag) < 1e-12  # the rounding of a double root
+        inner = roots.real[is_real & (roots.real > 0) & (roots.real < 1)]
         xi = np.concatenate([[0.0, 1.0], inner])
         radii = np.polynomial.polynomial.polyval(xi, self.monomials)
         return float(radii.min()), float(radii.max())

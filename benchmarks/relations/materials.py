@@ -119,8 +119,9 @@ def stated_of_packings(packings: Problem) -> xr.Dataset:
     particles, packing = packings["particles"], packings["packing"]
     sample = reduced_radii([with_cells(x) for x in particles])
     rule = RadiusLimits(packing.shape, packed_fraction=packing.fraction)
-    _, pbox, _, band = fit_map(rule, sample, seed=0)
-    numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
+    fit = fit_map(rule, sample, seed=0)
+    pbox = fit.pbox
+    numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": fit.band}
     numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}
     numbers |= {f"a4[{i}]": x for i, x in enumerate(pbox.a4)}
     numbers |= {"mean r_n": float(sample.values @ sample.weights / sample.weights.sum())}

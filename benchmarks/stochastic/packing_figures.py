@@ -135,7 +135,7 @@ def draw_areas(fitted: FittedRadiusMap) -> Figure:
     text, top = f"{shape.particles[:-1]} larger\nthan its cell ", axes.get_ylim()[1]
     axes.text(bound, top, text, ha="right", va="top", color=GREY)
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
-    share = f"{100 * fitted.share_within:.2f} % of the {shape.cells}"
+    share = f"{100 * fitted.fraction_within:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} contain {share}")
     return figure
 

@@ -51,7 +51,7 @@ def sample_of(sections: Sequence[Particles]) -> AreaWeighted:
 
 def row(name: str, sample: AreaWeighted) -> str:
     """Shares and slopes of a sample in one line."""
-    below, within = float(sample.cdf(LIMITS[0])), sample.share_within(*LIMITS)
+    below, within = float(sample.cdf(LIMITS[0])), sample.fraction_within(*LIMITS)
     a2, a4 = HermiteFit(*ENDS).slopes(sample.truncated(*ENDS))
     above = 1 - below - within
     return f"{name:40} {within:9.2%} {below:9.3%} {above:9.3%} {a2:7.3f} {a4:7.3f}"

@@ -1,9 +1,9 @@
 """Fit of the radius map to a sample by f_r dr = f_θ dθ and least squares (section 4.2).
 
-The map that carries the law of θ to the sample is r(θ) = Q(F_Θ(θ)), Q the sample's quantile
-function: a staircase. Its distance to the Hermite cubic, ∫ (r − H)² f_Θ dθ, is a quadratic in (a2,
-a4) whose integrals over the steps are known in closed form. Where the minimiser is not monotone,
-the nearest monotone one in the same norm is taken.
+The map that carries the distribution of θ to the sample is r(θ) = Q(F_Θ(θ)), Q the sample's
+quantile function: a staircase. Its distance to the Hermite cubic H, ∫ (r − H)² f_Θ dθ, is a
+quadratic function of (a2, a4) whose integrals over the steps are known in closed form. Where the
+minimiser is not monotone, the nearest monotone cubic in the same norm is taken.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial, polynomial
@@ -24,14 +24,24 @@ from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.theta.distribution import TruncatedNormal
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
-# h1 … h4 of eq. 12 in powers of ξ
-SHAPES = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
-XI = np.linspace(0, 1, 401)
-# least slope at the points XI, in units of a3 − a1: keeps it positive between them
-MARGIN = 2e-5
-STEEPEST = 3.0  # times the chord's slope, up to which both slopes make a monotone cubic
-# their slopes, shape (4, 401)
-SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES])
+HERMITE = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
+"""Coefficients of h1 … h4 of eq. 12 by powers of ξ."""
+MIN_SLOPE = 2e-5
+"""Smallest slope of a map at 401 equally spaced ξ, in units of a3 − a1. Between the points the
+slope of a cubic is smaller by (1/400)²/8 times its curvature at most, so that it stays positive."""
+
+
+def _hermite_at(xi: ArrayLike) -> Array:
+    """Return h1 … h4 at ξ of shape (n,), shape (4, n)."""
+    return np.array([polynomial.polyval(np.asarray(xi, float), h) for h in HERMITE])
+
+
+class SlopeEnds(NamedTuple):
+    """Range of a slope with its nominal or fitted value inside."""
+
+    lower: float
+    nominal: float
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -44,19 +54,24 @@ class HermiteFit:
     distribution: ClassVar[TruncatedNormal] = TruncatedNormal()
 
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
-        """Slopes a2, a4 of the monotone cubic H nearest to the sample between the limits.
+        """Return the slopes a2, a4 of the monotone cubic H nearest to a sample.
 
-        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample; the
-        bootstrap gives its values other weights.
+        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample.
+
+        Args:
+            sample: Reduced radii between the limits.
+            weights: Other weights of the values, by the bootstrap, shape (n,), sum 1.
         """
         cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
-        probability = np.concatenate([[0.0], cumulated])
+        probability = np.append(0.0, cumulated)
         probability[-1] = 1.0
-        # normal equations: ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ, Q constant between probabilities
-        weights_at_nodes, shape = self._shapes_at_nodes
-        ends = shape[[1, 3]] * weights_at_nodes @ (self.a1 * shape[0] + self.a3 * shape[2])
-        right_side = np.diff(self._integrals(probability), axis=1) @ sample.values - ends
-        best = np.asarray(np.linalg.solve(self._gram, right_side), float)
+
+        # The normal equations have the right-hand sides ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ for h2 and
+        # h4. Q is constant between two probabilities, so the integrals of h_i f_Θ there suffice.
+        rule_weights, h = self._hermite_at_nodes
+        of_ends = h[[1, 3]] * rule_weights @ (self.a1 * h[0] + self.a3 * h[2])
+        of_sample = np.diff(self._integrals(probability), axis=1) @ sample.values
+        best = np.asarray(np.linalg.solve(self._gram, of_sample - of_ends), float)
         a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
 
@@ -65,99 +80,134 @@ class HermiteFit:
         return HermiteMap(self.a1, slopes[0], self.a3, slopes[1], self.distribution)
 
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
-        """Root mean square over θ of the sample's quantiles less the map with slopes (a2, a4)."""
+        """Return the root mean square over θ of the sample's quantiles less the map.
+
+        Args:
+            sample: Reduced radii between the limits.
+            slopes: Slopes (a2, a4) of the map.
+        """
         probability = (np.arange(20_000) + 0.5) / 20_000
         fitted = self.map(slopes)(self.distribution.quantile(probability))
         return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
 
-    @cached_property
-    def _powers(self) -> Array:
-        """Functions h2 and h4 in powers of θ, shape (2, 4)."""
-        law = self.distribution
-        xi = Polynomial([-law.lower, 1.0]) / (law.upper - law.lower)
-        return np.array([Polynomial(h)(xi).coef for h in SHAPES[[1, 3]]])
-
     def _integrals(self, probability: Array) -> Array:
-        """Integrals ∫ h_i f_Θ dθ of h2, h4 up to quantiles of probabilities (n,), (2, n)."""
-        # the moments ∫ θ^k f_Θ dθ follow from each other by partial integration, as f' = −θ f
-        law = self.distribution
-        theta = law.quantile(probability)
-        density, first = law.pdf(theta), law.pdf(law.lower)
-        moments = [probability, first - density]
+        """Return ∫ h_i f_Θ dθ of h2 and h4 from the lower end of θ to some quantiles.
+
+        The moments m_k = ∫ θ^k f_Θ dθ follow from each other by partial integration. With f' = −θ f
+        of a normal density, m_k = (k − 1) m_{k−2} − [θ^{k−1} f].
+
+        Args:
+            probability: Probabilities of the quantiles, shape (n,).
+
+        Returns:
+            Integrals of shape (2, n).
+        """
+        lower = self.distribution.lower
+        theta = self.distribution.quantile(probability)
+        density = self.distribution.pdf(theta)
+        density_at_lower = self.distribution.pdf(lower)
+        moments = [probability, density_at_lower - density]
         for k in (2, 3):
-            ends = law.lower ** (k - 1) * first - theta ** (k - 1) * density
-            moments.append((k - 1) * moments[k - 2] + ends)
-        return np.asarray(self._powers @ np.array(moments))
+            boundary = lower ** (k - 1) * density_at_lower - theta ** (k - 1) * density
+            moments.append((k - 1) * moments[k - 2] + boundary)
+        # h2 and h4 by powers of θ
+        xi = Polynomial([-lower, 1.0]) / (self.distribution.upper - lower)
+        coefficients = np.array([Polynomial(h)(xi).coef for h in HERMITE[[1, 3]]])
+        return np.asarray(coefficients @ np.array(moments))
 
     @cached_property
-    def _shapes_at_nodes(self) -> tuple[Array, Array]:
-        """Weights (8,) of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8)."""
+    def _hermite_at_nodes(self) -> tuple[Array, Array]:
+        """Weights (8,) of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8).
+
+        The rule is exact for polynomials of degree 15, and products of two cubics have degree 6.
+        """
         rule = gauss_rule(self.distribution, points=8)
-        law = self.distribution
-        xi = (rule.nodes - law.lower) / (law.upper - law.lower)
-        return rule.weights, np.array([polynomial.polyval(xi, h) for h in SHAPES])
+        width = self.distribution.upper - self.distribution.lower
+        xi = (rule.nodes - self.distribution.lower) / width
+        return rule.weights, _hermite_at(xi)
 
     @cached_property
     def _gram(self) -> Array:
         """Gram matrix ∫ h_i h_j f_Θ dθ of h2 and h4, shape (2, 2)."""
-        weights, shape = self._shapes_at_nodes
-        return np.asarray(shape[[1, 3]] * weights @ shape[[1, 3]].T)
+        weights, h = self._hermite_at_nodes
+        return np.asarray(h[[1, 3]] * weights @ h[[1, 3]].T)
+
+    @cached_property
+    def _derivatives(self) -> Array:
+        """Derivatives of h1 … h4 by ξ at 401 equally spaced ξ, shape (4, 401)."""
+        xi = np.linspace(0, 1, 401)
+        return np.array([polynomial.polyval(xi, polynomial.polyder(h)) for h in HERMITE])
+
+    @property
+    def slope_derivatives(self) -> Array:
+        """Derivatives of h2 and h4 by ξ at 401 equally spaced ξ, shape (2, 401)."""
+        return self._derivatives[[1, 3]]
 
     @property
     def base_slopes(self) -> Array:
-        """Slopes of the map at the points XI with a2 = a4 = 0, less a margin, shape (401,)."""
-        return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
+        """Slopes of the map at 401 ξ with a2 = a4 = 0, less the smallest allowed, shape (401,)."""
+        slopes = self.a1 * self._derivatives[0] + self.a3 * self._derivatives[2]
+        return np.asarray(slopes - MIN_SLOPE * (self.a3 - self.a1))
 
     def is_monotone(self, slopes: ArrayLike) -> bool:
-        """Return whether the map with slopes (a2, a4) rises at all points XI."""
-        return bool((self.base_slopes + np.asarray(slopes) @ SLOPES[[1, 3]] >= -1e-12).all())
+        """Return whether the map with slopes (a2, a4) rises at 401 equally spaced ξ."""
+        excess = self.base_slopes + np.asarray(slopes) @ self.slope_derivatives
+        return bool((excess >= -1e-12).all())
 
     @property
     def mean_shapes(self) -> tuple[float, float]:
-        """Means ∫ h2 f_Θ dθ and ∫ |h4| f_Θ dθ."""
-        weights, shape = self._shapes_at_nodes
-        return float(weights @ shape[1]), float(-weights @ shape[3])
+        """Means ∫ h2 f_Θ dθ and ∫ |h4| f_Θ dθ; h4 is not positive."""
+        weights, h = self._hermite_at_nodes
+        return float(weights @ h[1]), float(-weights @ h[3])
 
     def _nearest_monotone(self, best: Array) -> Array:
-        """Slopes (2,) of the monotone map nearest to the map with slopes `best` (2,)."""
-        # least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter
-        # 23): the least |x| with G x ≥ h, x = Lᵀ (slopes − best) and L Lᵀ the Gram matrix
+        """Return the slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
+
+        With the Gram matrix L Lᵀ and x = Lᵀ (slopes − best) this is the shortest x with G x ≥ h, a
+        row for each ξ. It follows from a problem of non-negative least squares (least distance
+        programming: Lawson, Hanson 1974, chapter 23).
+        """
         from scipy.optimize import nnls
 
         L = np.linalg.cholesky(self._gram)
-        G_transposed = np.linalg.solve(L, SLOPES[[1, 3]])
-        h = -self.base_slopes - SLOPES[[1, 3]].T @ best  # what each slope lacks
+        G_transposed = np.linalg.solve(L, self.slope_derivatives)
+        h = -self.base_slopes - self.slope_derivatives.T @ best
         scale = np.linalg.norm(G_transposed, axis=0)
         system = np.vstack([G_transposed / scale, h / scale])
-        weights, _ = nnls(system, np.array([0.0, 0.0, 1.0]))
-        residual = system @ weights - (0, 0, 1)
+        target = np.array([0.0, 0.0, 1.0])
+        weights, _ = nnls(system, target)
+        residual = system @ weights - target
         return np.asarray(best + np.linalg.solve(L.T, -residual[:2] / residual[2]))
 
 
 @dataclass(frozen=True)
 class SlopeBand:
-    """Lower end, fitted value and upper end of each slope in their joint band."""
+    """Joint band of the slopes a2 and a4 around their fitted values."""
 
-    a2: tuple[float, float, float]
-    a4: tuple[float, float, float]
+    a2: SlopeEnds
+    a4: SlopeEnds
 
     def monotone_part(self, fit: HermiteFit) -> SlopeBand:
-        """Largest part of the band around the fitted slopes with four monotone corners."""
-        # slopes beyond are those of no radius map. The ends are cut at slopes from zero to three
-        # times the chord's (Fritsch and Carlson 1980), then moved towards the fitted ones until all
-        # corners rise
+        """Return the largest part of the band around the fitted slopes with four monotone corners.
+
+        Slopes beyond it belong to no radius map. The ends are cut at slopes from zero to three
+        times the chord's (Fritsch and Carlson 1980), and then moved towards the fitted slopes until
+        the maps at all corners rise.
+        """
         chord = fit.a3 - fit.a1
-        least, greatest = MARGIN * chord, (STEEPEST - 4 * MARGIN) * chord
+        min_end = MIN_SLOPE * chord
+        max_end = (3.0 - 4 * MIN_SLOPE) * chord
         lower, fitted, upper = np.array([self.a2, self.a4]).T
-        lower = np.minimum(np.clip(lower, least, greatest), fitted)
-        upper = np.maximum(np.clip(upper, least, greatest), fitted)
+        lower = np.minimum(np.clip(lower, min_end, max_end), fitted)
+        upper = np.maximum(np.clip(upper, min_end, max_end), fitted)
         for fraction in np.linspace(1, 0, 201):
-            low, high = fitted + fraction * (lower - fitted), fitted + fraction * (upper - fitted)
-            if all(map(fit.is_monotone, product(*zip(low, high, strict=True)))):
+            low = fitted + fraction * (lower - fitted)
+            high = fitted + fraction * (upper - fitted)
+            corners = product(*zip(low, high, strict=True))
+            if all(fit.is_monotone(slopes) for slopes in corners):
                 break
-        ends = zip(low, fitted, high, strict=True)
-        a2, a4 = ((float(x), float(y), float(z)) for x, y, z in ends)
-        return SlopeBand(a2, a4)
+        ends = [SlopeEnds(*map(float, x)) for x in zip(low, fitted, high, strict=True)]
+        return SlopeBand(a2=ends[0], a4=ends[1])
 
 
 def slope_band(
@@ -168,61 +218,92 @@ def slope_band(
     resamples: int,
     generator: np.random.Generator,
 ) -> SlopeBand:
-    """Fitted slopes and their joint band of confidence `level` in (0, 1), by the bootstrap.
+    """Return the fitted slopes and their joint confidence band, by the bootstrap.
 
-    The half width is a quantile of Student's t, with one degree of freedom less than there are
-    groups, times the bootstrap standard error; the probability of error is halved (Bonferroni).
+    The half-width is a quantile of Student's t, with one degree of freedom less than there are
+    groups, times the bootstrap standard error. The probability of error is halved, since both
+    slopes shall lie in the band (Bonferroni), and halved again for the two sides.
+
+    Args:
+        fit: Limits of the map.
+        sample: Reduced radii between the limits.
+        level: Confidence of the band in (0, 1).
+        resamples: Number of bootstrap samples.
+        generator: Source of the bootstrap samples.
     """
     from scipy.special import stdtrit
 
     a2, a4 = fit.slopes(sample)
-    weights = sample.bootstrap_weights(resamples, generator)
-    errors = np.std([fit.slopes(sample, w) for w in weights], axis=0, ddof=1)
-    quantile = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4))
-    a2_half, a4_half = (quantile * float(error) for error in errors)
-    return SlopeBand((a2 - a2_half, a2, a2 + a2_half), (a4 - a4_half, a4, a4 + a4_half))
+    all_weights = sample.bootstrap_weights(resamples, generator)
+    resampled_slopes = [fit.slopes(sample, weights) for weights in all_weights]
+    standard_errors = np.std(resampled_slopes, axis=0, ddof=1)
+    degrees_of_freedom = sample.groups.max()
+    quantile = float(stdtrit(degrees_of_freedom, 1 - (1 - level) / 4))
+    a2_half = quantile * float(standard_errors[0])
+    a4_half = quantile * float(standard_errors[1])
+    return SlopeBand(
+        a2=SlopeEnds(a2 - a2_half, a2, a2 + a2_half),
+        a4=SlopeEnds(a4 - a4_half, a4, a4 + a4_half),
+    )
 
 
 @dataclass(frozen=True)
 class PBox:
-    """A Hermite map with fuzzy slopes a2, a4: lower end, nominal value, upper end of each."""
+    """A Hermite map with fuzzy slopes: the supports of a2 and a4 with the nominal values inside."""
 
     fit: HermiteFit
-    a2: tuple[float, float, float]
-    a4: tuple[float, float, float]
+    a2: SlopeEnds
+    a4: SlopeEnds
+
+    @property
+    def nominal_slopes(self) -> tuple[float, float]:
+        """Nominal slopes (a2, a4)."""
+        return self.a2.nominal, self.a4.nominal
 
     def bounds(self, theta: Array) -> tuple[Array, Array]:
-        """Return least and greatest radius at `theta`, two arrays of its shape."""
-        least, greatest = (self.a2[0], self.a4[2]), (self.a2[2], self.a4[0])
-        return self.fit.map(least)(theta), self.fit.map(greatest)(theta)
+        """Return the smallest and the largest radius at `theta`, two arrays of its shape.
+
+        The radius rises with a2 and falls with a4, since h2 is not negative and h4 not positive.
+        """
+        smallest = self.fit.map((self.a2.lower, self.a4.upper))
+        largest = self.fit.map((self.a2.upper, self.a4.lower))
+        return smallest(theta), largest(theta)
 
     @property
     def area(self) -> float:
         """Area between the two distribution functions, in units of r_n."""
         h2, h4 = self.fit.mean_shapes
-        return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
+        return (self.a2.upper - self.a2.lower) * h2 + (self.a4.upper - self.a4.lower) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Largest distance, a probability, of the sample's distribution outside the p-box."""
-        values, before, after = sample.steps
-        law = self.fit.distribution
-        theta = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
-        least_radius, greatest_radius = self.bounds(theta)
-        probability = law.cdf(theta)
-        lower_cdf = np.interp(values, greatest_radius, probability)
-        upper_cdf = np.interp(values, least_radius, probability)
-        return float(max((lower_cdf - before).max(), (after - upper_cdf).max(), 0.0))
+        """Return the largest distance, a probability, of the sample's distribution from the p-box.
+
+        It is 0 where the distribution function of the sample lies inside.
+        """
+        steps = sample.steps
+        distribution = self.fit.distribution
+        theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 20_001), float)
+        smallest_radius, largest_radius = self.bounds(theta)
+        probability = distribution.cdf(theta)
+        lower_cdf = np.interp(steps.values, largest_radius, probability)
+        upper_cdf = np.interp(steps.values, smallest_radius, probability)
+        below = (lower_cdf - steps.before).max()
+        above = (steps.at - upper_cdf).max()
+        return float(max(below, above, 0.0))
 
 
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
-    """P-box of least area around the map fitted to a sample of r_n that contains the sample's band.
+    """Return the p-box of least area that contains a sample of r_n and the map fitted to it.
+
+    The supports are the solution of a linear program in their ends (a2 lower, a2 upper, a4 lower,
+    a4 upper).
 
     Args:
-        fit: Ends of the map and law of θ.
-        sample: r_n within the ends.
-        band: Half width of the band by which the p-box may miss the sample's distribution function,
+        fit: Ends of the map and distribution of θ.
+        sample: Reduced radii within the ends.
+        band: Half-width of the band by which the p-box may miss the sample's distribution function,
             in probability, in [0, 1).
         required: Slopes that the supports must contain as well, as far as their maps are monotone,
             such as their bootstrap band: where data are few, the misfit alone is little fuzzy.
@@ -230,39 +311,74 @@ def least_pbox(
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
-    # a linear program in the ends of the supports, (a2L, a2U, a4L, a4U): which contain these slopes
     from scipy.optimize import linprog
 
+    # The supports contain the fitted slopes and the required ones.
     a2, a4 = fit.slopes(sample)
-    part = SlopeBand((a2,) * 3, (a4,) * 3) if required is None else required.monotone_part(fit)
-    inner_a2, inner_a4 = (a2, *part.a2), (a4, *part.a4)
+    inner_a2 = [a2]
+    inner_a4 = [a4]
+    if required is not None:
+        part = required.monotone_part(fit)
+        inner_a2 += part.a2
+        inner_a4 += part.a4
     limits = [(0, min(inner_a2)), (max(inner_a2), None), (0, min(inner_a4)), (max(inner_a4), None)]
-    # at each step of the sample's distribution function the greatest radius must reach the value
-    # where the band's lower edge rises, and the least must not pass it where the upper edge does
-    steps, before, after = sample.steps
-    lower, upper = before + band < 1, after - band > 0
-    probability = np.concatenate([(before + band)[lower], (after - band)[upper]])
-    values = np.concatenate([steps[lower], steps[upper]])
-    is_lower_edge = np.arange(len(values)) < lower.sum()
-    law = fit.distribution
-    xi = (law.quantile(probability) - law.lower) / (law.upper - law.lower)
-    h1, h2, h3, h4 = (polynomial.polyval(xi, h) for h in SHAPES)
-    rest, zero = values - fit.a1 * h1 - fit.a3 * h3, np.zeros_like(h2)  # for a2 h2 + a4 h4
-    greatest = np.stack([zero, -h2, -h4, zero], axis=1)
-    least = np.stack([h2, zero, zero, h4], axis=1)
-    containment = np.where(is_lower_edge[:, None], greatest, least)
-    monotone = np.zeros((4, SLOPES.shape[1], 4))  # of the maps at the four corners
-    for corner, (i, j) in enumerate(product((0, 1), (2, 3))):
-        monotone[corner, :, i], monotone[corner, :, j] = -SLOPES[1], -SLOPES[3]
+
+    # The maps at all four corners of the supports are monotone.
+    derivatives = fit.slope_derivatives
+    is_monotone = np.zeros((4, derivatives.shape[1], 4))  # corner, ξ, end of a support
+    for corner, (a2_end, a4_end) in enumerate(product((0, 1), (2, 3))):
+        is_monotone[corner, :, a2_end] = -derivatives[0]
+        is_monotone[corner, :, a4_end] = -derivatives[1]
+    base_slopes = np.tile(fit.base_slopes + 1e-9, 4)
+
+    contains, bounds = _containment(fit, sample, band)
     h2, h4 = fit.mean_shapes
     result = linprog(
-        [-h2, h2, -h4, h4],
-        A_ub=np.concatenate([containment, *monotone]),
-        b_ub=np.append(np.where(is_lower_edge, -rest, rest), np.tile(fit.base_slopes + 1e-9, 4)),
+        [-h2, h2, -h4, h4],  # the area
+        A_ub=np.concatenate([contains, *is_monotone]),
+        b_ub=np.append(bounds, base_slopes),
         bounds=limits,
     )
     if result.status != 0:
         what = f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g}"
         raise FailedError(f"{what} contains the distribution", "widen the limits, or the band")
-    least_a2, greatest_a2, least_a4, greatest_a4 = map(float, result.x)
-    return PBox(fit, (least_a2, a2, greatest_a2), (least_a4, a4, greatest_a4))
+    ends = result.x.tolist()
+    return PBox(fit, SlopeEnds(ends[0], a2, ends[1]), SlopeEnds(ends[2], a4, ends[3]))
+
+
+def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
+    """Return inequalities A x ≤ b by which a p-box contains the band around a sample.
+
+    At each step of the sample's distribution function the largest radius must reach the value where
+    the lower edge of the band rises, and the smallest radius must not pass the value where the
+    upper edge does.
+
+    Args:
+        fit: Ends of the map and distribution of θ.
+        sample: Reduced radii within the ends.
+        band: Half-width of the band.
+
+    Returns:
+        A of shape (inequalities, 4), for x = (a2 lower, a2 upper, a4 lower, a4 upper), and b of
+        shape (inequalities,).
+    """
+    steps = sample.steps
+    rises_in_lower_edge = steps.before + band < 1
+    rises_in_upper_edge = steps.at - band > 0
+    probability = np.concatenate(
+        [(steps.before + band)[rises_in_lower_edge], (steps.at - band)[rises_in_upper_edge]]
+    )
+    values = np.concatenate([steps.values[rises_in_lower_edge], steps.values[rises_in_upper_edge]])
+    is_lower_edge = np.arange(len(values)) < rises_in_lower_edge.sum()
+
+    # r = a1 h1 + a2 h2 + a3 h3 + a4 h4, of which a2 h2 + a4 h4 must be above or below `remaining`.
+    distribution = fit.distribution
+    width = distribution.upper - distribution.lower
+    xi = (distribution.quantile(probability) - distribution.lower) / width
+    h1, h2, h3, h4 = _hermite_at(xi)
+    remaining = values - fit.a1 * h1 - fit.a3 * h3
+    zero = np.zeros_like(h2)
+    largest = np.stack([zero, -h2, -h4, zero], axis=1)
+    smallest = np.stack([h2, zero, zero, h4], axis=1)
+    matrix = np.where(is_lower_edge[:, None], largest, smallest)
+    return matrix, np.where(is_lower_edge, -remaining, remaining)

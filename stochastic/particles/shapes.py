@@ -15,13 +15,14 @@ class Shape:
     """Particles of one kind in their cells, of two or three dimensions.
 
     Args:
-        particles: discs or spheres.
+        particles: Name of the particles: discs or spheres.
         cells: Measure of a cell: area or volume.
         dimensions: 2 or 3.
-        factor: Share of a cell of side 2 that a particle of radius 1 takes.
-        reach: Greatest r_n that a map may have: the particle almost touches its cell's sides.
-        sequential: Share of the box up to which random sequential addition is quick.
-        densest: Share of the box that packed particles may take, below random close packing.
+        factor: Fraction of a cell of side 2 that a particle of radius 1 takes.
+        reach: Largest reduced radius r_n that a map may have: the particle almost touches the sides
+            of its cell.
+        sequential: Fraction of the box up to which random sequential addition is quick.
+        densest: Fraction of the box that packed particles may take, below random close packing.
     """
 
     particles: str
@@ -34,7 +35,7 @@ class Shape:
 
     @property
     def largest(self) -> float:
-        """r_n of a particle that fills its cell."""
+        """Reduced radius r_n of a particle that fills its cell."""
         return float(self.factor ** (-1 / self.dimensions))
 
     def fractions(self, radii: ArrayLike) -> Array:
@@ -42,13 +43,29 @@ class Shape:
         return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
 
     def reduced_radius(self, fraction: float) -> float:
-        """Reduced radius of a particle that takes a share of its cell."""
+        """Return the reduced radius of a particle that takes a fraction of its cell."""
         return float((fraction / self.factor) ** (1 / self.dimensions))
 
     def measure(self, radii: ArrayLike) -> Array:
-        """Area in m² or volume in m³ of particles, of radii in m of any shape."""
+        """Return the area in m² or the volume in m³ of particles, of radii in m of any shape."""
         return self.fractions(radii) * 2.0**self.dimensions
 
 
-DISCS = Shape("discs", "area", 2, np.pi / 4, 0.99, 0.45, 0.82)
-SPHERES = Shape("spheres", "volume", 3, np.pi / 6, 0.97, 0.25, 0.58)
+DISCS = Shape(
+    particles="discs",
+    cells="area",
+    dimensions=2,
+    factor=np.pi / 4,
+    reach=0.99,
+    sequential=0.45,
+    densest=0.82,
+)
+SPHERES = Shape(
+    particles="spheres",
+    cells="volume",
+    dimensions=3,
+    factor=np.pi / 6,
+    reach=0.97,
+    sequential=0.25,
+    densest=0.58,
+)

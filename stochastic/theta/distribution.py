@@ -1,4 +1,4 @@
-"""Laws of the basic random variable θ (section 3.1); the truncated normal is the paper's."""
+"""Distributions of the basic random variable θ (section 3.1), as the truncated normal one."""
 
 from __future__ import annotations
 
@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import is_number, require
-
-MIN_WIDTH = 1e-4  # of a support over its greater end, so that rounding is small beside it
+from alphacut.base.errors import RefusedError, is_number, require
 
 
 class ThetaDistribution(Protocol):
-    """Law of θ on a bounded support, with a density.
+    """Distribution of θ on a bounded support, with a density.
 
-    Laws that can be hashed (frozen dataclasses) have their quadrature rules kept.
+    The quadrature rules of distributions that can be hashed (frozen dataclasses) are cached.
     """
 
     @property
@@ -40,31 +38,42 @@ class ThetaDistribution(Protocol):
         """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
 
 
-def require_distribution(law: object) -> None:
-    """Refuse what is no `ThetaDistribution`, as a name or a frozen law of SciPy."""
-    ends = getattr(law, "lower", None), getattr(law, "upper", None)
-    is_law = all(map(is_number, ends)) and callable(getattr(law, "pdf", None))
+def require_distribution(distribution: object) -> None:
+    """Refuse what is no `ThetaDistribution`, as a name or a frozen distribution of SciPy."""
+    has_lower = is_number(getattr(distribution, "lower", None))
+    has_upper = is_number(getattr(distribution, "upper", None))
+    if has_lower and has_upper and callable(getattr(distribution, "pdf", None)):
+        return
     cure = "give the law itself, as TruncatedNormal(-3, 3)"
-    if hasattr(law, "ppf"):
+    if hasattr(distribution, "ppf"):
         cure = "for scipy.stats.norm give TruncatedNormal(-3, 3); else a class with these members"
-    shown = type(law).__name__ if not isinstance(law, str) else repr(law)
-    allowed = "a law with lower, upper, pdf, cdf and quantile"
-    require(is_law, "law of θ", value=shown, allowed=allowed, cure=cure)
+    is_text = isinstance(distribution, str)
+    shown = repr(distribution) if is_text else type(distribution).__name__
+    raise RefusedError("law of θ", shown, "a law with lower, upper, pdf, cdf and quantile", cure)
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding."""
-    least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
+    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding.
+
+    Its width must be 1e-4 of its larger end: then the rounding of θ, 1e-16 of the end, is 1e-12 of
+    the width.
+
+    Args:
+        lower: Lower end of the support.
+        upper: Upper end.
+        unit: Magnitude that counts as an end as well, of distributions with a unit of their own.
+    """
+    min_width = 1e-4 * max(abs(lower), abs(upper), unit)
     is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
-    is_wide = is_ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
-    distance = f", {least:.2g} or more apart" if is_ordered else ""
+    is_wide = is_ordered and upper - lower >= 0.999 * min_width  # 9.999 … 10 is wide enough
+    distance = f", {min_width:.2g} or more apart" if is_ordered else ""
     allowed = f"two finite ends, rising{distance}"
     require(is_wide, "support of θ", value=[lower, upper], allowed=allowed)
 
 
 @dataclass(frozen=True)
 class TruncatedNormal:
-    """Standard normal law cut to [lower, upper], in standard deviations, and normalised there.
+    """Standard normal distribution, truncated to [lower, upper] in standard deviations.
 
     Raises:
         RefusedError: The ends are not finite or not in order.
@@ -89,43 +98,54 @@ class TruncatedNormal:
         return float(self._below(self.upper))
 
     def _below(self, theta: ArrayLike) -> Array:
-        """Uncut probability of [lower, theta], a difference of the smaller tails."""
+        """Return the probability that the uncut normal distribution gives to [lower, theta].
+
+        It is a difference of the smaller tails, which keeps its digits: far above 0 the lower tails
+        are both nearly 1.
+        """
         if self.lower > 0:
             return _normal(-self.lower) - _normal(-np.asarray(theta))
         return _normal(theta) - _normal(self.lower)
 
     def pdf(self, theta: ArrayLike) -> Array:
-        """Density f_Θ at `theta` (any shape); zero outside the support."""
+        """Return the density f_Θ at `theta` (any shape); zero outside the support."""
         theta = np.asarray(theta, float)
         inside = (theta >= self.lower) & (theta <= self.upper)
         return np.where(inside, np.exp(-(theta**2) / 2) / (np.sqrt(2 * np.pi) * self.mass), 0.0)
 
     def cdf(self, theta: ArrayLike) -> Array:
-        """P(Θ ≤ theta), any shape."""
+        """Return P(Θ ≤ theta), any shape."""
         inside = np.clip(np.asarray(theta, float), self.lower, self.upper)
         return np.asarray(self._below(inside) / self.mass, float)
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
+        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape.
+
+        Raises:
+            RefusedError: A probability is outside [0, 1].
+        """
         from scipy.special import ndtri
 
         p = np.asarray(probability, float)
         wrong = p[~((p >= 0) & (p <= 1))]
         value = next(wrong.flat, None)
         require(not wrong.size, "probability", value=value, allowed="values in [0, 1]")
-        if self.lower > 0:  # by the smaller tail
+        if self.lower > 0:  # by the smaller tail, as in `_below`
             theta = -ndtri(_normal(-self.lower) - p * self.mass)
         else:
             theta = ndtri(_normal(self.lower) + p * self.mass)
         return np.asarray(np.clip(theta, self.lower, self.upper))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
-        """`number` independent values of θ, shape (number,)."""
+        """Draw independent values of θ, shape (number,)."""
         return self.quantile(generator.random(number))
 
 
 def _normal(theta: ArrayLike) -> Array:
-    """Distribution function of the standard normal law, any shape; SciPy would start later."""
+    """Return the distribution function of the standard normal distribution, any shape.
+
+    SciPy has it, but takes a third of a second to be imported.
+    """
     values = np.asarray(theta, float)
-    shares = [erfc(-value / sqrt(2)) / 2 for value in values.ravel()]
-    return np.array(shares).reshape(values.shape)
+    probabilities = [erfc(-value / sqrt(2)) / 2 for value in values.ravel()]
+    return np.array(probabilities).reshape(values.shape)

@@ -1,4 +1,4 @@
-"""Quadrature rules for means under the law of θ, and interpolation between their nodes."""
+"""Quadrature rules for means under the distribution of θ, and interpolation between their nodes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,6 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require
 from alphacut.stochastic.theta.distribution import ThetaDistribution
 
-MASS_GAP = 1e-8
-"""Most by which the integral of a density may miss the difference of its distribution function."""
-_PANEL_GAP = 1e-13
-_HALVINGS, _MAX_PANELS = 48, 400
-_FIRST_PANELS = 64
-_NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
-MIN_NODES = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-MAX_LEBESGUE = 30.0  # of a polynomial that is trusted; rules in layers have far more
-MAX_NODES = 40  # nodes of a polynomial
-
 
 @dataclass(frozen=True)
 class ThetaRule:
@@ -32,7 +22,7 @@ class ThetaRule:
     weights: Array
 
     def mean(self, values: Array) -> Array:
-        """Mean of `values`, shape (n, …), under f_Θ."""
+        """Return the mean of `values`, shape (n, …), under f_Θ."""
         return np.asarray(np.tensordot(self.weights, values, axes=1), float)
 
 
@@ -45,13 +35,27 @@ def level_rule(distribution: ThetaDistribution, levels: Array, *, points: int) -
     return _weighted(distribution, levels, np.polynomial.legendre.leggauss(points))
 
 
-def _weighted(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
-    """Composite rule of `rule`, nodes and weights on [−1, 1], in panels, weighted by f_Θ."""
-    x, w = rule
-    half = np.diff(edges)[:, None] / 2
-    nodes = (edges[:-1, None] + half * (1 + x)).ravel()
-    weights = (half * w).ravel() * law.pdf(nodes)
-    return ThetaRule(nodes, weights / weights.sum())
+Rule = tuple[Array, Array]
+"""Nodes and weights of a quadrature rule on [−1, 1], shape (points,) each."""
+
+
+def _on_panels(edges: Array, rule: Rule) -> tuple[Array, Array]:
+    """Return the nodes and weights of a rule on each panel, shape (panels, points) each.
+
+    Args:
+        edges: Ends of the panels, rising, shape (panels + 1,).
+        rule: The rule on [−1, 1].
+    """
+    x, weights = rule
+    half_width = np.diff(edges)[:, None] / 2
+    return edges[:-1, None] + half_width * (1 + x), half_width * weights
+
+
+def _weighted(distribution: ThetaDistribution, edges: Array, rule: Rule) -> ThetaRule:
+    """Return the composite rule on panels between rising edges, weighted by the density f_Θ."""
+    nodes, panel_weights = _on_panels(edges, rule)
+    weights = panel_weights.ravel() * distribution.pdf(nodes.ravel())
+    return ThetaRule(nodes.ravel(), weights / weights.sum())
 
 
 def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
@@ -61,7 +65,7 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
     Jacobi matrix (Golub & Welsch 1969).
 
-    The rules of laws that are compared by value are cached.
+    The rules of distributions that are compared by value are cached.
 
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
@@ -79,20 +83,32 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
 
 
 def _stieltjes_rule(distribution: ThetaDistribution, points: int) -> ThetaRule:
-    panels = min(math.ceil(distribution.upper - distribution.lower), _FIRST_PANELS)
-    levels = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
+    """Return the Gauss rule with so many points; its arrays cannot be written to."""
+    # A fine rule that integrates the density and polynomials of degree 2·points stands in for the
+    # integral. Nodes of no weight are so far off that the polynomials overflow there.
+    panels = min(math.ceil(distribution.upper - distribution.lower), 64)
+    edges = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
     legendre = np.polynomial.legendre.leggauss(16 + 2 * points)
-    fine = _weighted(distribution, _panel_edges(distribution, levels, legendre), legendre)
-    relevant = fine.weights > _NEGLIGIBLE
-    theta, weights = fine.nodes[relevant], fine.weights[relevant]
-    alpha, beta = np.zeros(points), np.zeros(points + 1)  # of the recurrence; beta[0] = 0
-    last, current = np.zeros_like(theta), np.ones_like(theta)  # orthonormal polynomials at θ
+    fine = _weighted(distribution, _panel_edges(distribution, edges, legendre), legendre)
+    relevant = fine.weights > 1e-200
+    theta = fine.nodes[relevant]
+    weights = fine.weights[relevant]
+
+    # The orthonormal polynomials p_k obey √β_{k+1} p_{k+1} = (θ − α_k) p_k − √β_k p_{k−1}.
+    alpha = np.zeros(points)
+    sqrt_beta = np.zeros(points + 1)
+    last = np.zeros_like(theta)
+    current = np.ones_like(theta)
     for k in range(points):
         alpha[k] = weights @ (theta * current**2)
-        following = (theta - alpha[k]) * current - beta[k] * last
-        beta[k + 1] = np.sqrt(weights @ following**2)
-        last, current = current, following / beta[k + 1]
-    off_diagonal = beta[1:-1]
+        following = (theta - alpha[k]) * current - sqrt_beta[k] * last
+        sqrt_beta[k + 1] = np.sqrt(weights @ following**2)
+        last = current
+        current = following / sqrt_beta[k + 1]
+
+    # The nodes are the eigenvalues of the Jacobi matrix, the weights the squares of the first
+    # components of its eigenvectors.
+    off_diagonal = sqrt_beta[1:-1]
     jacobi = np.diag(alpha) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
     nodes, vectors = np.linalg.eigh(jacobi)
     rule = ThetaRule(nodes, vectors[0] ** 2)
@@ -104,35 +120,60 @@ def _stieltjes_rule(distribution: ThetaDistribution, points: int) -> ThetaRule:
 _cached_rule = lru_cache(maxsize=256)(_stieltjes_rule)
 
 
-def _panel_edges(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Refine rising edges until a rule on [−1, 1] integrates the density of θ on each panel."""
-    # a panel on which it misses the difference of the distribution function is halved, which
-    # resolves corners, jumps and narrow peaks of the density
-    for _ in range(_HALVINGS):
-        gaps = _mass_gaps(law, edges, rule)
-        coarse = np.flatnonzero(~(gaps <= _PANEL_GAP))  # also where a gap is not a number
-        if not coarse.size or len(edges) > _MAX_PANELS:
+def _panel_edges(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Array:
+    """Refine panels until a rule integrates the density of θ on each of them.
+
+    A panel on which the integral misses the difference of the distribution function is halved,
+    which resolves corners, jumps and narrow peaks of the density.
+
+    Args:
+        distribution: Distribution of θ.
+        edges: Ends of the first panels, rising.
+        rule: The rule on [−1, 1].
+
+    Raises:
+        RefusedError: The density is not the derivative of the distribution function.
+    """
+    max_halvings = 48  # of a panel; narrower ones are rounding
+    max_panels = 400
+    for _ in range(max_halvings):
+        gaps = _mass_gaps(distribution, edges, rule)
+        coarse = np.flatnonzero(~(gaps <= 1e-13))  # also where a gap is not a number
+        if not coarse.size or len(edges) > max_panels:
             break
-        edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
-    total = float(_mass_gaps(law, edges, rule).sum())
-    key = "probability between the density of θ and its distribution function"
-    cure = "pdf must be the derivative of cdf, finite everywhere on the support"
-    allowed = f"differences up to {MASS_GAP:g}"
-    require(total <= MASS_GAP, key, value=f"{total:.1e}", allowed=allowed, cure=cure)
+        midpoints = (edges[coarse] + edges[coarse + 1]) / 2
+        edges = np.insert(edges, coarse + 1, midpoints)
+    total = float(_mass_gaps(distribution, edges, rule).sum())
+    max_total = 1e-8  # eight digits of all means; a jump within the narrowest panel leaves less
+    require(
+        total <= max_total,
+        "probability between the density of θ and its distribution function",
+        value=f"{total:.1e}",
+        allowed=f"differences up to {max_total:g}",
+        cure="pdf must be the derivative of cdf, finite everywhere on the support",
+    )
     return edges
 
 
-def _mass_gaps(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Error of a rule for the density f on each panel, (n,), by its distribution function F."""
-    # the larger of the errors of ∫ f, which is [F], and of ∫ x f, x from −1 to 1 over the panel,
-    # which is [x F] − ∫ F dx: a jump right in the middle of a panel shows in the second alone
-    x, w = rule
-    half = np.diff(edges)[:, None] / 2
-    theta = edges[:-1, None] + half * (1 + x)
-    mass, F = half * w * law.pdf(theta), law.cdf(edges)
-    error = mass.sum(axis=1) - np.diff(F)
-    integral_of_F = (w * law.cdf(theta)).sum(axis=1)
-    moment_error = (mass * x).sum(axis=1) - (F[1:] + F[:-1] - integral_of_F)
+def _mass_gaps(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Array:
+    """Return the error of a rule for the density f on each panel, shape (panels,).
+
+    It is the larger of the errors of ∫ f, which is [F], and of ∫ x f, which is [x F] − ∫ F dx; F is
+    the distribution function, and x runs from −1 to 1 over the panel. A jump right in the middle of
+    a panel shows in the second error alone.
+
+    Args:
+        distribution: Distribution of θ.
+        edges: Ends of the panels, rising, shape (panels + 1,).
+        rule: The rule on [−1, 1].
+    """
+    x, weights = rule
+    theta, panel_weights = _on_panels(edges, rule)
+    masses = panel_weights * distribution.pdf(theta)
+    F = distribution.cdf(edges)
+    error = masses.sum(axis=1) - np.diff(F)
+    integral_of_F = (weights * distribution.cdf(theta)).sum(axis=1)
+    moment_error = (masses * x).sum(axis=1) - (F[1:] + F[:-1] - integral_of_F)
     gaps: Array = np.maximum(np.abs(error), np.abs(moment_error))
     return gaps
 
@@ -140,15 +181,16 @@ def _mass_gaps(law: ThetaDistribution, edges: Array, rule: tuple[Array, Array]) 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     """Interpolate values at rising nodes, both of shape (n,), at points `at` of any shape.
 
-    By the polynomial through all nodes if these are few and its Lebesgue function is small at the
-    points, as for the nodes of one Gauss rule; otherwise by monotone cubic pieces (PCHIP).
+    The polynomial through all nodes is taken if there are 10 to 40 nodes, and its Lebesgue function
+    is below 30 at the points, as for the nodes of one Gauss rule. Otherwise the interpolation is by
+    monotone cubic pieces (PCHIP), which are better with fewer nodes and safe with any others.
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
-    if MIN_NODES <= len(nodes) <= MAX_NODES:
-        # the same digits each time: SciPy takes the nodes in a random order
+    if 10 <= len(nodes) <= 40:
+        # SciPy takes the nodes in a random order; with one seed the digits are the same each time.
         lagrange = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
         lebesgue_constant = np.abs(lagrange).sum(axis=-1).max()
-        if lebesgue_constant <= MAX_LEBESGUE:
+        if lebesgue_constant <= 30.0:
             return np.asarray(lagrange @ values)
     return np.asarray(PchipInterpolator(nodes, values)(at))

@@ -11,7 +11,7 @@ from scipy import integrate
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, least_pbox, slope_band
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeEnds, least_pbox, slope_band
 
 LAW = TruncatedNormal()
 TRUE = HermiteMap(0.13, 0.3, 0.87, 0.5)
@@ -37,9 +37,9 @@ def test_weighted_distribution_by_hand():
     assert sample.cdf([0.1, 0.2, 0.5, 0.79, 0.8]).tolist() == [0, 0.5, 0.75, 0.75, 1]
     assert sample.quantile([0.1, 0.5, 0.6, 1]).tolist() == [0.2, 0.2, 0.5, 0.8]
     assert sample.mean == pytest.approx(0.425)
-    assert sample.share_within(0.3, 0.9) == pytest.approx(0.5)
+    assert sample.fraction_within(0.3, 0.9) == pytest.approx(0.5)
     many = drawn(TRUE, 50_000, 1)
-    assert many.share_within(*many.limits(0.99)) == pytest.approx(0.99, abs=1e-4)
+    assert many.fraction_within(*many.limits(0.99)) == pytest.approx(0.99, abs=1e-4)
 
 
 @pytest.mark.parametrize("weighted", [False, True])
@@ -137,11 +137,14 @@ def test_no_smaller_pbox_and_no_shrunken_support_contains_the_sample():
         shrunken = ends.copy()
         shrunken[slope, end] += 0.2 * (ends[slope, 1] - ends[slope, end])
         if abs(ends[slope, end] - ends[slope, 1]) >= 1e-3:
-            assert not contained(PBox(FIT, *map(tuple, shrunken)), sample, band), (slope, end)
+            assert not contained(PBox(FIT, *(SlopeEnds(*x) for x in shrunken)), sample, band), (
+                slope,
+                end,
+            )
     rng = np.random.default_rng(0)
     reach = np.maximum(np.abs(ends - ends[:, 1:2]), [0, 0, 0.02]) * [-1, 0, 1]
     for _ in range(300):
-        other = PBox(FIT, *map(tuple, ends[:, 1:2] + 2 * rng.random((2, 3)) * reach))
+        other = PBox(FIT, *(SlopeEnds(*x) for x in ends[:, 1:2] + 2 * rng.random((2, 3)) * reach))
         if other.area < box.area * 0.999:
             assert not contained(other, sample, band)
 

@@ -55,7 +55,7 @@ def test_few_data_leave_the_slopes_as_fuzzy_as_their_bootstrap_band(rng):
     for seed in range(20):
         values = truth(truth.distribution.quantile(rng.random(60)))
         sample = AreaWeighted.from_values(values, np.ones(60), np.arange(60) % 6)
-        _, pbox, *_ = fit_map(RadiusLimits(DISCS, (0.15, 0.85)), sample, seed=seed)
+        pbox = fit_map(RadiusLimits(DISCS, (0.15, 0.85)), sample, seed=seed).pbox
         count += pbox.a2[0] <= truth.a2 <= pbox.a2[2] and pbox.a4[0] <= truth.a4 <= pbox.a4[2]
     assert count >= 17  # the band's confidence is 99 %
 
@@ -68,7 +68,7 @@ def test_discs_tighter_than_their_cells_count_as_touching_them():
     capped = rule.capped(sample)
     assert capped.values.max() == DISCS.reach == 0.99
     assert capped.mean == pytest.approx(0.9 * 0.65 + 0.1 * 0.99, rel=1e-12)
-    assert capped.share_within(0.95, 0.99) == pytest.approx(0.1, rel=1e-12)
+    assert capped.fraction_within(0.95, 0.99) == pytest.approx(0.1, rel=1e-12)
     assert RadiusLimits(DISCS, (0.2, 0.9)).capped(sample) is sample
 
 
@@ -277,7 +277,7 @@ def test_cells_as_tight_as_no_square_are_counted_or_refused():
     dense = fit_radius_map(pack(300, packings=5, fraction=0.55, radii=(1e-3, 2e-3)))
     assert dense.limits[1] == 0.99 < dense.sample.values[-1]
     assert 0 < dense.rule.capped_fraction(dense.sample) < 0.05
-    assert dense.share_within > 0.99
+    assert dense.fraction_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
         fit_radius_map(pack(200, packings=5, fraction=0.75, radii=EQUAL))
 
