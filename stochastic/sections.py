@@ -1,4 +1,4 @@
-"""Particles of a section or a packing with their cells, and the reduced radii of all."""
+"""Particles of a section or a packing with their cells, and the reduced radii of all cells."""
 
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.shapes import DISCS
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, counted_cells
 
-PATCHES = 5  # a single section is cut into 5 × 5 patches, which the bootstrap draws
-
 
 @dataclass(frozen=True, eq=False)
 class ParticleCells:
@@ -28,8 +26,8 @@ class ParticleCells:
     Args:
         particles: All particles.
         counted: Indices of the particles whose cells count, shape (k,).
-        cells: Area in m² or volume in m³ of these cells, shape (k,).
-        weight: Cells that each stands for, shape (k,); 1 in a periodic box.
+        cells: Area in m² or volume in m³ of the counted cells, shape (k,).
+        weight: Number of cells that each counted cell stands for, shape (k,); 1 in a periodic box.
         diagram: Apollonius cells of discs; None of spheres.
     """
 
@@ -41,7 +39,10 @@ class ParticleCells:
 
     @property
     def reduced_radii(self) -> Array:
-        """Values r_n = r/a of the counted cells, 2a the side of a square or cube as large."""
+        """Reduced radii r_n = r/a of the counted cells, shape (k,).
+
+        2a is the side of a square or cube as large as the cell.
+        """
         sides = self.cells ** (1 / self.particles.shape.dimensions)
         return np.asarray(2 * self.particles.radii[self.counted] / sides)
 
@@ -60,16 +61,16 @@ def with_cells(particles: Particles) -> ParticleCells:
 
 
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
-    """Sample of r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
+    """Return the reduced radii of all counted cells, weighted by area or volume.
 
-    A group is a section, or one of 5 × 5 patches if there is a single section. A cell smaller than
-    its particle is refused.
+    For the bootstrap they are grouped by section, or by 5 × 5 patches (5 × 5 × 5 of a cube) if
+    there is a single section.
+
+    Raises:
+        RefusedError: A cell is smaller than its particle.
     """
     if len(sections) == 1:
-        particles, counted = sections[0].particles, sections[0].counted
-        patch = (PATCHES * particles.centres[counted] / particles.size).astype(int)
-        base = PATCHES ** np.arange(len(particles.size))[::-1]
-        groups = [np.minimum(patch, PATCHES - 1) @ base]
+        groups = [_patches(sections[0])]
     else:
         groups = [np.full(len(section.counted), k) for k, section in enumerate(sections)]
     sample = AreaWeighted.from_values(
@@ -77,14 +78,25 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
         np.concatenate([section.cells * section.weight for section in sections]),
         np.concatenate(groups),
     )
-    full, largest = sections[0].particles.shape.largest, sample.values[-1]
-    allowed, cure = f"values up to {full:.4g}", "mend the overlaps in the data"
-    require(largest <= full, "r_n of a cell", value=largest, allowed=allowed, cure=cure)
+    filled = sections[0].particles.shape.largest
+    largest = sample.values[-1]
+    cure = "mend the overlaps in the data"
+    is_possible = largest <= filled
+    require(is_possible, "r_n of a cell", largest, allowed=f"values up to {filled:.4g}", cure=cure)
     return sample
 
 
+def _patches(section: ParticleCells) -> Ints:
+    """Return the number of the patch that the particle of each counted cell lies in, shape (k,)."""
+    per_side = 5
+    particles = section.particles
+    place = (per_side * particles.centres[section.counted] / particles.size).astype(int)
+    digits = per_side ** np.arange(len(particles.size))[::-1]
+    return np.asarray(np.minimum(place, per_side - 1) @ digits)
+
+
 def cell_volumes(spheres: Particles) -> Array:
-    """Volumes of the power (Laguerre) cells of spheres in a periodic cube, in m³, shape (n,).
+    """Return the volumes of the power (Laguerre) cells of spheres in a periodic cube, in m³, (n,).
 
     Voro++ (Rycroft, Chaos 19, 041111, 2009) is run as a program; Debian's package is voro++.
 
@@ -94,18 +106,21 @@ def cell_volumes(spheres: Particles) -> Array:
     program = shutil.which("voro++")
     if program is None:
         raise FailedError("cells of spheres need Voro++", "install Debian's package voro++")
-    side, count = float(spheres.size[0]), len(spheres)
+    side = float(spheres.size[0])
+    count = len(spheres)
     table = np.c_[np.arange(count), spheres.centres / side, spheres.radii / side]
     with TemporaryDirectory() as folder:
         file = Path(folder) / "spheres"
         np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
-        command = [program, "-r", "-p", "-c", "%i %v", *"010101", str(file)]
+        # -r: radii follow the centres; -p: periodic; -c: print index and volume; box [0, 1]³
+        command = [program, "-r", "-p", "-c", "%i %v", "0", "1", "0", "1", "0", "1", str(file)]
         subprocess.run(command, capture_output=True, check=False)
         output = file.with_suffix(".vol")
         cells = np.loadtxt(output, ndmin=2) if output.is_file() else np.zeros((0, 2))
     volumes = np.zeros(count)
     volumes[cells[:, 0].astype(int)] = cells[:, 1]
-    if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:  # Voro++ prints six digits
+    # Voro++ prints six digits.
+    if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:
         what = f"the power cells of {count} spheres fill {volumes.sum():.6f} of the cube"
         what += f", and {int((volumes <= 0).sum())} spheres have none"
         raise FailedError(what, "take spheres that do not overlap")

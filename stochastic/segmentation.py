@@ -3,8 +3,8 @@
 A pixel's grey value is modelled as the level of its class, plus a light that changes slowly over
 the image (a polynomial of degree two), plus noise. The model is fitted to the segmented image and
 its classes are assigned anew until nothing changes. A pixel may belong to either side of a
-threshold where its grey value is nearer to it than `CONFIDENT` deviations of the noise and the
-light there. Texture of the phases counts as noise.
+threshold where its grey value is nearer to it than `CONFIDENT` standard deviations of the noise
+and the light there. Texture of the phases counts as noise.
 
 Grey values that are clipped hide noise and light, so that no judgement holds: an image is refused
 where the values of a class pile up at an end, or one class is flat beside another one that is not.
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percentile_filter
@@ -22,24 +23,9 @@ from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percent
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
 
-CONFIDENT = 3.0  # deviations of the noise
-MAX_OPEN = 0.15  # area that may be open, over that of the smallest class
-_MAX_ITERATIONS = 20
-_OF_NORMAL = 1.4826  # deviation of a normal law over the median of its magnitude
-_NEAR = 3.0  # deviations within which a pixel helps to fit levels and light
-_BORDER = 3  # pixels from a border that do not help, if
-_ENOUGH = 0.1  # of each class is farther from it
-_NOISE_QUANTILE = 0.9  # of the residuals; rounding makes up to half of them zero
-_EXACT = 1e-9  # of the grey values: noise that is rounding
-_MIN_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
-_FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
-_MAX_FLAT, _FLAT_GAP = 3, 0.05  # greys of a clean class, and least gap over the contrast
-MIN_IMPULSES = 0.01
-"""Share of pixels that are impulses from which on they count; noise alone has 0.003."""
-_AROUND = 7  # pixels around; a line has 7 of 49
-_PERCENTILES_AROUND = 15, 85
-_MIN_PIXELS = 50  # of a class whose grey values are checked for clipping
-_MEDIAN = 5  # pixels of the median filter of the classes
+CONFIDENT = 3.0
+"""Standard deviations of the noise within which a pixel may be of another class: a normal noise
+leaves 0.3 % outside. A larger number leaves more pixels open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +67,9 @@ class Segmentation:
         return float(np.mean(first < last))
 
     def ranges(self) -> tuple[Ints, Ints]:
-        """Least and greatest class that each pixel may be of, shape (rows, columns) each.
+        """Return the lowest and the highest class that each pixel may be of, (rows, columns) each.
 
-        The grey value is varied by `CONFIDENT` deviations of the noise and by the light.
+        The grey value is varied by `CONFIDENT` standard deviations of the noise and by the light.
         """
         uncertainty = CONFIDENT * self.noise + np.abs(self.light)
         uncertainty = np.where(self.is_impulse, np.inf, uncertainty)
@@ -91,8 +77,12 @@ class Segmentation:
         last = np.searchsorted(self.thresholds, self.grey + uncertainty, side="right")
         return first, last
 
-    def require_certain(self, most: float = MAX_OPEN) -> None:
-        """Refuse a segmentation whose open area is more than `most` times that of a class."""
+    def require_certain(self, max_fraction: float = 0.15) -> None:
+        """Refuse a segmentation that leaves too many pixels open.
+
+        Args:
+            max_fraction: Area that may be open, over the area of the smallest class.
+        """
         fraction = self.open_fraction / float(self.fractions.min())
         impulses = float(np.mean(self.is_impulse))
         value = (
@@ -102,13 +92,15 @@ class Segmentation:
         if impulses:
             value += f", and by impulses or scratches on {impulses:.1%}"
         cure = "the how-to on images takes noise and light away by scikit-image"
-        require(fraction <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
+        is_certain = fraction <= max_fraction
+        require(is_certain, "threshold", value, allowed=f"up to {max_fraction:.0%}", cure=cure)
 
 
 def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
     """Segment a grey image: classes, light, noise, and pixels that may be of another class.
 
-    Levels, light and noise are fitted and classes assigned in turn, until no class changes.
+    Levels, light and noise are fitted and classes assigned in turn, until no class changes, at most
+    20 times.
 
     Args:
         grey: Grey values, shape (rows, columns).
@@ -117,92 +109,176 @@ def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
     Raises:
         RefusedError: A class has no pixel, or grey values are clipped.
     """
-    values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
-    y, x = np.meshgrid(*(np.linspace(-1, 1, count) for count in values.shape), indexing="ij")
-    polynomials = np.stack([x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 5)  # of the light
+    values = np.asarray(grey, float)
+    borders = tuple(map(float, thresholds))
+
+    # Polynomials of degree two and mean zero, of which the light consists, shape (pixels, 5)
+    coordinates = [np.linspace(-1, 1, count) for count in values.shape]
+    y, x = np.meshgrid(*coordinates, indexing="ij")
+    polynomials = np.stack([x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 5)
     polynomials -= polynomials.mean(axis=0)
-    light, last_labels = np.zeros_like(values), None
-    for _ in range(_MAX_ITERATIONS):
+
+    light = np.zeros_like(values)
+    last_labels = None
+    for _ in range(20):
         labels = np.searchsorted(borders, values - light, side="right")
         if last_labels is not None and np.array_equal(labels, last_labels):
             break
-        levels, light, noise = _fit_light(values, labels, polynomials, len(borders) + 1)
+        fit = _fit_light(values, labels, polynomials=polynomials, classes=len(borders) + 1)
+        light = fit.light
         last_labels = labels
-    impulses = _impulses(values - light, levels, noise)
+    impulses = _impulses(values - light, fit.levels, fit.noise)
     _require_unclipped(values, borders, ~impulses)
-    return Segmentation(values, borders, levels, light, noise, impulses)
+    return Segmentation(values, borders, fit.levels, light, fit.noise, impulses)
+
+
+def _rounding(grey: Array) -> float:
+    """Return the noise that is no more than rounding of some grey values."""
+    return 1e-9 * float(np.abs(grey).max())
 
 
 def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
-    """Mask of the pixels that are salt, pepper or scratches in an evenly lit image."""
-    # beyond the noise of every class and of most pixels around, unlike those of a blurred border
-    band = CONFIDENT * noise + _EXACT * float(np.abs(grey).max())
+    """Return which pixels are salt, pepper or scratches, shape (rows, columns).
+
+    An impulse differs from the level of every class, and from most of the 7 × 7 pixels around, of
+    which a line has 7, by more than the noise; pixels of a blurred border differ from the levels
+    alone. Noise by itself leaves 0.3 % of such pixels: below 1 % they do not count.
+
+    Args:
+        grey: Grey values of an evenly lit image, shape (rows, columns).
+        levels: Grey value of each class.
+        noise: Standard deviation of the noise.
+    """
+    band = CONFIDENT * noise + _rounding(grey)
     is_outlier = np.abs(grey[..., None] - levels).min(axis=-1) > band
-    low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _PERCENTILES_AROUND)
+    low = percentile_filter(grey, 15, 7, mode="wrap")
+    high = percentile_filter(grey, 85, 7, mode="wrap")
     impulses = is_outlier & ((grey < low - band) | (grey > high + band))
-    return np.asarray(impulses & (impulses.mean() >= MIN_IMPULSES))
+    return np.asarray(impulses & (impulses.mean() >= 0.01))
 
 
 def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
-    """Refuse an image of which a class piles up at an end of the values; `sound`: no impulses."""
-    labels = median_filter(np.searchsorted(borders, values, side="right"), _MEDIAN, mode="wrap")
-    interior = _interior(labels, _BORDER) & sound
+    """Refuse an image of which a class piles up at an end of the grey values.
+
+    A class is clipped where 1 % of its pixels have the last grey value, and three times as many as
+    have the next one. Classes of fewer than 50 pixels tell nothing.
+
+    Args:
+        values: Grey values, shape (rows, columns).
+        borders: Grey values between the classes.
+        sound: Pixels that are no impulses, shape (rows, columns).
+
+    Raises:
+        RefusedError: A class is clipped.
+    """
+    # The median over 5 × 5 pixels takes noise off the classes.
+    labels = median_filter(np.searchsorted(borders, values, side="right"), 5, mode="wrap")
+    interior = _interior(labels, reach=3) & sound
     classes = [values[interior & (labels == k)] for k in range(len(borders) + 1)]
-    classes = [grey for grey in classes if grey.size >= _MIN_PIXELS]
-    flat = [_is_flat(grey, float(np.ptp(values[sound]))) for grey in classes]
+    classes = [grey for grey in classes if grey.size >= 50]
+    contrast = float(np.ptp(values[sound]))
+    is_flat = [_is_flat(grey, contrast) for grey in classes]
+    if all(is_flat):  # a clean image
+        return
     for end in (float(values[sound].min()), float(values[sound].max())):
-        for grey, is_flat in zip(classes, flat, strict=True):
+        for grey in classes:
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
-            pile = counts[0] / grey.size if distance[0] == 0 else 0.0
-            next_value = counts[1] / grey.size if len(counts) > 1 else 0.0
-            is_clipped = pile >= _MIN_PILE and pile > _STEEPEST * next_value
-            if is_clipped and not (is_flat and all(flat)):  # all flat: a clean image
-                what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
+            at_end = counts[0] / grey.size if distance[0] == 0 else 0.0
+            next_to_end = counts[1] / grey.size if len(counts) > 1 else 0.0
+            if at_end >= 0.01 and at_end > 3.0 * next_to_end:
+                what = f"{at_end:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"
                 raise RefusedError("image", what, "grey values that are not clipped", cure)
 
 
 def _is_flat(grey: Array, contrast: float) -> bool:
-    """Whether a class has one grey value, or up to three distant ones, as in a clean image."""
+    """Return whether a class has one grey value, or up to three distant ones, as in a clean image.
+
+    These take 95 % of its pixels. Where particles meet, a blurred image has others. Distant grey
+    values are apart by 5 % of the contrast.
+
+    Args:
+        grey: Grey values of the pixels of the class.
+        contrast: Range of the grey values of the image.
+    """
     values, counts = np.unique(grey, return_counts=True)
-    order = np.argsort(-counts)[:_MAX_FLAT]  # of the most frequent values
-    fractions = counts[order] / grey.size
-    are_distant = (np.diff(np.sort(values[order])) >= _FLAT_GAP * contrast).all()
-    return bool(fractions[0] >= _FLAT or (are_distant and fractions.sum() >= _FLAT))
+    most_frequent = np.argsort(-counts)[:3]
+    fractions = counts[most_frequent] / grey.size
+    gaps = np.diff(np.sort(values[most_frequent]))
+    are_distant = (gaps >= 0.05 * contrast).all()
+    return bool(fractions[0] >= 0.95 or (are_distant and fractions.sum() >= 0.95))
 
 
-def _fit_light(
-    values: Array, labels: Ints, shapes: Array, classes: int
-) -> tuple[Array, Array, float]:
-    """Fit levels (classes,), light (rows, columns) and noise by least squares without outliers."""
+class _LightFit(NamedTuple):
+    """Levels of the classes, shape (classes,), light (rows, columns), and noise of an image."""
+
+    levels: Array
+    light: Array
+    noise: float
+
+
+def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int) -> _LightFit:
+    """Fit levels, light and noise of an image by least squares without outliers.
+
+    Pixels are left out whose residual is above three standard deviations of the noise, and those
+    near borders of classes.
+
+    Args:
+        values: Grey values, shape (rows, columns).
+        labels: Class of each pixel, same shape.
+        polynomials: Polynomials of the light, shape (pixels, 5).
+        classes: Number of classes.
+
+    Raises:
+        RefusedError: A class has no pixel.
+    """
     inner = _inner_pixels(labels, classes).ravel()
-    columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
-    flat, used = values.ravel(), inner
-    rounding = _EXACT * float(np.abs(flat).max())
+    columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), polynomials])
+    flat = values.ravel()
+    rounding = _rounding(flat)
+    used = inner
     for _ in range(3):
-        fit = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
-        residual = np.abs(flat - columns @ fit)
-        median, high = np.quantile(residual[inner], (0.5, _NOISE_QUANTILE))
-        limit = max(_NEAR * _OF_NORMAL * float(median), float(high), rounding)
+        coefficients = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
+        residual = np.abs(flat - columns @ coefficients)
+        # A normal noise has 1.4826 times the median residual as its standard deviation. Grey values
+        # that are whole numbers may have the median 0, and then a higher quantile counts.
+        median, high = np.quantile(residual[inner], (0.5, 0.9))
+        limit = max(3.0 * 1.4826 * float(median), float(high), rounding)
         used = inner & (residual <= limit)
-    noise, light = float(np.sqrt(np.mean(residual[used] ** 2))), shapes @ fit[classes:]
+    noise = float(np.sqrt(np.mean(residual[used] ** 2)))
+    light = polynomials @ coefficients[classes:]
     light[np.abs(light) < rounding] = 0.0
-    return fit[:classes], light.reshape(values.shape), noise if noise > rounding else 0.0
+    return _LightFit(
+        levels=coefficients[:classes],
+        light=light.reshape(values.shape),
+        noise=noise if noise > rounding else 0.0,
+    )
 
 
 def _inner_pixels(labels: Ints, classes: int) -> Mask:
-    """Mask of pixels 3 pixels from other classes, or nearer until a tenth of each class is left."""
+    """Return the pixels that are 3 pixels from other classes, shape (rows, columns).
+
+    They are nearer if less than a tenth of some class would be left.
+
+    Args:
+        labels: Class of each pixel, shape (rows, columns).
+        classes: Number of classes.
+
+    Raises:
+        RefusedError: A class has no pixel.
+    """
     counts = np.bincount(labels.ravel(), minlength=classes)
-    value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
-    require(counts.all(), "threshold", value=value, allowed=allowed)
-    for reach in range(_BORDER, 0, -1):
+    value = "beyond the grey values of a class"
+    require(counts.all(), "threshold", value, allowed="values that leave each class some pixels")
+    for reach in (3, 2, 1):
         inner = _interior(labels, reach)
-        if (np.bincount(labels[inner], minlength=classes) >= _ENOUGH * counts).all():
+        if (np.bincount(labels[inner], minlength=classes) >= 0.1 * counts).all():
             return inner
     return np.ones(labels.shape, bool)
 
 
 def _interior(labels: Ints, reach: int) -> Mask:
-    """Mask of the pixels with no other class within `reach` pixels."""
-    low, high = (f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter))
-    return np.asarray(low == high)
+    """Return the pixels with no other class within `reach` pixels, the image repeated."""
+    lowest = minimum_filter(labels, 2 * reach + 1, mode="wrap")
+    highest = maximum_filter(labels, 2 * reach + 1, mode="wrap")
+    return np.asarray(lowest == highest)
