@@ -67,7 +67,8 @@ class Boxes:
         Args:
             axis: Index of the parameter.
         """
-        low, high = self.lower[0, axis], self.upper[0, axis]
+        low = self.lower[0, axis]
+        high = self.upper[0, axis]
         middle = (low + high) / 2
         # Frequencies are powers of stiffnesses and masses, so that the geometric mean divides their
         # ranges better. It differs noticeably for a large ratio of the ends only (tuned).
@@ -123,7 +124,8 @@ class Boxes:
         The shape is (points, parameters). With many parameters there are two opposite corners and
         random ones.
         """
-        d, max_corners = len(self.names), 16
+        d = len(self.names)
+        max_corners = 16
         if 2**d <= max_corners:
             ends = corners(-np.ones(d), np.ones(d))
         else:

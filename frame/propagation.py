@@ -283,7 +283,8 @@ def _require_range(system: StructureModel, name: str, low: float, high: float) -
     Raises:
         RefusedError: It is not.
     """
-    key, shown = f"support of {name}", f"[{low:g}, {high:g}]"
+    key = f"support of {name}"
+    shown = f"[{low:g}, {high:g}]"
     parameter = system.parameter(name)
     require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
     # A support whose values all are 500 times larger or smaller than the own value of the
