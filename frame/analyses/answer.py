@@ -55,12 +55,15 @@ class Answer(ABC):
 
     def nature_text(self, nature: Nature) -> str:
         """Return the guarantee of a bound as text, with the enclosing box if there is one."""
-        return f"{nature} {of_enclosing_box(self.encloses)}" if self.encloses else str(nature)
+        if self.encloses:
+            return f"{nature} {of_enclosing_box(self.encloses)}"
+        return str(nature)
 
     def all_words(self) -> str:
         """Return the sentences of `words`, and those on the enclosing box if there is one."""
-        box = f" {enclosing_box_words(self.encloses)}" if self.encloses else ""
-        return self.words() + box
+        if self.encloses:
+            return f"{self.words()} {enclosing_box_words(self.encloses)}"
+        return self.words()
 
     def __str__(self) -> str:
         """Return the question, the table and the sentences."""
@@ -86,8 +89,7 @@ class Answer(ABC):
         for title in rows[0]:
             column = [row[title] for row in rows]
             is_text = any(isinstance(value, str) for value in column)
-            values = [str(value) for value in column] if is_text else np.array(column, float)
-            variables[title] = ("row", values)
+            variables[title] = ("row", np.array(column, str if is_text else float))
         return xarray.Dataset(variables, attrs={"title": self.title, "notes": self.all_words()})
 
 

@@ -57,6 +57,16 @@ class LimitDecision(LimitResult):
     input_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def peak_bound(self) -> float:
+        """Guaranteed bound of the peak on the lowest level; NaN for an event."""
+        return np.nan if self.peak is None else float(self.peak.proved[0])
+
+    @property
+    def attained_peak(self) -> float:
+        """Attained value of the peak on the lowest level; NaN for an event."""
+        return np.nan if self.peak is None else float(self.peak.reached[0])
+
+    @property
     def verdict_words(self) -> str:
         """The verdict, with the lowest level for which it holds unless this is 0."""
         is_about_all = self.verdict in ("exceeded", "not exceeded")
@@ -67,11 +77,11 @@ class LimitDecision(LimitResult):
     @property
     def verdict_and_motion(self) -> str:
         """The verdict; if only some responses exceed the limit, with the inputs of one of them."""
-        inputs = {} if self.peak is None else self.peak.reached_at
-        if self.verdict != "can be exceeded" or not inputs:
+        is_by_some = self.verdict == "can be exceeded"
+        if not is_by_some or self.peak is None or not self.peak.reached_at:
             return self.verdict_words
         texts = []
-        for name, value in inputs.items():
+        for name, value in self.peak.reached_at.items():
             texts.append(f"{name} = {engineering(value, self.input_units.get(name, ''))}")
         if self.record:
             texts.append(f"record {self.record}")
@@ -87,12 +97,15 @@ class LimitDecision(LimitResult):
         """
         if not np.isfinite(value):
             return "not known"
-        if not self.is_event:
-            factor = 1.0 if self.stated_unit is None else self.stated_unit.factor
-            return self.text_of_value(rounded(factor * value, side, nature) / factor)
-        # Percentages have one decimal place: the third one of the fraction.
-        digits = 4 + floor(log10(abs(value))) if value else 1
-        return percent_text(rounded(value, side, nature, max(digits, 1)))
+        if self.is_event:
+            # Percentages have one decimal place: the third one of the fraction.
+            places_before = floor(log10(abs(value) or 1e-3))
+            return percent_text(rounded(value, side, nature, max(4 + places_before, 1)))
+        # The number that is shown is rounded, which is in the unit of the limit.
+        factor = 1.0
+        if self.stated_unit is not None:
+            factor = self.stated_unit.factor
+        return self.text_of_value(rounded(factor * value, side, nature) / factor)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,11 +131,12 @@ class Decision(Answer):
         """Return the texts of a row of the table by the titles of the columns."""
         bound_text = attained_text = gap = ""
         if part.peak is not None:
-            bound = float(part.peak.proved[0])
-            attained = float(part.peak.reached[0])
+            bound = part.peak_bound
+            attained = part.attained_peak
             bound_text = part.text_of(bound, part.peak.bound_side)
             if np.isfinite(bound):
-                bound_text = f"{'≥' if part.peak.is_least else '≤'} {bound_text}"
+                relation = {"lower": "≥", "upper": "≤"}[part.peak.bound_side]
+                bound_text = f"{relation} {bound_text}"
             attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
             if bound and np.isfinite(bound) and np.isfinite(attained):
                 gap = f"{abs((bound - attained) / bound):.1%}"
@@ -151,8 +165,8 @@ class Decision(Answer):
                 "least necessity": part.necessity[0],
                 "greatest necessity": part.necessity[1],
                 "least margin": known(part.margin.lower[0]),
-                "bound of peak": None if part.peak is None else known(part.peak.proved[0]),
-                "peak reached": None if part.peak is None else known(part.peak.reached[0]),
+                "bound of peak": known(part.peak_bound),
+                "peak reached": known(part.attained_peak),
             }
             for name, part in self.limits.items()
         ]
@@ -206,12 +220,9 @@ def decide(
     output_units = dict(units or {})
     farthest_record: Mapping[str, str] = {}
     if isinstance(response, Envelope):
-        outputs = [*map(str, response.outputs)]
-        named = limits_by_name(limits, outputs)
-        known_units = response.units or [Output(output).unit for output in outputs]
-        output_units |= dict(zip(outputs, known_units, strict=True))
-        limited = dict.fromkeys(limit.peak for limit in named.values())
-        found: Peaks = peaks(response, [*limited])
+        named = limits_by_name(limits, response.outputs)
+        output_units |= dict(zip(response.outputs, response.units, strict=False))
+        found: Peaks = peaks(response, [limit.peak for limit in named.values()])
     else:
         named = limits_by_name(limits, ())
         if isinstance(response, SuitePeaks):
@@ -231,7 +242,7 @@ def decide(
             input_units=input_units or {},
         )
     if len(decisions) > 1:
-        decisions[ANY] = _decide_any([*decisions.values()])
+        decisions[ANY] = _decide_any(list(decisions.values()))
     first = next(iter(found.values()))
     return Decision(first.alpha, decisions, encloses=first.encloses)
 
@@ -296,13 +307,14 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
     )
     necessity = (
         max(part.necessity[0] for part in single),
-        0.0 if possibility[1] < 1 else 1.0,
+        float(possibility[1] >= 1),
     )
-    # Margins as fractions of the limits; for a limit of 0 only their signs have a meaning.
-    margins = [
-        np.stack(part.margin) / abs(part.limit) if part.limit else np.sign(part.margin)
-        for part in single
-    ]
+    margins = []
+    for part in single:
+        margin = np.stack(part.margin)
+        # Margins as fractions of the limits; for a limit of 0 only their signs have a meaning.
+        margins.append(margin / abs(part.limit) if part.limit else np.sign(margin))
+    lower, upper = np.min(margins, axis=0)
     lowest_level = single[0].from_level
     is_exceeded = any(part.verdict in ("exceeded", "can be exceeded") for part in single)
     return LimitDecision(
@@ -310,7 +322,7 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
         is_event=True,
         possibility=possibility,
         necessity=necessity,
-        margin=Ends(*np.min(margins, axis=0)),
+        margin=Ends(lower, upper),
         verdict=_verdict(possibility, necessity, lowest_level, is_exceeded=is_exceeded),
         from_level=lowest_level,
         nature=Nature.weakest(part.nature for part in single),
@@ -347,4 +359,4 @@ def _lowest_excluding_level(alpha: Array, is_excluded: Mask) -> float:
         is_excluded: The mask, shape (levels,).
     """
     first = np.flatnonzero(~is_excluded).max(initial=-1) + 1
-    return float(alpha[first]) if first < len(alpha) else 1.0
+    return float(np.append(alpha, 1.0)[first])

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Mask
+from alphacut.base.arrays import Array
 from alphacut.base.errors import require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, subprogress
@@ -47,29 +47,6 @@ from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
-
-
-@dataclass(frozen=True)
-class TriedMeasures:
-    """Intensity measures of one record that were tried, and what the structures moved showed.
-
-    Args:
-        measure: The measures, rising, shape (measures,).
-        exceeded: Whether some structure of the cut, and whether all structures that were found,
-            exceed the limit; shape (2, levels, measures).
-    """
-
-    measure: Array
-    exceeded: Mask
-
-    @classmethod
-    def from_increments(cls, increments: Increments, name: str) -> TriedMeasures:
-        """Return what the demands of the limit or event with a name show.
-
-        A demand is the peak over the limit. The demand of a collapse is NaN, which exceeds every
-        limit.
-        """
-        return cls(increments.measure, ~(increments.demands[name] <= 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,18 +114,19 @@ class CriticalMeasures:
         )
 
     @classmethod
-    def from_demands(cls, records: Sequence[TriedMeasures]) -> CriticalMeasures:
+    def from_demands(cls, records: Sequence[Increments], name: str) -> CriticalMeasures:
         """Return the critical measures of a frame that yields, from the measures that were tried.
 
         The first crossing lies between `low` and `low_reached`, the last non-exceedance between
         `high_reached` and `high`. Those beyond the largest measure are infinite.
 
         Args:
-            records: Measures of each record. No structure exceeds the limit at the first one.
+            records: Demands under each record. No structure exceeds the limit at the first measure.
+            name: Name of the limit or event.
         """
         of_records = []
         for record in records:
-            by_some, by_all = record.exceeded
+            by_some, by_all = record.is_exceeded(name)
             count = len(record.measure)
             measure_or_infinite = np.append(record.measure, np.inf)
             # Index of the first measure at which some structure exceeds the limit, and of the first
@@ -227,24 +205,26 @@ class CriticalMeasures:
         return Ends(lower, np.where(is_known, deviation + distance, np.inf))
 
 
-def counts_between(records: Sequence[TriedMeasures], measure: Array) -> Ends:
+def counts_between(records: Sequence[Increments], name: str, measure: Array) -> Ends:
     """Return the number of records under which all, and under which some structures exceed.
 
     Between two measures that were tried, all structures are counted as exceeding the limit if they
     do so at both, and some structure if one does so at either.
 
     Args:
-        records: Measures of each record that were tried.
+        records: Demands at the measures of each record that were tried.
+        name: Name of the limit or event.
         measure: Measures at which the records are counted, shape (measures,).
 
     Returns:
         Both numbers, shape (levels, measures) each.
     """
-    shape = (records[0].exceeded.shape[1], len(measure))
+    n_levels = records[0].demands[name].shape[1]
+    shape = (n_levels, len(measure))
     count_all = np.zeros(shape)
     count_some = np.zeros(shape)
     for record in records:
-        by_some, by_all = record.exceeded
+        by_some, by_all = record.is_exceeded(name)
         after = np.searchsorted(record.measure, measure)
         before = np.maximum(after - 1, 0)
         after = np.minimum(after, len(record.measure) - 1)
@@ -295,7 +275,10 @@ class LimitFragility(LimitResult):
         low = self.critical.low[level]
         high = self.critical.high[level]
         curves = []
-        for end in [low] if np.array_equal(low, high) else [low, high]:
+        ends = [low, high]
+        if np.array_equal(low, high):
+            ends = [low]
+        for end in ends:
             logarithms = np.log(end)
             if np.isfinite(end).all() and np.ptp(logarithms) > 0:
                 deviation = logarithms.std(ddof=1)
@@ -375,15 +358,22 @@ class Fragility(Answer):
             for level, alpha in enumerate(self.alpha):
                 row = part.columns(name) | {"α": float(alpha)}
                 for title, ends in numbers.items():
-                    row[f"least {title}"] = None if ends is None else float(ends.lower[level])
-                    row[f"greatest {title}"] = None if ends is None else float(ends.upper[level])
+                    row |= {f"least {title}": None, f"greatest {title}": None}
+                    if ends is not None:
+                        row[f"least {title}"] = float(ends.lower[level])
+                        row[f"greatest {title}"] = float(ends.upper[level])
                 rows.append(row | {"nature": self.nature_text(part.nature)})
         return rows
 
     @property
     def _measure_title(self) -> str:
-        """Title of a column of intensity measures."""
-        return f"{self.measure} [{self.unit}]" if self.unit else "scale"
+        """Title of a column of intensity measures; "scale" has no unit."""
+        return f"{self.measure}{self._unit_title}"
+
+    @property
+    def _unit_title(self) -> str:
+        """Unit of the measure in the title of a column."""
+        return f" [{self.unit}]" if self.unit else ""
 
     def crossings(self) -> list[Record]:
         """Return a row for each limit, record and level of a frame that yields.
@@ -391,7 +381,7 @@ class Fragility(Answer):
         It has the measures of the first crossing and the last non-exceedance, and the sets of
         measures at which the limit is exceeded as texts.
         """
-        unit = f" [{self.unit}]" if self.unit else ""
+        unit = self._unit_title
         rows: list[Record] = []
         for name, part in self.limits.items():
             for column, (record, increments) in enumerate(self.increments.items()):
@@ -445,11 +435,12 @@ class Fragility(Answer):
 
     def words(self) -> str:
         """Return sentences on the measure, and on how to read the bands."""
-        spectral = ", a pseudo-acceleration with the structure's own damping"
+        measure = self.measure
+        if measure == "Sa(T1)":
+            measure += ", a pseudo-acceleration with the structure's own damping"
         text = (
-            f"Measure: {self.measure}{spectral if self.measure == 'Sa(T1)' else ''}"
-            f" (T1 = {self.period_s:.4g} s, ζ = {self.damping_ratio:.3g}, at the most"
-            " plausible inputs). α is a level of possibility, no probability."
+            f"Measure: {measure} (T1 = {self.period_s:.4g} s, ζ = {self.damping_ratio:.3g}, at"
+            " the most plausible inputs). α is a level of possibility, no probability."
             " The median is that of the sample of records; a lognormal fit has the geometric mean"
             " of their measures, and is drawn dotted."
         )
@@ -465,7 +456,7 @@ class Fragility(Answer):
             collapses = [
                 record
                 for record, increments in self.increments.items()
-                if not np.isfinite([*increments.demands.values()]).all()
+                if not all(np.isfinite(x).all() for x in increments.demands.values())
             ]
             if collapses:
                 text += f" A collapse exceeds every limit: under {', '.join(collapses)}."
@@ -546,7 +537,7 @@ def fragility(
         RefusedError: The structure does not start at rest or has forces, or a limit does not fit.
     """
     named = limits_by_name(limits, ())
-    require_fragile(model, [*named.values()])
+    require_fragile(model, list(named.values()))
     require_choice("intensity", intensity, MEASURES)
     peaks: SuitePeaks | None = None
     increments: dict[str, Increments] = {}
@@ -556,8 +547,8 @@ def fragility(
             model, inputs, records, named, intensity=intensity, most=most, step=step, alpha=alpha
         )
         for k, (name, analysis) in enumerate(analyses.items()):
-            ends = k / len(analyses), (k + 1) / len(analyses)
-            increments[name] = increments_of(analysis, named, subprogress(progress, *ends))
+            tick = subprogress(progress, k / len(analyses), (k + 1) / len(analyses))
+            increments[name] = increments_of(analysis, named, tick)
     else:
         peaks = over_records(
             model,
@@ -566,7 +557,7 @@ def fragility(
             duration=duration,
             step=step,
             alpha=alpha,
-            names=[*dict.fromkeys(limit.peak for limit in named.values())],
+            names=list(dict.fromkeys(limit.peak for limit in named.values())),
             progress=progress,
         )
     return fragility_of(
@@ -624,7 +615,7 @@ def incremental_analyses(
     The arguments are those of `fragility`, with the records in the place of the suite. Each record
     is divided by its intensity, so that the scale of an analysis is the intensity measure.
     """
-    names = [*limits]
+    names = list(limits)
     pairs = [(limit.output, limit.number) for limit in limits.values()]
     events = [[names.index(name) for name in members] for members in events_of(limits).values()]
     cuts = boxes(inputs, alpha)
@@ -674,13 +665,12 @@ def fragility_of(
         increments: Demands over the measure of each record, for a frame that yields.
     """
     events = events_of(limits)
-    tried: dict[str, list[TriedMeasures]] = {}
+    demands = list((increments or {}).values())
     critical: dict[str, CriticalMeasures] = {}
     natures: dict[str, Nature] = {}
-    if increments:
+    if demands:
         for name in (*limits, *events):
-            tried[name] = [TriedMeasures.from_increments(x, name) for x in increments.values()]
-            critical[name] = CriticalMeasures.from_demands(tried[name])
+            critical[name] = CriticalMeasures.from_demands(demands, name)
             natures[name] = Nature.ESTIMATED
     elif suite is not None:
         records = suite.by_record.values()
@@ -693,29 +683,31 @@ def fragility_of(
             critical[event] = CriticalMeasures.of_any([critical[member] for member in members])
             natures[event] = Nature.weakest(natures[member] for member in members)
 
-    parts = {}
+    about: dict[str, LimitResult] = {}
     for name, limit in limits.items():
-        about = LimitResult(
-            **limit_fields(limit, model.unit_of(limit.output)),
-            event_name=limit.event if limit.event in events else "",
+        about[name] = LimitResult(**limit_fields(limit, model.unit_of(limit.output)))
+    for event, members in events.items():
+        for name in members:
+            about[name] = replace(about[name], event_name=event)
+        about[event] = LimitResult(output=event_words(event), is_event=True)
+    parts = {}
+    for name in about:
+        measure = _grid(critical[name], demands)
+        counts = critical[name].counts(measure)
+        if demands:
+            counts = counts_between(demands, name, measure)
+        parts[name] = _limit_fragility(
+            about[name], natures[name], critical[name], measure, counts, independent=independent
         )
-        parts[name] = about
-    for event in events:
-        parts[event] = LimitResult(output=event_words(event), is_event=True)
     mode = nominal_mode(model)
     return Fragility(
-        encloses="" if suite is None else suite.encloses,
+        encloses=suite.encloses if suite is not None else "",
         alpha=np.array(alpha, float),
         measure=intensity,
         unit=MEASURES[intensity],
         period_s=mode.period,
         damping_ratio=mode.ratio,
-        limits={
-            name: _limit_fragility(
-                about, natures[name], critical[name], tried.get(name, []), independent=independent
-            )
-            for name, about in parts.items()
-        },
+        limits=parts,
         increments=dict(increments or {}),
     )
 
@@ -724,26 +716,28 @@ def _limit_fragility(
     about: LimitResult,
     nature: Nature,
     critical: CriticalMeasures,
-    tried: Sequence[TriedMeasures],
+    measure: Array,
+    counts: Ends,
     *,
     independent: bool,
 ) -> LimitFragility:
-    """Return the fragility of one limit or event from its critical measures.
+    """Return the fragility of one limit or event.
 
     Args:
         about: The limit or event.
         nature: Guarantee of the critical measures.
         critical: Critical measures of all records.
-        tried: Measures of each record that were tried, for a frame that yields; empty otherwise.
+        measure: Measures at which the fraction of the records is given, shape (measures,).
+        counts: Bounds of the number of records at these measures, shape (levels, measures) each.
         independent: Whether the records are independent draws.
     """
     n_records = critical.low.shape[1]
-    measure = _grid(critical, tried)
-    counts = counts_between(tried, measure) if tried else critical.counts(measure)
-    confidence = None
+    confidence = dispersion = None
     if independent:
         tail = (1 - CONFIDENCE) / 2
         confidence = clopper_pearson(counts.lower, counts.upper, n_records, tail)
+    if n_records > 1:
+        dispersion = critical.dispersion
     return LimitFragility(
         **vars(about),
         nature=nature,
@@ -752,7 +746,7 @@ def _limit_fragility(
         band=Ends(counts.lower / n_records, counts.upper / n_records),
         median=critical.median,
         lognormal_median=critical.lognormal_median,
-        dispersion=critical.dispersion if n_records > 1 else None,
+        dispersion=dispersion,
         confidence=confidence,
     )
 
@@ -762,16 +756,18 @@ def event_words(event: str) -> str:
     return f"{event.replace('<=', '≤').replace('>=', '≥')} everywhere"
 
 
-def _grid(critical: CriticalMeasures, tried: Sequence[TriedMeasures]) -> Array:
+def _grid(critical: CriticalMeasures, demands: Sequence[Increments]) -> Array:
     """Return measures that cover all finite critical ones, for bands and tables, shape (60,).
 
     If measures were tried, the grid ends with the largest one at the latest, and with this one if
     a critical measure lies beyond it.
     """
     is_finite = np.isfinite(critical.high)
-    largest = critical.high[is_finite].max() if is_finite.any() else critical.low_reached.max()
-    largest = 1.1 * float(largest)
-    if tried:
-        last_tried = float(tried[0].measure[-1])  # the same for all records
-        largest = min(largest, last_tried) if is_finite.all() else last_tried
+    largest = 1.1 * float(critical.high.max(initial=0.0, where=is_finite))
+    if not is_finite.any():
+        largest = 1.1 * float(critical.low_reached.max())
+    if demands:
+        largest_tried = float(demands[0].measure[-1])  # the same for all records
+        if not is_finite.all() or largest > largest_tried:
+            largest = largest_tried
     return np.linspace(0.8 * float(critical.low.min()), largest, 60, dtype=float)

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number, require
 from alphacut.base.number_text import Table, range_text
 from alphacut.base.progress_bar import Progress
@@ -192,7 +192,7 @@ class IncrementalAnalysis:
         first = self.elastic_scales(structures).min() / GRID_RATIO
         first = min(first, self.greatest_scale / 2)
         count = int(np.ceil(np.log(self.greatest_scale / first) / np.log(GRID_RATIO))) + 1
-        return [*map(float, np.geomspace(first, self.greatest_scale, count))]
+        return list(map(float, np.geomspace(first, self.greatest_scale, count)))
 
     def _peaks_over_limits(
         self, scale: float, points: Array, limits: Sequence[tuple[str, float]]
@@ -246,8 +246,8 @@ class IncrementalAnalysis:
         points = points[[row.tobytes() not in known_rows for row in points]]
         if len(points):
             new = self._peaks_over_limits(scale, points, self.limits)
-            of_events = [new[:, [*event]].max(axis=1) for event in self.events]
-            new = np.column_stack([new, *of_events])
+            for event in self.events:
+                new = np.column_stack([new, new[:, list(event)].max(axis=1)])
             self.moved[scale] = np.vstack([moved, points]), np.vstack([demands, new])
 
     def _extremes(self, scale: float) -> tuple[Array, Array]:
@@ -304,6 +304,16 @@ class Increments:
 
     measure: Array
     demands: dict[str, Array]
+
+    def is_exceeded(self, name: str) -> Mask:
+        """Return whether some structure, and whether all structures exceed a limit or event.
+
+        A collapse exceeds every limit.
+
+        Returns:
+            Mask, shape (2, levels, measures).
+        """
+        return ~(self.demands[name] <= 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -405,7 +415,7 @@ def incremental(
     allowed = "columns that yield"
     require(yields(model), "incremental", value=value, allowed=allowed)
     tried = np.unique([checked_number("scale", scale, positive=True) for scale in scales])
-    outputs = [*map(str, model.outputs)]
+    outputs = list(map(str, model.outputs))
     limits = [(output, 1.0) for output in outputs]
     cuts = boxes(inputs, alpha)
     peaks: dict[str, dict[str, Array]] = {}

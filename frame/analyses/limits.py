@@ -62,9 +62,8 @@ class Limit:
         """What is limited, by the word that a case file has for it."""
         if self.mean:
             return "mean"
-        if self.largest is None:
-            return ""
-        return "max" if self.largest else "min"
+        sides: dict[bool | None, Side] = {None: "", True: "max", False: "min"}
+        return sides[self.largest]
 
     @property
     def peak(self) -> str:
@@ -82,8 +81,8 @@ class Limit:
 
         A smallest value of q that falls below the limit L is a largest value of -q above -L.
         """
-        outwards = -self.number if self.side == "min" else self.number
-        return outwards + 0.0  # -0.0 becomes 0.0
+        sign = -1.0 if self.side == "min" else 1.0
+        return sign * self.number + 0.0  # -0.0 becomes 0.0
 
     @property
     def text(self) -> str:
@@ -114,8 +113,9 @@ def limits_by_name(
         RefusedError: There is no limit; a limit is given twice, names no output or is not finite; a
             limit of a magnitude is not positive; or `magnitudes` is violated.
     """
-    given = [limits] if isinstance(limits, Limit) else limits
-    single = [side for limit in given for side in limit.one_sided]
+    if isinstance(limits, Limit):
+        limits = [limits]
+    single = [side for limit in limits for side in limit.one_sided]
     require(bool(single), "limits", value=None, allowed='one limit or more: Limit("q3", 0.1)')
     for limit in single:
         if outputs:
@@ -124,7 +124,10 @@ def limits_by_name(
         checked_number(f"limit of {limit.peak}", limit.number, positive=is_magnitude)
 
     peaks = [limit.peak for limit in single]
-    named = {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in single}
+    named = {}
+    for limit in single:
+        is_only_one = peaks.count(limit.peak) == 1
+        named[limit.peak if is_only_one else limit.text] = limit
     texts = ", ".join(limit.text for limit in single)
     require(len(named) == len(single), "limits", value=texts, allowed="each limit once")
     if magnitudes:
@@ -166,9 +169,11 @@ class LimitResult:
         """The limit as text, such as "|drift1| ≤ 1 % (30.00 mm)", or the text of the event."""
         if self.is_event:
             return self.output
-        output = f"|{self.output}|" if self.side in ("", "mean") else self.output
-        relation = "≥" if self.side == "min" else "≤"
-        return f"{self.side} {output} {relation} {self.value_words}".strip()
+        if self.side == "min":
+            return f"min {self.output} ≥ {self.value_words}"
+        if self.side == "max":
+            return f"max {self.output} ≤ {self.value_words}"
+        return f"{self.side} |{self.output}| ≤ {self.value_words}".strip()
 
     @property
     def value_words(self) -> str:
@@ -178,7 +183,9 @@ class LimitResult:
             return in_si
         stated = re.sub(r"-(?=[\d.])", MINUS, self.stated)
         is_fraction = stated.endswith("%") or re.fullmatch(r"1\s*/\s*\d+", stated)
-        return f"{stated} ({in_si})" if is_fraction and self.unit else stated
+        if is_fraction and self.unit:
+            return f"{stated} ({in_si})"
+        return stated
 
     @property
     def stated_unit(self) -> ShownUnit | None:
@@ -192,13 +199,15 @@ class LimitResult:
     def text_of_value(self, value: float) -> str:
         """Return the text of a value of the output, given in SI, in the unit of the limit."""
         unit = self.stated_unit
-        return engineering(value, self.unit) if unit is None else unit.text(value)
+        if unit is None:
+            return engineering(value, self.unit)
+        return unit.text(value)
 
     @property
     def event(self) -> str:
         """Text of the event that the limit is exceeded, such as "|drift1| > 40.00 mm"."""
-        words = f"{self.output} exceeded" if self.is_event else self.words
-        return words.translate({ord("≤"): ">", ord("≥"): "<"})
+        words = self.words.replace("≤", ">").replace("≥", "<")
+        return f"{words} exceeded" if self.is_event else words
 
     def columns(self, name: str) -> Record:
         """Return the first columns of a row of numbers about the limit with a name."""

@@ -7,7 +7,7 @@ part of the guaranteed bounds, and of the error of all others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -81,23 +81,28 @@ class Peak:
 
     def __post_init__(self) -> None:
         """Make unknown values infinite and compute `proved`."""
-        sign = -1.0 if self.is_least else 1.0  # of values that are far out
+        far_out = self.outward_sign * np.inf
         values_that_say_nothing = {
             "lower": -np.inf,
             "upper": np.inf,
-            "reached": -sign * np.inf,
-            "least_lower": -sign * np.inf,
-            "least_upper": sign * np.inf,
+            "reached": -far_out,
+            "least_lower": -far_out,
+            "least_upper": far_out,
         }
         for name, unknown in values_that_say_nothing.items():
             values = np.asarray(getattr(self, name), float)
             object.__setattr__(self, name, np.where(np.isnan(values), unknown, values))
-        object.__setattr__(self, "proved", sign * self.max_peak_bounds.upper + 0.0)
+        object.__setattr__(self, "proved", self.outward_sign * self.max_peak_bounds.upper + 0.0)
 
     @property
     def is_least(self) -> bool:
         """Whether it is the smallest value of an output."""
         return self.side == "min"
+
+    @property
+    def outward_sign(self) -> float:
+        """Sign of the direction in which peaks are farther out: -1 for a smallest value, else 1."""
+        return -1.0 if self.is_least else 1.0
 
     @property
     def bound_side(self) -> Literal["lower", "upper"]:
@@ -107,7 +112,8 @@ class Peak:
     @property
     def far_end(self) -> Array:
         """Bound of the peaks that are farthest out on each level, shape (levels,)."""
-        return self.lower if self.is_least else self.upper
+        ends: Array = getattr(self, self.bound_side)
+        return ends
 
     @property
     def outwards(self) -> Peak:
@@ -115,26 +121,28 @@ class Peak:
         return mirrored(self) if self.is_least else self
 
     @property
-    def _exclusion_error(self) -> Array | float:
-        """Distance beyond `upper`, or below `lower`, that excludes any peak.
+    def _excluding_error(self) -> Array:
+        """Distance outside `lower` and `upper` beyond which peaks are excluded, (levels,).
 
         It is infinite for attained bounds, which exclude nothing.
         """
-        return np.inf if self.nature is Nature.ATTAINED else self.error
+        if self.nature is Nature.ATTAINED:
+            return np.full_like(self.error, np.inf)
+        return self.error
 
     @property
     def max_peak_bounds(self) -> Ends:
         """Lower and upper bound of the largest peak of each cut, of `outwards`."""
         if self.is_least:
             return self.outwards.max_peak_bounds
-        return Ends(self.reached, self.upper + self._exclusion_error)
+        return Ends(self.reached, self.upper + self._excluding_error)
 
     @property
     def min_peak_bounds(self) -> Ends:
         """Lower and upper bound of the smallest peak of each cut, of `outwards`."""
         if self.is_least:
             return self.outwards.min_peak_bounds
-        below = self.lower - self._exclusion_error
+        below = self.lower - self._excluding_error
         lower_bound = np.maximum(np.maximum(below, _smallest_peak(self.side)), self.least_lower)
         # Each cut contains the narrowest one. The smallest peak of a cut is therefore at most the
         # largest peak of the narrowest cut.
@@ -150,8 +158,9 @@ class Peak:
         """
         bound = float(self.far_end[0])
         attained = float(self.reached[0])
-        has_gap = self.nature is Nature.GUARANTEED and np.isfinite(attained)
-        width = abs(bound - attained) if has_gap else float(self.error[0])
+        width = float(self.error[0])
+        if self.nature is Nature.GUARANTEED and np.isfinite(attained):
+            width = abs(bound - attained)
         return self.between_nodes > max(width / 2, WIDENING * abs(bound))
 
     @property
@@ -203,34 +212,39 @@ def peaks(band: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
 def _peak_of(band: Envelope, name: str) -> Peak:
     """Return the fuzzy peak with a name, such as "q3" or "min q3", of an envelope."""
     output = output_of(name)
-    column = [*map(str, band.outputs)].index(output)
-    nature = band.natures[column] if band.natures else band.nature
+    column = band.column(output)
+    nature = band.nature_of(output)
     is_guaranteed = nature is Nature.GUARANTEED
-    is_magnitude = name == output
-    smallest = _smallest_peak("" if is_magnitude else "max")
+    side: Literal["", "max"] = "" if name == output else "max"
+    smallest = _smallest_peak(side)
 
     # Bounds of |q|, q or -q at the time nodes, shape (levels, times). Guaranteed bounds contain
     # the error.
     ends = _oriented(band.lower[..., column], band.upper[..., column], name)
     attained = _oriented(band.attained.lower[..., column], band.attained.upper[..., column], name)
-    error = 0.0 if is_guaranteed else band.error[..., column]
-    between = None if band.between is None else band.between[:, column]
+    error: Array = np.zeros(ends.upper.shape)
+    if not is_guaranteed:
+        error = band.error[..., column]
+    between: Array = np.zeros(len(band.time))
+    if band.between is not None:
+        between = band.between[:, column]
 
     # The largest peak of each cut, and bounds of it at the nodes and within the steps.
     upper = ends.upper.max(axis=1)
     lower = ends.lower.max(axis=1)
     bound_at_nodes = ends.upper + error
     bound = within_steps(bound_at_nodes, between).max(axis=1)
-    if band.searched_peaks is not None and is_magnitude:
-        is_at_nodes = name.rstrip("0123456789") in AT_NODES
-        added = bound - bound_at_nodes.max(axis=1) if is_at_nodes else np.zeros_like(bound)
+    if band.searched_peaks is not None and not side:
+        added = np.zeros_like(bound)
+        if name.rstrip("0123456789") in AT_NODES:
+            added = bound - bound_at_nodes.max(axis=1)
         return _searched_peak(band.searched_peaks, column, added)
 
     # The smallest peak of each cut. A peak is no smaller than the magnitude at any node.
     below = lower - np.maximum(ends.lower - error, smallest).max(axis=1)
     least_lower = np.full_like(upper, smallest)
     least_upper = np.full_like(upper, np.inf)
-    if band.least_peaks is not None and is_magnitude:
+    if band.least_peaks is not None and not side:
         least_lower = band.least_peaks.lower[:, column]
         least_upper = band.least_peaks.upper[:, column]
 
@@ -245,17 +259,19 @@ def _peak_of(band: Envelope, name: str) -> Peak:
         least_lower = np.maximum(least_lower, lower - below)
 
     reached = np.fmax(attained.upper, smallest).max(axis=1)  # NaN where none is known
+    if band.encloses:
+        reached = np.full_like(upper, -np.inf)
     peak = Peak(
         alpha=np.asarray(band.alpha),
         lower=lower,
         upper=upper,
         error=peak_error,
-        reached=np.full_like(upper, -np.inf) if band.encloses else reached,
+        reached=reached,
         least_lower=least_lower,
         least_upper=least_upper,
         nature=nature,
         between_nodes=float(bound[0] - bound_at_nodes[0].max()),
-        side="" if is_magnitude else "max",
+        side=side,
         reached_at=_inputs_at_peak(band, column, name),
         encloses=band.encloses,
     )
@@ -342,25 +358,40 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 def _tighter(first: Peak, second: Peak) -> Peak:
     """Return the combined bounds of two analyses of a peak that is no smallest value."""
-    strength = [*Nature]
-    better = max(first, second, key=lambda x: (strength.index(x.nature), -x.error.max()))
-    rules: dict[str, np.ufunc] = {
-        "reached": np.maximum,
-        "least_lower": np.maximum,
-        "least_upper": np.minimum,
-    }
+    both = [first, second]
+    strength = list(Nature)
+    better = max(both, key=lambda peak: (strength.index(peak.nature), -peak.error.max()))
+    found = with_combined(better, both, np.max, "reached", "least_lower")
+    found = with_combined(found, both, np.min, "least_upper")
     natures = {first.nature, second.nature}
     if natures == {Nature.GUARANTEED}:
-        rules |= {"lower": np.maximum, "upper": np.minimum}
+        found = with_combined(found, both, np.max, "lower")
+        found = with_combined(found, both, np.min, "upper")
     elif natures == {Nature.ATTAINED}:
-        rules |= {"lower": np.minimum, "upper": np.maximum, "error": np.maximum}
+        found = with_combined(found, both, np.min, "lower")
+        found = with_combined(found, both, np.max, "upper", "error")
+    between_nodes = better.between_nodes
+    if len(natures) == 1 and better.nature is not Nature.ESTIMATED:
+        between_nodes = min(both, key=lambda peak: peak.upper[0]).between_nodes
+    farther = max(both, key=lambda peak: peak.reached[0])
+    return replace(found, between_nodes=between_nodes, reached_at=farther.reached_at)
+
+
+def with_combined(
+    peak: Peak, peaks: Sequence[Peak], rule: Callable[..., Array], *names: str
+) -> Peak:
+    """Return a peak with arrays that are combined from those of several peaks.
+
+    Args:
+        peak: Peak whose other fields are kept.
+        peaks: The peaks that are combined.
+        rule: Function of the stacked arrays and of `axis`, such as `np.max`.
+        names: Names of the arrays.
+    """
     changes: dict[str, Any] = {}
-    for name, rule in rules.items():
-        changes[name] = rule(getattr(first, name), getattr(second, name))
-    if "upper" in changes:
-        changes["between_nodes"] = min(first, second, key=lambda x: x.upper[0]).between_nodes
-    farther = first if first.reached[0] >= second.reached[0] else second
-    return replace(better, reached_at=farther.reached_at, **changes)
+    for name in names:
+        changes[name] = rule([getattr(x, name) for x in peaks], axis=0)
+    return replace(peak, **changes)
 
 
 def close_peaks(

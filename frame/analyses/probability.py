@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -201,7 +202,8 @@ def probability(
 
     # Without fuzzy inputs, one parameter with its own value gives a box of one point.
     crisp = {name: Crisp(x) for name, x in model.parameters.items() if name not in random}
-    cuts = boxes(inputs or dict([*crisp.items()][:1]), alpha)
+    first = dict(islice(crisp.items(), 1))
+    cuts = boxes(inputs or first, alpha)
     flow = make_flow(model, (*cuts.names, *random), duration, step)
     points_of_levels = [_points_of_cut(cuts, level) for level in range(len(cuts.alpha))]
     level_of_points = np.repeat(np.arange(len(cuts.alpha)), [len(x) for x in points_of_levels])
@@ -209,8 +211,8 @@ def probability(
 
     # 4 points of the lowest level with 4 draws each show the errors of the time steps (tuned).
     some_points = points_of_levels[0][:: -(-len(points_of_levels[0]) // 4)]
-    some_inputs = np.array([[*point, *draw] for point in some_points for draw in draws[:4]])
-    columns = [[*map(str, model.outputs)].index(name) for name in named]
+    some_inputs = np.concatenate([_joined(point, draws[:4]) for point in some_points])
+    columns = [flow.outputs.index(name) for name in named]
     ratios = _peak_ratios(
         flow,
         points,
@@ -253,8 +255,9 @@ def _random_draws(random: Mapping[str, FuzzyNumber | Sampler], samples: int, see
     rng = np.random.default_rng(seed)
     columns = []
     for name, number in random.items():
-        draw = shaped_like(number) if isinstance(number, FuzzyNumber) else number
-        values = np.asarray(draw(rng, samples), float)
+        if isinstance(number, FuzzyNumber):
+            number = shaped_like(number)
+        values = np.asarray(number(rng, samples), float)
         is_sample = values.shape == (samples,) and bool(np.isfinite(values).all())
         allowed = f"{samples} finite numbers"
         require(is_sample, f"values of {name}", value=values.shape, allowed=allowed)
@@ -268,7 +271,9 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     The cumulative integral of the membership function is inverted by linear interpolation on a fine
     grid.
     """
-    grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
+    support = number.support
+    uniform = np.linspace(support.lower, support.upper, 4001)
+    grid = np.unique(np.append(uniform, number.cuts[1:]))
     membership = number.membership(grid)
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2
     integral = np.concatenate([[0.0], np.cumsum(areas)])
@@ -289,6 +294,14 @@ def _points_of_cut(cuts: Boxes, level: int) -> Array:
     if len(lower) <= 8:
         inner = np.vstack([corners(lower, upper), inner])
     return np.asarray(cuts.to_physical(inner))
+
+
+def _joined(point: Array, draws: Array) -> Array:
+    """Return the fuzzy inputs of a point followed by the random inputs of each draw.
+
+    The shape is (draws, fuzzy and random inputs).
+    """
+    return np.hstack([np.tile(point, (len(draws), 1)), draws])
 
 
 def _step_error(flow: Flow, points: Array) -> Array:
@@ -341,16 +354,16 @@ def _peak_ratios(
         progress: Called with the completed fraction.
     """
     of_points = []
-    for count, point in enumerate(points, start=1):
-        inputs = np.hstack([np.tile(point, (len(draws), 1)), draws])
-        magnitudes = np.abs(flow.values(inputs)[:, :, columns]).swapaxes(1, 2)
+    for k in range(len(points)):
+        magnitudes = np.abs(flow.values(_joined(points[k], draws))[:, :, columns]).swapaxes(1, 2)
         low = np.maximum(magnitudes - step_error, 0.0)  # (draws, limits, times)
         high = magnitudes + step_error
         bounds = (low, high, within_steps(high, between))
         of_points.append([bound.max(axis=-1) / limits for bound in bounds])
         if progress:
-            progress(count / len(points))
-    return PeakRatios(*np.moveaxis(np.array(of_points), 1, 0))
+            progress((k + 1) / len(points))
+    lower, upper, at_all_times = np.moveaxis(np.array(of_points), 1, 0)
+    return PeakRatios(lower, upper, at_all_times)
 
 
 def _limit_probability(
@@ -374,10 +387,8 @@ def _limit_probability(
     high = at_nodes.upper
     fractions = _fractions_above(ratios.within_steps, np.ones(1))
     within_steps = _bounds_over_points(fractions, level)
-    added = (
-        within_steps.lower[:, 0] - lower_at_nodes,
-        within_steps.upper[:, 0] - high[:, -1],
-    )
+    added_to_lower = within_steps.lower[:, 0] - lower_at_nodes
+    added_to_upper = within_steps.upper[:, 0] - high[:, -1]
     interval = Ends(lower_at_nodes, high[:, -1])
     if is_random:
         # Either limit at each point is missed with this probability; by the inequality of
@@ -394,7 +405,7 @@ def _limit_probability(
         **vars(about),
         lower=low[:, -1],
         upper=high[:, -1],
-        error=np.maximum(*added),
+        error=np.maximum(added_to_lower, added_to_upper),
         interval=interval,
         curve=Curve(limits[:-1] * about.limit, low[:, :-1], high[:, :-1]),
     )

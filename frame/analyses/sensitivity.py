@@ -90,7 +90,7 @@ def sensitivity(
         reached_at: By output, inputs at which the peak of the output is known to be large. The
             search begins there, or at the nominal values where nothing is given.
     """
-    outputs = [*map(str, model.outputs)]
+    outputs = list(map(str, model.outputs))
     flow = make_flow(model, tuple(inputs), duration, step)
     start = np.empty((len(outputs), len(inputs)))
     for row, output in zip(start, outputs, strict=True):

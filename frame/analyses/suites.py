@@ -15,7 +15,7 @@ from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
-from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored
+from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored, with_combined
 from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -231,11 +231,14 @@ class SuitePeaks(Answer):
             unit = self.units[output_of(name)]
             ends = range_text(float(peak.lower[0]), float(peak.upper[0]), peak.nature)
             attained = float(peak.reached[0])
+            attained_text = "not known"
+            if np.isfinite(attained):
+                attained_text = engineering(attained, unit)
             row = {
                 "peak of": name,
                 f"at α = {self.alpha[0]:g}": f"{ends} {unit}".strip(),
                 "nature": self.nature_text(peak.nature),
-                "reached": engineering(attained, unit) if np.isfinite(attained) else "not known",
+                "reached": attained_text,
                 "record": self.farthest_record.get(name, ""),
             }
             rows.append(row)
@@ -350,7 +353,7 @@ def summarised(
         bounds = np.stack([found[name].proved for found in peaks.values()])  # (records, levels)
         # 84 % is one standard deviation of a normal distribution above the mean. The quantiles of
         # smallest values are counted from above.
-        sign = -1.0 if peak.is_least else 1.0
+        sign = peak.outward_sign
         statistics[name] = {
             "mean": bounds.mean(axis=0),
             "median": np.median(bounds, axis=0),
@@ -384,16 +387,11 @@ def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
     for name, first in next(iter(peaks.values())).items():
         of_records = [found[name].outwards for found in peaks.values()]
         farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
-        found = replace(
-            farthest,
-            nature=Nature.weakest(peak.nature for peak in of_records),
-            lower=np.max([peak.lower for peak in of_records], axis=0),
-            upper=np.max([peak.upper for peak in of_records], axis=0),
-            error=np.max([peak.error for peak in of_records], axis=0),
-            reached=np.max([peak.reached for peak in of_records], axis=0),
-            least_lower=np.max([peak.least_lower for peak in of_records], axis=0),
-            least_upper=np.max([peak.least_upper for peak in of_records], axis=0),
-        )
+        nature = Nature.weakest(peak.nature for peak in of_records)
+        found = with_combined(
+            replace(farthest, nature=nature), of_records, np.max,
+            "lower", "upper", "error", "reached", "least_lower", "least_upper",
+        )  # fmt: skip
         largest[name] = mirrored(found) if first.is_least else found
     return largest
 
@@ -421,9 +419,10 @@ def mean_peaks(
     magnitudes = tuple(name for name in peaks[records[0].name] if name == output_of(name))
     cuts = boxes(inputs, alpha)
     points = [cuts.nominal]
-    for ends in zip(cuts.lower, cuts.upper, strict=True):
+    for lower, upper in zip(cuts.lower, cuts.upper, strict=True):
         # At most 64 corners of each cut (tuned: more take time, and none is a bound).
-        points += map(np.array, islice(product(*np.transpose(ends)), 64))
+        ends_of_inputs = np.column_stack([lower, upper])
+        points += map(np.array, islice(product(*ends_of_inputs), 64))
     tried = np.unique(points, axis=0)
     is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
     is_in_cut = is_inside.all(axis=-1)  # (levels, structures)
@@ -432,18 +431,18 @@ def mean_peaks(
     for record in records:
         moved = model.moved_by(record.ground).with_outputs(magnitudes)
         flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
-        columns = [[*map(str, flow.outputs)].index(output) for output in magnitudes]
+        columns = [flow.outputs.index(output) for output in magnitudes]
         tried_means += np.abs(flow.values(tried)).max(axis=1)[:, columns] / len(records)
 
     found: dict[str, Peak] = {}
     for name, means in zip(magnitudes, tried_means.T, strict=True):
         of_records = [by_name[name] for by_name in peaks.values()]
-        lower = np.mean([peak.lower for peak in of_records], axis=0)
-        error = np.mean([peak.error for peak in of_records], axis=0)
-        least_lower = np.mean([peak.least_lower for peak in of_records], axis=0)
+        mean = with_combined(
+            of_records[0], of_records, np.mean, "lower", "upper", "error", "least_lower"
+        )
         # Any structure of a cut has at least the mean of the smallest peaks of this cut. Each cut
         # contains all higher ones.
-        mean_of_smallest = np.maximum(lower - error, least_lower)
+        mean_of_smallest = np.maximum(mean.lower - mean.error, mean.least_lower)
         of_higher_cuts = np.maximum.accumulate(mean_of_smallest[::-1])[::-1]
         in_cuts = np.where(is_in_cut, means, -np.inf)
         reached = np.maximum(of_higher_cuts, in_cuts.max(axis=1))
@@ -451,17 +450,13 @@ def mean_peaks(
         reached_at = dict(zip(cuts.names, farthest, strict=True))
         if of_records[0].encloses:
             # No structure of the box is known to belong to the enclosed set.
-            reached = np.full_like(lower, -np.inf)
+            reached = np.full_like(reached, -np.inf)
             reached_at = {}
         found[f"mean {name}"] = replace(
-            of_records[0],
+            mean,
             nature=Nature.weakest(peak.nature for peak in of_records),
-            lower=lower,
-            upper=np.mean([peak.upper for peak in of_records], axis=0),
-            error=error,
             reached=reached,
-            least_lower=least_lower,
-            least_upper=np.full_like(lower, np.inf),  # no structure is known to have a small mean
+            least_upper=np.full_like(reached, np.inf),  # no structure has a known small mean
             reached_at=reached_at,
         )
     return found

@@ -111,8 +111,10 @@ class Tolerances(Answer):
             return "not known"
         if self.passed is None:
             return "none is exceeded"
-        clear = "" if self.clear is None else f"no exceedance found up to {self.clear:.4g}, "
-        return f"{clear}exceeded at {self.passed:.4g}"
+        exceeded = f"exceeded at {self.passed:.4g}"
+        if self.clear is None:
+            return exceeded
+        return f"no exceedance found up to {self.clear:.4g}, {exceeded}"
 
     def records(self) -> list[Record]:
         """Return a row with the scale, then a row with the support of each input."""
@@ -132,12 +134,14 @@ class Tolerances(Answer):
             row = scale | {
                 "quantity": name,
                 "unit": support.unit,
-                "from": None if self.kept is None else support.kept[0],
-                "to": None if self.kept is None else support.kept[1],
+                "from": None,
+                "to": None,
                 "from in the case": support.own[0],
                 "to in the case": support.own[1],
                 "most plausible": support.nominal,
             }
+            if self.kept is not None:
+                row["from"], row["to"] = support.kept
             rows.append(row)
         return rows
 
@@ -218,7 +222,9 @@ def tolerances(
     model = model.with_outputs(tuple(largest_allowed))
     require_admissible_scale(model, inputs, most)
     # Peaks by the scales that were tried.
-    tried = {1.0: at_one} if at_one is not None and most >= 1 else {}
+    tried: dict[float, Peaks] = {}
+    if at_one is not None and most >= 1:
+        tried[1.0] = at_one
 
     def peaks_at(scale: float) -> Peaks:
         if scale not in tried:
@@ -273,10 +279,13 @@ def tolerances(
             own=(own.lower, own.upper),
             kept=(scaled.support.lower, scaled.support.upper),
         )
+    peaks_at_one = {}
+    if 1.0 in tried:
+        peaks_at_one = {name: tried[1.0][name] for name in largest_allowed}
     return Tolerances(
         encloses=encloses,
         limits=largest_allowed,
-        peaks={name: tried[1.0][name] for name in largest_allowed} if 1.0 in tried else {},
+        peaks=peaks_at_one,
         kept=kept if is_excluded(kept) else None,
         clear=clear,
         passed=passed if np.isfinite(passed) else None,

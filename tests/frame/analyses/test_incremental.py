@@ -15,13 +15,14 @@ from alphacut.frame import (
     incremental,
     over_records,
 )
-from alphacut.frame.analyses.fragility import CriticalMeasures, TriedMeasures, counts_between
+from alphacut.frame.analyses.fragility import CriticalMeasures, counts_between
 from alphacut.frame.analyses.incremental import (
     ALL,
     GRID_RATIO,
     RESOLUTION,
     SOME,
     IncrementalAnalysis,
+    Increments,
 )
 from alphacut.frame.analyses.peaks import peaks
 from alphacut.frame.boxes import boxes
@@ -34,11 +35,11 @@ STEADY = Accelerogram(0.1, np.ones(60))
 def tried_in(*case):
     """What the structures that an analysis moves show of its first limit."""
     scales, demands = IncrementalAnalysis(*case).run()
-    return [TriedMeasures(scales, ~(demands[:, :, 0] <= 1))]
+    return [Increments(scales, {"limit": demands[:, :, 0]})]
 
 
 def sets_of(*case):
-    return CriticalMeasures.from_demands(tried_in(*case))
+    return CriticalMeasures.from_demands(tried_in(*case), "limit")
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
@@ -91,7 +92,7 @@ def test_sets_that_are_no_intervals_agree_with_dense_scales(rng):
     limits = np.quantile(of_nominal, np.linspace(0.3, 0.9, 40))
     limit = max(limits, key=lambda x: np.diff(of_nominal > x, axis=0).sum())  # crossed most often
     tried = tried_in(frame, cuts, [("residual1", limit)], *motion, scales[-1])
-    exceeds_by_all, exceeds_by_some = counts_between(tried, scales)
+    exceeds_by_all, exceeds_by_some = counts_between(tried, "limit", scales)
     for level, structures in enumerate((dense, dense[:, :1])):
         exceeds = structures[..., 0] > limit
         missed = exceeds.any(1) & (exceeds_by_some[level] == 0)
