@@ -19,33 +19,9 @@ from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
-ENDINGS = (".mtx", ".npz", ".npy", ".csv")
 ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
-OTHER_ENDINGS = {
-    (".txt", ".dat", ".tsv", ".out", ".asc"): "rename a file of numbers alone to NAME.csv",
-    (".mat",): "write it by numpy.save of an array of scipy.io.loadmat",
-    (".xlsx", ".xls", ".ods"): "save the sheet as CSV, numbers alone",
-    (".mm",): "rename a file of Matrix Market to NAME.mtx",
-    (".pkl", ".pickle"): "write it by numpy.save",
-}
-"""What to do with files of other types."""
 MAX_ROWS = 5000
 """Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB."""
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)", re.IGNORECASE)
-CURES_OF_CELLS = {
-    r"[\[\]()]": "write numbers without brackets",
-    r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
-    r"^\s*%%": "a file of Matrix Market is NAME.mtx",
-    r",\s*(,|$)|;\s*(;|$)": "cells are empty: write 0, and nothing behind the last number",
-    r"\d['’_]\d{3}": "write thousands without separators",
-    r'"': "write numbers without quotes",
-    r"\d\.?[dD][-+]?\d": "write 1e3 in place of 1D3",
-    r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
-    r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",
-}
-"""Cure of a row of a CSV file by a pattern in it; the first that fits."""
-SPARSE = {"format", "shape", "data"}
-"""Arrays in every file of `scipy.sparse.save_npz`."""
 
 
 def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -> Array:
@@ -68,9 +44,6 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
         (18, 18)
     """
     file = path_of("path", path)
-    if file.suffix.lower() not in ENDINGS:
-        cures = (cure for kinds, cure in OTHER_ENDINGS.items() if file.suffix.lower() in kinds)
-        raise RefusedError(file.name, f"of type {file.suffix or 'none'}", ALLOWED, next(cures, ""))
     try:
         array = _read_by_ending(file, name, max_rows=max_rows)
     except RefusedError:
@@ -78,48 +51,78 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     except Exception as error:  # whatever the readers of files, texts and archives raise
         reason = getattr(error, "strerror", None) or printable(error, 80) or type(error).__name__
         raise RefusedError(printable(file.name, 80), reason, ALLOWED) from None
-    is_real, shape = array.dtype.kind in "uif", " × ".join(map(str, array.shape))
-    require(is_real, file.name, value=f"an array of {array.dtype.name}", allowed=ALLOWED)
+    shape = " × ".join(str(n) for n in array.shape)
+    cure = "save numbers, as array.astype(float)"
+    require(array.dtype.kind in "uif", file.name, f"an array of {array.dtype.name}", ALLOWED, cure)
     is_matrix = array.ndim in (1, 2) and array.size > 0
-    what = f"an array of {shape or 'no'} numbers"
     cure = "save two dimensions, as array[0] of three" if array.ndim > 2 else ""
-    require(is_matrix, file.name, what, ALLOWED, cure)
+    require(is_matrix, file.name, f"an array of {shape or 'no'} numbers", ALLOWED, cure)
     require_size(file.name, array.shape, max_rows)
     require_free_memory(file.name, 8.0 * array.size, f"{array.size} numbers")
-    if not np.isfinite(array).all():
-        place = np.argwhere(~np.isfinite(array))[0] + 1
-        what = f"{array[tuple(place - 1)]} at " + ", ".join(
-            f"{axis} {k}" for axis, k in zip(("row", "column"), place, strict=False)
-        )
-        raise RefusedError(file.name, what, ALLOWED, "write finite numbers there")
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        index = tuple(wrong[0])
+        place = f"row {index[0] + 1}"
+        if array.ndim == 2:
+            place += f", column {index[1] + 1}"
+        cure = "write finite numbers there"
+        raise RefusedError(file.name, f"{array[index]} at {place}", ALLOWED, cure)
     return np.array(array, float)
 
 
 def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
-    """Return the array in a file; `name` chooses one of several in a .npz file."""
-    kind = path.suffix.lower()
-    if kind == ".npy":
+    """Return the array in a file, whose ending tells its format.
+
+    Args:
+        path: The file.
+        name: Name of the array in a .npz file of several.
+        max_rows: Largest number of rows and of columns.
+
+    Raises:
+        RefusedError: The file is of another type or holds no matrix.
+        Exception: Whatever readers of files and archives raise.
+    """
+    ending = path.suffix.lower()
+    if ending == ".npy":
         return read_npy(path)
-    if kind == ".npz":
+    if ending == ".npz":
         return _read_archive(ArrayArchive(path), name, max_rows=max_rows)
-    require_text(path)
-    if kind == ".mtx":
+    if ending == ".mtx":
+        require_text(path)
         return matrix_market(path.name, path.read_bytes(), max_rows=max_rows)
-    return _read_csv(path.name, path.read_text(encoding="utf-8-sig"))
+    if ending == ".csv":
+        require_text(path)
+        return _read_csv(path.name, path.read_text(encoding="utf-8-sig"))
+    numbers_alone = "rename a file of numbers alone to NAME.csv"
+    sheet = "save the sheet as CSV, numbers alone"
+    cures = {
+        **dict.fromkeys((".txt", ".dat", ".tsv", ".out", ".asc"), numbers_alone),
+        **dict.fromkeys((".xlsx", ".xls", ".ods"), sheet),
+        **dict.fromkeys((".pkl", ".pickle"), "write it by numpy.save"),
+        ".mat": "write it by numpy.save of an array of scipy.io.loadmat",
+        ".mm": "rename a file of Matrix Market to NAME.mtx",
+    }
+    cure = cures.get(ending, "")
+    raise RefusedError(path.name, f"of type {path.suffix or 'none'}", ALLOWED, cure)
 
 
 def _read_csv(name: str, text: str) -> Array:
     """Return the numbers of a text, shape (rows, columns).
 
-    Commas part them, or semicolons, beside which commas are decimal ones, or blanks and tabs.
+    Commas separate them, or semicolons, beside which commas are decimal ones, or blanks and tabs.
+
+    Args:
+        name: Name of the file, for messages.
+        text: The text.
 
     Raises:
-        RefusedError: A row has another text, or another count of numbers than the first.
+        RefusedError: A row has another text, or another count of numbers than the others.
     """
     require(bool(text.strip()), name, "", ALLOWED)
     delimiter: str | None = ","
     if ";" in text:
-        delimiter, text = ";", text.replace(",", ".")
+        delimiter = ";"
+        text = text.replace(",", ".")
     elif "," not in text:
         delimiter = None
     try:
@@ -129,103 +132,122 @@ def _read_csv(name: str, text: str) -> Array:
 
 
 def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
-    """Error about the first row of a text that is not of as many numbers as the first row is."""
-    lines = {k: x for k, x in enumerate(text.splitlines(), 1) if x.partition("#")[0].strip()}
-    counts = [len(line.partition("#")[0].split(delimiter)) for line in lines.values()]
+    """Return the error about the first row that is not of as many numbers as most rows have.
+
+    Args:
+        name: Name of the file.
+        text: The text.
+        delimiter: What separates the numbers; None for blanks.
+    """
+    number = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?i:[-+]?(?:nan|inf))"
+    lines = dict(enumerate(text.splitlines(), 1))
+    rows = {k: x.partition("#")[0] for k, x in lines.items() if x.partition("#")[0].strip()}
+    cells = {k: [cell.strip() for cell in row.split(delimiter)] for k, row in rows.items()}
+    counts = [len(row) for row in cells.values()]
     count, n_rows = Counter(counts).most_common(1)[0]
     if n_rows == 1:  # all rows differ
         count = counts[0]
-    for number, line in lines.items():
-        cells = [cell.strip() for cell in line.partition("#")[0].split(delimiter)]
-        others = [cell for cell in cells if not NUMBER.fullmatch(cell)]
-        if not others and len(cells) == count:
+    for line, row in cells.items():
+        are_numbers = all(re.fullmatch(number, cell) for cell in row)
+        if are_numbers and len(row) == count:
             continue
-        cure = f"it has {len(cells)} numbers, and {n_rows} of {len(lines)} rows have {count}"
-        if delimiter == "," and "." not in text:
-            cure += "; if commas are decimal ones, part the numbers by semicolons"
-        if others:
-            fitting = (cure for pattern, cure in CURES_OF_CELLS.items() if re.search(pattern, line))
-            cure = next(fitting, "a matrix has no head and no names of rows")
-        key, allowed = f"{name}, line {number}", "rows of as many numbers, as 1.5,0,2e6"
-        return RefusedError(key, line.strip()[:60], allowed, cure)
+        if not are_numbers:
+            cure = _cure_of_row(lines[line])
+        else:
+            cure = f"it has {len(row)} numbers, and {n_rows} of {len(cells)} rows have {count}"
+            if delimiter == "," and "." not in text:
+                cure += "; if commas are decimal ones, part the numbers by semicolons"
+        allowed = "rows of as many numbers, as 1.5,0,2e6"
+        return RefusedError(f"{name}, line {line}", lines[line].strip()[:60], allowed, cure)
     return RefusedError(name, "no matrix", ALLOWED)
 
 
+def _cure_of_row(row: str) -> str:
+    """Return what to mend in a row of a CSV file that is not of numbers alone."""
+    cures = {
+        r"[\[\]()]": "write numbers without brackets",
+        r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
+        r"^\s*%%": "a file of Matrix Market is NAME.mtx",
+        r",\s*(,|$)|;\s*(;|$)": "cells are empty: write 0, and nothing behind the last number",
+        r"\d['’_]\d{3}": "write thousands without separators",
+        r'"': "write numbers without quotes",
+        r"\d\.?[dD][-+]?\d": "write 1e3 in place of 1D3",
+        r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
+        r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",
+    }
+    for pattern, cure in cures.items():
+        if re.search(pattern, row):
+            return cure
+    return "a matrix has no head and no names of rows"
+
+
 def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers:
-    """Return the sparse matrix of a .npz file, dense; else its array of that name, or the only."""
+    """Return an array in a .npz file, or the sparse matrix in it, dense.
+
+    Args:
+        archive: The file.
+        name: Name of the array; empty for the only one.
+        max_rows: Largest number of rows and of columns of a sparse matrix.
+
+    Raises:
+        RefusedError: There is no such array, or none is named and there are several; or an array is
+            damaged.
+    """
     names = archive.names
-    if set(names) >= SPARSE:
+    if set(names) >= {"format", "shape", "data"}:  # as scipy.sparse.save_npz writes it
         return _read_sparse(archive, max_rows=max_rows)
     chosen = [x for x in names if not name or x == name]
     if len(chosen) != 1:
-        what, file_name = f"array {name or 'not named'}", archive.path.name
-        raise RefusedError(file_name, what, f"{file_name}:NAME, one of {', '.join(names)}")
+        what = f"array {name or 'not named'}"
+        allowed = f"{archive.path.name}:NAME, one of {', '.join(names)}"
+        raise RefusedError(archive.path.name, what, allowed)
     return archive.read(chosen[0])
 
 
 def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:
-    """Return the matrix of a file of `scipy.sparse.save_npz` by the indices of its entries."""
+    """Return the matrix in a file of `scipy.sparse.save_npz`, dense.
+
+    SciPy itself is not asked: its compiled code writes where wrong indices lead, and its own check
+    of damaged arrays misses some.
+
+    Raises:
+        RefusedError: The matrix is larger than allowed, of another form, or its arrays contradict
+            one another.
+    """
     name = archive.path.name
     letters = archive.read("format", kinds="SU").item()
     form = letters.decode("latin-1") if isinstance(letters, bytes) else str(letters)
-    shape = tuple(int(n) for n in archive.read("shape", kinds="iu"))
-    require(len(shape) == 2, name, f"of shape {shape}", "rows and columns")
-    require_size(name, shape, max_rows)
-    data = np.asarray(archive.read("data", kinds="iuf"), float)
-
-    def indices(key: str) -> Array:
-        return np.asarray(archive.read(key, kinds="iu"), float)
-
-    def entries(rows: Array, columns: Array, values: Array) -> Array:
-        n_rows, n_columns = shape
-        return dense_of_entries(
-            name, (n_rows, n_columns), rows=rows, columns=columns, values=values
-        )
-
-    if form == "coo":
-        rows, columns = indices("row"), indices("col")
-        fit = rows.shape == columns.shape == data.shape and data.ndim == 1
-        require(fit, name, "of arrays of different lengths", ALLOWED)
-        return entries(rows, columns, data)
-    if form == "dia":
-        offsets = indices("offsets")
-        fit = data.ndim == 2 and offsets.shape == (len(data),)
-        require(fit, name, "of arrays of different lengths", ALLOWED)
-        # the diagonal of offset k has entry j of its data in row j − k and column j
-        columns = np.broadcast_to(np.arange(data.shape[1], dtype=float), data.shape)
-        rows = columns - offsets[:, None]
-        is_inside = (rows >= 0) & (rows < shape[0]) & (columns < shape[1])
-        return entries(rows[is_inside], columns[is_inside], data[is_inside])
-    require(
-        form in ("csr", "csc", "bsr"), name, f"sparse of form {form}", "csr, csc, coo, bsr, dia"
-    )
-    first, second = _compressed_indices(name, indices("indptr"), indices("indices"), len(data))
-    if form == "csc":
-        first, second = second, first
-    if form != "bsr":
-        require(data.ndim == 1, name, "of arrays of different lengths", ALLOWED)
-        return entries(first, second, data)
-    require(data.ndim == 3, name, "of blocks without two sides", ALLOWED)
-    _, n_rows, n_columns = data.shape
-    rows = first[:, None, None] * n_rows + np.arange(n_rows)[:, None]
-    columns = second[:, None, None] * n_columns + np.arange(n_columns)
-    rows, columns = np.broadcast_to(rows, data.shape), np.broadcast_to(columns, data.shape)
-    return entries(rows.ravel(), columns.ravel(), data.ravel())
+    shape = archive.read("shape", kinds="iu")
+    require(shape.shape == (2,), name, f"of {shape.size} sides", "rows and columns")
+    n_rows, n_columns = (int(n) for n in shape)
+    require_size(name, (n_rows, n_columns), max_rows)
+    keys = {"coo": ("row", "col"), "csr": ("indptr", "indices"), "csc": ("indptr", "indices")}
+    cure = "save it as scipy.sparse.save_npz(NAME, matrix.tocsr())"
+    require(form in keys, name, f"sparse of form {form}", "csr, csc or coo", cure)
+    values = np.asarray(archive.read("data", kinds="iuf"), float)
+    first, second = (np.asarray(archive.read(key, kinds="iu"), float) for key in keys[form])
+    if form != "coo":
+        first = _expanded(name, first, len(values))
+    fit = first.shape == second.shape == values.shape and values.ndim == 1
+    require(fit, name, "of arrays of different lengths", ALLOWED, "save the matrix anew")
+    rows, columns = (second, first) if form == "csc" else (first, second)
+    return dense_of_entries(name, (n_rows, n_columns), rows=rows, columns=columns, values=values)
 
 
-def _compressed_indices(
-    name: str, pointers: Array, indices: Array, n_entries: int
-) -> tuple[Array, Array]:
-    """Return compressed and stored index of each entry of a compressed sparse matrix.
+def _expanded(name: str, pointers: Array, n_entries: int) -> Array:
+    """Return the compressed index of each entry of a compressed sparse matrix, shape (entries,).
 
-    Row k of a matrix by rows has the entries from pointers[k] up to pointers[k + 1].
+    Args:
+        name: Name of the file, for the message.
+        pointers: The entries from pointers[k] up to pointers[k + 1] have the index k.
+        n_entries: Number of entries.
 
     Raises:
         RefusedError: The pointers do not rise from 0 to the number of entries.
     """
-    fit = pointers.ndim == indices.ndim == 1 and len(indices) == n_entries and len(pointers) > 0
+    fit = pointers.ndim == 1 and len(pointers) > 0
     counts = np.diff(pointers) if fit else np.empty(0)
     fit = fit and pointers[0] == 0 and pointers[-1] == n_entries and bool((counts >= 0).all())
-    require(fit, name, "of pointers that do not rise from 0 to the entries", ALLOWED)
-    compressed = np.repeat(np.arange(len(counts), dtype=float), counts.astype(int))
-    return compressed, indices
+    value = "of pointers that do not rise from 0 to the entries"
+    require(fit, name, value, ALLOWED, "save the matrix anew")
+    return np.repeat(np.arange(len(counts), dtype=float), counts.astype(int))

@@ -253,7 +253,7 @@ def _matrices() -> list[Format]:
         "k.npz": lambda p: np.savez_compressed(p, k=matrix),
         "k.csv": lambda p: np.savetxt(p, matrix, delimiter=","),
     }
-    for form in ("csr", "csc", "coo", "bsr", "dia"):
+    for form in ("csr", "csc", "coo"):
         savers[f"{form}.npz"] = lambda p, form=form: scipy.sparse.save_npz(
             p, sparse.asformat(form), compressed=False
         )

@@ -93,8 +93,8 @@ def test_files_of_scipy_give_the_matrices_that_it_reads(
     assert np.array_equal(read_matrix(path), expected)
 
 
-@pytest.mark.parametrize("form", ["csr", "csc", "coo", "bsr", "dia"])
-def test_sparse_matrices_of_every_form_are_read(tmp_path, rng, form):
+@pytest.mark.parametrize("form", ["csr", "csc", "coo"])
+def test_sparse_matrices_of_each_form_are_read(tmp_path, rng, form):
     matrix = random_sparse(rng, is_square=False).asformat(form)
     for is_compressed in (False, True):
         scipy.sparse.save_npz(tmp_path / "k.npz", matrix, compressed=is_compressed)
@@ -144,13 +144,13 @@ def test_texts_that_contradict_themselves_are_refused(tmp_path, text, words):
     [
         ("indices", [0, 3, 1, 2, 0], "index 4 of columns"),
         ("indices", [0, -1, 1, 2, 0], "index 0 of columns"),
-        ("indices", [0, 1], "pointers that do not rise"),
+        ("indices", [0, 1], "different lengths"),
         ("indptr", [0, 2, 1, 5], "pointers that do not rise"),
         ("indptr", [0, 2, 4, 900000000], "pointers that do not rise"),
         ("indptr", [0, 1, 2, 3, 5], "index 4 of rows"),
         ("shape", [900000000, 900000000], "up to 5000"),
-        ("shape", [3, 3, 3], "of shape"),
-        ("format", b"lil", "of form lil"),
+        ("shape", [3, 3, 3], "of 3 sides"),
+        ("format", b"bsr", r"of form bsr; .* matrix\.tocsr"),
     ],
 )  # fmt: skip
 def test_sparse_arrays_that_contradict_one_another_are_refused(tmp_path, key, values, words):
