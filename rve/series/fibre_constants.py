@@ -73,7 +73,8 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
     The mean is by Gauss quadrature with 32 nodes. Its error is the mean of those of G_L plus the
     distance to two finer rules, times a safety factor.
     """
-    matrix, inclusion = cell.matrix, cell.inclusion
+    matrix = cell.matrix
+    inclusion = cell.inclusion
     assert isinstance(matrix, Phase)
     assert isinstance(inclusion, Phase)
     points = 32

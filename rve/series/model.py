@@ -1,22 +1,24 @@
 """Series model of the cell, exact for circles: Kolosov–Muskhelishvili potentials in plane strain.
 
-In the matrix 2μu = κφ − z conj(φ') − conj(ψ), with every particle P of the square lattice carrying
-the same multipoles (Weierstrass' and Natanzon's functions; Grigolyuk & Fil'shtinskii, Perforated
+In the matrix 2μu = κφ − z conj(φ') − conj(ψ). Every particle P of the square lattice carries the
+same multipoles (Weierstrass' and Natanzon's functions; Grigolyuk and Fil'shtinskii, Perforated
 Plates and Shells, 1970):
 
     φ = A z + Σ_P Σ_n a_n (z − P)^-n
     ψ = B z + Σ_P Σ_n [b_n (z − P)^-n + n a_n conj(P) (z − P)^(-n-1)]
 
-Continuity of displacement and traction on |z| = r gives, with p_k, q_k the Taylor coefficients of
-φ, ψ less their poles at 0, coefficients scaled by r, and λ = μ_m / μ_i,
+Let p_k and q_k be the Taylor coefficients at 0 of φ and ψ without their poles there, all
+coefficients scaled by powers of the radius r, and λ = μ_m / μ_i. Continuity of displacement and
+traction on |z| = r gives
 
     a_n = (1 − λ)/(κ + λ) · [(n + 2) p*_{n+2} + q*_n]
     b_n = (κ − λκ_i)/(1 + λκ_i) · p*_n + (n − 2) a_{n-2}        (n ≥ 2)
     b_1 = 2 [(κ − 1) − λ(κ_i − 1)]/[2 + λ(κ_i − 1)] · Re p_1
 
-The square's symmetry leaves every fourth harmonic of each load, all real or all imaginary (`mirror`
-= −1): a few unknowns reach round-off, and whole θ-rules times many moduli are solved as one batch.
-The error falls as exp(−8 N arccosh(1/r)) with N harmonics.
+Because of the symmetry of the square, each load excites only every fourth harmonic, and its
+coefficients are all real or all imaginary. So a few unknowns are enough for rounding accuracy, and
+all nodes of a quadrature rule times many moduli are solved as one batch. With N harmonics the error
+falls like exp(−8 N arccosh(1/r)).
 """
 
 from __future__ import annotations
@@ -40,19 +42,17 @@ from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattic
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
 from alphacut.stochastic import RadiusMap
 
-MAX_HARMONICS = 160  # per potential and load; reaches r = 0.999
-HIGHEST_SUM = 12 * MAX_HARMONICS + 8  # order of the lattice sums that couple so many
+MAX_HARMONICS = 160
+"""Largest number of harmonics of each potential and load; it reaches reduced radii of .999."""
+HIGHEST_SUM = 12 * MAX_HARMONICS + 8
+"""Highest order of the lattice sums that couple so many harmonics."""
 LOADS = ("hydrostatic", "deviator", "shear")
 MAX_ACCURACY = 0.1
-TOLERANCE_PART = 0.4
-"""Fraction of a tolerance for the series at each θ, and again for the quadrature in θ."""
-COARSER = 100.0
-"""Multiple of the error of a series that tests bounds; a larger one sees less."""
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """Factors of the interface conditions of a matrix and m inclusions; complex with losses.
+    """Factors of the interface conditions for a matrix and m inclusions; complex with losses.
 
     Args:
         kappa: κ = 3 − 4ν of the matrix, in plane strain.
@@ -70,10 +70,11 @@ class Contrast:
 
     @classmethod
     def of_materials(cls, materials: Sequence[Material]) -> Contrast:
-        """From the materials of the matrix and of m inclusions."""
+        """Return the factors for the materials of the matrix and of m inclusions, in this order."""
         kappa, *inclusion_kappas = (3 - 4 * material.poisson for material in materials)
         mu, *inclusion_mus = (material.bulk_and_shear[1] for material in materials)
-        kappa_i, ratio = np.array(inclusion_kappas), mu / np.array(inclusion_mus)
+        kappa_i = np.array(inclusion_kappas)
+        ratio = mu / np.array(inclusion_mus)
         return cls(
             kappa,
             mu,
@@ -85,16 +86,16 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Family:
-    """Harmonics that one load excites and their lattice couplings at r = 1.
+    """The harmonics that one load excites, and their couplings by all images at r = 1.
 
     Args:
-        a: Orders n of a_n, shape (N,): 3, 7, 11, … for the hydrostatic load, 1, 5, 9, … for the two
-            deviatoric ones.
-        b: Orders of b_n, shape (N,): 1, 5, … and 3, 7, ….
-        to_p: p at the orders `b` per a_n, shape (N, N).
-        to_next: (n + 2) p_{n+2} at the orders `a` per a_n.
-        a_to_q: q at the orders `a` per a_n.
-        b_to_q: q at the orders `a` per b_n.
+        a: Orders n of the a_n, shape (N,): 3, 7, 11, … for the hydrostatic load, 1, 5, 9, … for the
+            two deviatoric ones.
+        b: Orders n of the b_n, shape (N,): 1, 5, 9, … and 3, 7, 11, ….
+        to_p: What unit a_n add to p_k for k in `b`, shape (N, N), one column for each a_n.
+        to_next: What unit a_n add to (k + 2) p_{k+2} for k in `a`, shape (N, N).
+        a_to_q: What unit a_n add to q_k for k in `a`, shape (N, N).
+        b_to_q: What unit b_n add to q_k for k in `a`, shape (N, N).
     """
 
     a: Ints
@@ -107,10 +108,15 @@ class Family:
 
 @cache
 def family(harmonics: int, *, hydrostatic: bool) -> Family:
-    """First harmonics of a hydrostatic or a deviatoric load, with their lattice couplings."""
+    """Return the first so many harmonics of a hydrostatic or of a deviatoric load."""
     sums = lattice_sums(HIGHEST_SUM)
-    a = 4 * np.arange(harmonics) + (3 if hydrostatic else 1)
-    b = 4 * np.arange(harmonics) + (1 if hydrostatic else 3)
+    ones = 4 * np.arange(harmonics) + 1
+    threes = 4 * np.arange(harmonics) + 3
+    a = ones
+    b = threes
+    if hydrostatic:
+        a = threes
+        b = ones
     return Family(
         a=a,
         b=b,
@@ -124,26 +130,42 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
 def _system(
     orders: Family, radius: Array, contrast: Contrast, *, mirror: float
 ) -> tuple[Array, Array]:
-    """Matrices (n, m, N, N) and right-hand sides (n, m, N) for the a_n of φ, the b_n eliminated."""
-    r_a, r_b = radius[:, None] ** orders.a, radius[:, None] ** orders.b
+    """Return the linear systems for the coefficients a_n, from which the b_n are eliminated.
+
+    Args:
+        orders: The N harmonics of the load.
+        radius: Reduced radii, shape (n,).
+        contrast: Factors of m inclusions.
+        mirror: 1 if the coefficients are real, −1 if they are imaginary, which reverses the sign of
+            conjugates.
+
+    Returns:
+        Matrices, shape (n, m, N, N), and right-hand sides, shape (n, m, N).
+    """
+    r_a = radius[:, None] ** orders.a
+    r_b = radius[:, None] ** orders.b
     to_p = orders.to_p * r_b[:, :, None] * r_a[:, None, :]
     to_next = orders.to_next * (r_a * radius[:, None] ** 2)[:, :, None] * r_a[:, None, :]
     a_to_q = orders.a_to_q * r_a[:, :, None] * r_a[:, None, :]
     b_to_q = orders.b_to_q * r_a[:, :, None] * r_b[:, None, :]
     is_deviatoric = orders.a[0] == 1
-    by_shift = np.zeros_like(b_to_q)  # b_to_q applied to the part (n − 2) a_{n-2} of b_n
+    # q by the term (n − 2) a_{n-2} of b_n
+    by_shift = np.zeros_like(b_to_q)
     if is_deviatoric:
         by_shift = b_to_q * (orders.b - 2)
     else:
         by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
-    outer, inner = (mirror * f[:, None, None] for f in (contrast.outer, contrast.inner))
+    outer = mirror * contrast.outer[:, None, None]
+    inner = mirror * contrast.inner[:, None, None]
     coupling = (to_next + a_to_q + by_shift)[:, None] + inner * (b_to_q @ to_p)[:, None]
     shape = len(radius), contrast.outer.size, orders.a.size
     source = np.zeros(shape, np.result_type(outer))
     if is_deviatoric:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
-    else:  # b_1 has the factor `swelling` in place of `inner`
-        b1_to_q, to_p1 = b_to_q[:, None, :, 0], to_p[:, None, :1, :]
+    else:
+        # b_1 has the factor `swelling` in place of `inner`
+        b1_to_q = b_to_q[:, None, :, 0]
+        to_p1 = to_p[:, None, :1, :]
         excess = (contrast.swelling - contrast.inner)[:, None, None]
         coupling += excess * b1_to_q[..., None] * to_p1
         factor = contrast.outer * contrast.swelling
@@ -152,20 +174,33 @@ def _system(
 
 
 def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int) -> Array:
-    """C11 + C12, C11 − C12 or C33 in Pa, (n, m), of n radii and m inclusions by one of `LOADS`.
+    """Return C11 + C12, C11 − C12 or C33, which the load determines, in Pa.
 
-    Mean strain and stress follow from the jumps across the cell of 2μu and of the resultant force
-    φ + z conj(φ') + conj(ψ).
+    The mean strain and the mean stress follow from the jumps across the cell of 2μu and of the
+    resultant force φ + z conj(φ') + conj(ψ).
+
+    Args:
+        load: "hydrostatic", "deviator" or "shear".
+        radius: Reduced radii, shape (n,).
+        contrast: Factors of m inclusions.
+        harmonics: Number of harmonics.
+
+    Returns:
+        Shape (n, m).
     """
     orders = family(harmonics, hydrostatic=load == "hydrostatic")
-    # of "shear" the a_n are the imaginary parts
-    matrices, sources = _system(orders, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
-    a = np.linalg.solve(matrices, sources[..., None])[..., 0]  # scaled by rⁿ, (n, m, N)
-    r, kappa, mu = radius[:, None], contrast.kappa, contrast.mu
+    mirror = 1.0
+    if load == "shear":
+        mirror = -1.0  # its a_n are imaginary
+    matrices, sources = _system(orders, radius, contrast, mirror=mirror)
+    a = np.linalg.solve(matrices, sources[..., None])[..., 0]  # scaled by rⁿ, shape (n, m, N)
+    r = radius[:, None]
+    kappa = contrast.kappa
+    mu = contrast.mu
     if load == "hydrostatic":
         to_first = orders.to_p[0] * r ** (orders.a + 1)
-        pole = contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + r)  # b_1
-        jump = ZETA_PERIOD * r * pole  # of ψ across the cell
+        b_1 = contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + r)
+        jump = ZETA_PERIOD * r * b_1  # of ψ across the cell
         return np.asarray(mu * (4 + 2 * jump) / (kappa - 1 - jump))
     jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
     natanzon_jump = lattice_sums(HIGHEST_SUM).natanzon_period * r * a[..., 0]
@@ -175,7 +210,16 @@ def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int
 
 
 def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:
-    """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, (n, m, 3), in Pa."""
+    """Return C11 + C12, C11 − C12 and C33 of square cells, in Pa.
+
+    Args:
+        radius: Reduced radii, shape (n,).
+        materials: Matrix, then m inclusions.
+        harmonics: Number of harmonics of each potential and load.
+
+    Returns:
+        Shape (n, m, 3).
+    """
     contrast = Contrast.of_materials(materials)
     columns = [modulus_of_load(load, radius, contrast, harmonics) for load in LOADS]
     return np.stack(columns, axis=-1)
@@ -198,15 +242,15 @@ square_stiffness = CIRCLES.converged_moduli
 
 @dataclass(frozen=True)
 class SeriesModel(AnyModel):
-    """Multipole series at the nodes of a Gauss rule in θ.
+    """The cell by multipole series at the nodes of a Gauss rule in θ.
 
     Args:
-        points: Nodes of the rule, or None: as many as bring two successive rules within `accuracy`
-            of one another.
-        accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
-            rule in θ; from `MIN_ACCURACY` to 0.1.
-        energies: Whether to compute the energies of the phases, for loss factors; they are also
-            computed where a phase states a loss factor.
+        points: Number of nodes of the rule. None takes as many as bring the mean moduli of finer
+            rules within `accuracy`.
+        accuracy: Relative error allowed for the series at each θ and, without `points`, for the
+            quadrature in θ; from `MIN_ACCURACY` to 0.1.
+        energies: Whether to compute the energies of the phases, for loss factors. They are always
+            computed where a phase has a loss factor.
 
     Example:
         >>> from alphacut.rve import Phase
@@ -236,29 +280,36 @@ class SeriesModel(AnyModel):
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
-        """The series of a tolerance of E, at each θ and in the rule in θ; see `CellModel`."""
+        """Return the model for a tolerance of E; see `CellModel`."""
         tolerance = resolution.tolerance or cls.DEFAULT_TOLERANCE
         if tolerance is None:
             return cls(energies=resolution.energies)
-        accuracy = max(TOLERANCE_PART * tolerance, cls.MIN_ACCURACY)
+        # .4 of it for the series at each θ and .4 for the quadrature leave some for their sum
+        accuracy = max(0.4 * tolerance, cls.MIN_ACCURACY)
         return cls(accuracy=accuracy, energies=resolution.energies)
 
     def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
-        """This model; see `CellModel`."""
+        """Return this model, with energies if they are needed; see `CellModel`."""
         return replace(self, energies=energies or self.energies)
 
     def coarser(self) -> Self:
-        """The series of `COARSER` times the error."""
-        return replace(self, accuracy=min(COARSER * self.accuracy, MAX_ACCURACY))
+        """Return the model with 100 times the error, by which declared errors are tested."""
+        return replace(self, accuracy=min(100.0 * self.accuracy, MAX_ACCURACY))
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[HomogenisedStiffness]:
-        """Homogenised stiffness for each of `inclusions`, in their order.
+        """Return the homogenised stiffness for each of the inclusions, in their order.
+
+        Args:
+            radius_map: Radius of the particle over θ.
+            matrix: Material around the particle.
+            inclusions: Materials of the particle.
 
         Raises:
             SeriesError: Particles nearly touch.
-            RuleError: No rule in θ converges (a map that is not smooth).
+            RuleError: No quadrature rule converges, since the radius map is not smooth.
+            RefusedError: An argument is not what it should be.
         """
         require_solve_arguments(radius_map, matrix, inclusions)
         start = perf_counter()
@@ -283,4 +334,5 @@ class SeriesModel(AnyModel):
         return results
 
     def _checked_result(self, **parts: Any) -> HomogenisedStiffness:
+        """Return the result with its fields, and with checks of symmetry and bounds."""
         return with_checks(HomogenisedStiffness(**parts))
