@@ -43,10 +43,14 @@ class Content(CellContent):
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
-        """Sections of questions to the motion, by their keys, with one limit of each storey."""
-        sections = (self.probability, self.decision, self.tolerances, self.fragility)
-        given, structure = [x for x in sections if x is not None], self.structure
-        return {x.key: x if structure is None else x.with_storeys(structure) for x in given}
+        """Sections of questions about the response by key, with one limit of each storey."""
+        questions: dict[str, QuestionSection] = {}
+        for section in (self.probability, self.decision, self.tolerances, self.fragility):
+            if section is not None:
+                questions[section.key] = section
+                if self.structure is not None:
+                    questions[section.key] = section.with_storeys(self.structure)
+        return questions
 
     @property
     def incremental_question(self) -> FragilitySection | None:
@@ -59,11 +63,12 @@ class Content(CellContent):
     @property
     def limited_outputs(self) -> tuple[str, ...]:
         """Peaks that questions compare with limits, each once, such as q3 and max q3."""
-        sections = (section for section in self.questions.values() if section.reads_peaks)
-        limits = (limit for section in sections for limit in section.limits)
-        # the mean over records follows from the peaks under each
-        peaks = (limit.output if limit.side == "mean" else limit.peak for limit in limits)
-        return tuple(dict.fromkeys(peaks))
+        peaks: dict[str, None] = {}
+        for section in self.questions.values():
+            for limit in section.limits if section.reads_peaks else ():
+                # the mean over records follows from the peaks under each
+                peaks[limit.output if limit.side == "mean" else limit.peak] = None
+        return tuple(peaks)
 
     @property
     def stated_fraction(self) -> float | None:
@@ -74,7 +79,7 @@ class Content(CellContent):
 
     @property
     def has_stated_modulus(self) -> bool:
-        """True if the structure needs no modulus of a stage."""
+        """Whether the structure needs no modulus of a stage."""
         section = self.structure_section
         return section is None or not section.needs_modulus
 
@@ -98,10 +103,14 @@ class Content(CellContent):
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure with its forces; RefusedError where there is none or takes no such force.
+        """Return the structure with its forces.
 
-        `modulus` is Young's in Pa, the structure's own by default; `loss` the loss factor of its
-        material, where the case takes damping from there.
+        Args:
+            modulus: Young's modulus in Pa; the structure's own if not given.
+            loss: Loss factor of its material, where the case takes damping from there.
+
+        Raises:
+            RefusedError: The case has no structure, or it takes no such force.
         """
         section = self.structure_section
         if section is None:
@@ -110,12 +119,12 @@ class Content(CellContent):
 
     @property
     def has_material_damping(self) -> bool:
-        """True if the structure takes damping from the loss factors of its material."""
+        """Whether the structure takes damping from the loss factors of its material."""
         ratios = getattr(self.structure_section, "damping_ratio", None)
         return isinstance(ratios, MaterialDamping)
 
     def require_consistent(self) -> None:
-        """Refuses sections that do not fit each other."""
+        """Refuse sections that do not fit each other."""
         super().require_consistent()
         if self.has_material_damping:
             has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
@@ -123,41 +132,52 @@ class Content(CellContent):
             allowed = "stage modulus and loss factors in [cell], or a number"
             require(has_losses, key, "material", allowed)
         self._require_excitation()
-        self._require_envelope()
+        if self.records is None:
+            self._require_no_questions_to_records()
+        else:
+            self._require_records_alone(self.records)
+        if "envelope" in self.stages and self.envelope is not None:
+            self._require_response(self.envelope, self._one_structure())
 
     def _require_excitation(self) -> None:
-        """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
+        """Refuse a structure at rest without loads."""
         section = self.structure_section
-        ground = None if section is None else section.nominal.model.ground
-        is_loaded = self.records is not None or ground is not None or bool(self.force)
-        is_moved = is_loaded or section is None or section.moves_by_itself
-        allowed = "a start, an accelerogram, a section [records] or [[force]]"
-        cure = "nothing moves the frame"
-        require(is_moved, "frame.displacements", None, allowed, cure=cure)
-        if self.records is None:
-            is_absent, allowed = self.fragility is None, "beside [records]"
-            require(is_absent, "fragility", "without records", allowed)
-            for key, question in self.questions.items():
-                means = ", ".join(limit.text for limit in question.limits if limit.side == "mean")
-                require(not means, f"{key}.limits", means, "a mean over records beside [records]")
+        if section is None or section.moves_by_itself:
             return
-        require_alone("records", ground is not None, "an accelerogram")
+        has_ground = section.nominal.model.ground is not None
+        is_loaded = self.records is not None or has_ground or bool(self.force)
+        allowed = "a start, an accelerogram, a section [records] or [[force]]"
+        require(is_loaded, "frame.displacements", None, allowed, cure="nothing moves the frame")
+
+    def _require_no_questions_to_records(self) -> None:
+        """Refuse what only a suite of records answers."""
+        require(self.fragility is None, "fragility", "without records", "beside [records]")
+        for key, question in self.questions.items():
+            means = ", ".join(limit.text for limit in question.limits if limit.side == "mean")
+            require(not means, f"{key}.limits", means, "a mean over records beside [records]")
+
+    def _require_records_alone(self, records: RecordsSection) -> None:
+        """Refuse another excitation of the ground, and what a suite of records cannot answer."""
+        section = self.structure_section
         if section is not None:
+            has_ground = section.nominal.model.ground is not None
+            require_alone("records", has_ground, "an accelerogram")
             section.require_pattern()
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
 
-    def _require_envelope(self) -> None:
-        envelope, structure = self.envelope, self.structure
-        if envelope is None or "envelope" not in self.stages:
-            return
-        sections = self.structure_sections
-        if structure is None or len(sections) > 1:
-            value = None if structure is None else f"beside {len(sections) - 1} more"
+    def _one_structure(self) -> Structure:
+        """Return the structure; refuse a case with none or several."""
+        structure, n_sections = self.structure, len(self.structure_sections)
+        if structure is None or n_sections > 1:
+            value = f"beside {n_sections - 1} more" if n_sections else None
             *names, last = (f"[{name}]" for name in sorted(STRUCTURES))
-            allowed = f"one of {', '.join(names)} and {last}"
-            raise RefusedError("frame", value, allowed)
+            raise RefusedError("frame", value, f"one of {', '.join(names)} and {last}")
+        return structure
+
+    def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
+        """Refuse studies and questions that the structure cannot answer."""
         if yields(structure.model):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
@@ -166,45 +186,54 @@ class Content(CellContent):
             require(is_exact, "envelope.integrator", envelope.integrator, allowed)
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
+        names: list[str] = []
         for number, study in enumerate(self.study, start=1):
             self._require_study(f"study[{number}]", study, envelope, structure)
+            is_first = study.name not in names
+            require(is_first, f"study[{number}].name", study.name, "a name of its own")
+            names.append(study.name)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
-        is_framed = self.identify is None or structure.model.floors > 0
-        require(is_framed, "identify", "without a frame", "beside [frame]")
-        names = [study.name for study in self.study]
-        for number, name in enumerate(names, start=1):
-            is_first = names.index(name) == number - 1
-            require(is_first, f"study[{number}].name", name, "a name of its own")
         for section in self.questions.values():
             section.require_answerable(structure)
         if self.identify is not None:
+            is_framed = structure.model.floors > 0
+            require(is_framed, "identify", "without a frame", "beside [frame]")
             structure.inputs(self.identify.learn, "identify.learn")
 
     def _require_study(
         self, key: str, study: Study, envelope: EnvelopeSection, structure: Structure
     ) -> None:
+        """Refuse inputs, outputs and a duration that do not fit the structure and its forces.
+
+        Args:
+            key: Name of the study's section, for messages.
+            study: The study.
+            envelope: What holds for all studies.
+            structure: The structure. What a stage will make fuzzy may be crisp in it.
+        """
         computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
         if self.has_material_damping:
             computed = r"E|zeta\d*"
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
-        structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
+        structure.inputs(stated, f"{key}.fuzzy")
         for output in study.figures:
             require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
-        for number, (history, _) in enumerate((x.history for x in self.force), start=1):
-            start, allowed = history.start if history else 0.0, f"a start below {key}.duration"
-            require(
-                start < study.duration, f"force[{number}].history", f"from {start:g} s", allowed
-            )
+        for number, force in enumerate(self.force, start=1):
+            history, allowed = force.history.history, f"a start below {key}.duration"
+            start = 0.0 if history is None else history.start
+            key_of_start = f"force[{number}].history"
+            require(start < study.duration, key_of_start, f"from {start:g} s", allowed)
 
 
 Case = ParsedCase[Content]
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
-    """Reads a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
+    """Read a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
 
-    BadInput has every problem of the case.
+    Raises:
+        BadInput: With every problem of the case.
     """
     return parse(with_structures(Content, built=True), path, changes)

@@ -64,12 +64,18 @@ class MaterialDamping:
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
-    word, plus, joints = value.partition("+") if isinstance(value, str) else ("", "", "")
-    if word.strip() != "material":
-        is_one_a_mode = isinstance(value, list) and any(isinstance(x, str) for x in value)
-        values = cast("list[object]", value) if is_one_a_mode else [value]
-        return tuple(cast("FuzzyNumber", RATIO.parse(entry)) for entry in values)
-    return MaterialDamping(cast("FuzzyNumber", RATIO.parse(joints.strip())) if plus else ZERO)
+    """Return one ratio of all modes or one of each; or "material", with the ratio of joints."""
+    if isinstance(value, str):
+        word, plus, joints = value.partition("+")
+        if word.strip() == "material":
+            return MaterialDamping(_ratio(joints.strip())) if plus else MaterialDamping()
+    if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
+        return tuple(_ratio(entry) for entry in value)
+    return (_ratio(value),)
+
+
+def _ratio(value: object) -> FuzzyNumber:
+    return cast("FuzzyNumber", RATIO.parse(value))
 
 
 RATIO = Quantity(minimum=0, below=1, fuzzy=True)
@@ -82,9 +88,11 @@ DampingRatios = Annotated[
 class Structure:
     """A structure of a case: the model at its nominal values, and its fuzzy parameters.
 
-    `numbers` has every parameter, crisp or fuzzy, in SI; `heights` those of the storeys by
-    drift and residual drift; `force_units` the SI units of the forces' amplitudes, empty of
-    factors.
+    Args:
+        model: The structure at its nominal parameters.
+        numbers: Every parameter by name, crisp or fuzzy, in SI units.
+        heights: Heights of storeys in m by the names of their drifts and residual drifts.
+        force_units: SI units of the amplitudes of forces by parameter, empty of factors.
     """
 
     model: StructureModel
@@ -109,49 +117,48 @@ class Structure:
         return self.model.outputs
 
     def unit(self, output: str) -> str:
-        """SI unit of an output."""
+        """Return the SI unit of an output."""
         return self.model.unit_of(output)
 
     def input_unit(self, name: str) -> str:
-        """SI unit of a parameter; empty where it has none, or none is known."""
+        """Return the SI unit of a parameter; empty where it has none, or none is known."""
         return self.force_units.get(name, self.model.parameter(name).unit)
 
     def fuzzy_members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
-        """Fuzzy parameters of a name, "m" of all masses of a frame; RefusedError where none is."""
-        allowed, cure = "inputs that are fuzzy", f"{name} is one number"
+        """Return the fuzzy parameters that a name stands for, as "m" for m1 … mn of a frame.
+
+        Args:
+            name: Name in the case.
+            key: Key that has it, for the message.
+
+        Raises:
+            RefusedError: There is no such parameter, or it is crisp.
+        """
         try:
             members = self.model.group(name)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
-            fuzzy, allowed = (), ", ".join(self.numbers)
             cure = suggestion(name, self.numbers)
-        require(bool(fuzzy), key, name, allowed, cure=cure)
+            raise RefusedError(key, name, ", ".join(self.numbers), cure) from None
+        require(bool(fuzzy), key, name, "inputs that are fuzzy", cure=f"{name} is one number")
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
-        """The fuzzy inputs that the names stand for."""
-        return {
-            member: self.numbers[member]
-            for name in names
-            for member in self.fuzzy_members(name, key)
-        }
+        """Return the fuzzy parameters that names stand for; raises as `fuzzy_members`."""
+        members = [member for name in names for member in self.fuzzy_members(name, key)]
+        return {member: self.numbers[member] for member in members}
 
     def require_quantities(self, key: str, names: Sequence[str]) -> None:
-        """Refuses outputs that the model cannot have, though it need not observe them."""
+        """Refuse outputs that the model cannot have, though it need not observe them."""
         for name in names:
             try:
                 self.model.require_quantity(name)
             except RefusedError as error:
                 raise RefusedError(key, error.value, error.allowed) from None
 
-    def model_with_outputs(self, key: str, outputs: tuple[str, ...]) -> StructureModel:
-        """The model reduced to some outputs; one that is not linear always computes all of them."""
-        self.require_quantities(key, outputs)
-        return self.model.with_outputs(outputs)
-
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
-    """Record of a file that the case names; warns of what is unusual in it."""
+    """Return the record of a file that the case names; warn of what is unusual in it."""
     path = case_file(value, info)
     ground = read_record(path)
     for remark in ground.remarks:
@@ -162,14 +169,17 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
 def damping_ratios_by_name(
     ratios: MaterialDamping | tuple[FuzzyNumber, ...], loss: FuzzyNumber | None
 ) -> dict[str, FuzzyNumber]:
-    """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
+    """Return damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
 
-    `loss` is the loss factor of the material, for damping by it; None: a stand-in.
+    Args:
+        ratios: The ratios of the case.
+        loss: Loss factor of the material, for damping by it; a stand-in if None.
     """
     if isinstance(ratios, MaterialDamping):
         ratios = (damping_from_loss(loss or LOSS_STAND_IN, joints=ratios.joints),)
-    names = ["zeta"] if len(ratios) == 1 else [f"zeta{mode + 1}" for mode in range(len(ratios))]
-    return dict(zip(names, ratios, strict=True))
+    if len(ratios) == 1:
+        return {"zeta": ratios[0]}
+    return {f"zeta{mode}": ratio for mode, ratio in enumerate(ratios, start=1)}
 
 
 class StructureSection(Section):
@@ -178,10 +188,15 @@ class StructureSection(Section):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure with its fuzzy parameters; RefusedError where they make none.
+        """Return the structure with its fuzzy parameters.
 
-        `modulus` is Young's in Pa, by default the section's own or a stand-in; `loss` the loss
-        factor of the material, or a stand-in. A structure without them takes neither.
+        Args:
+            modulus: Young's modulus in Pa; the section's own, or a stand-in, if not given.
+            loss: Loss factor of the material; a stand-in if not given. A structure that takes none
+                of both ignores them.
+
+        Raises:
+            RefusedError: The values of the section make no structure.
         """
         raise NotImplementedError
 
@@ -209,8 +224,12 @@ class StructureSection(Section):
     def require_pattern(self) -> None:
         """Refuse a structure that records of the ground do not move."""
 
-    def warnings(self, structure: Structure) -> Iterator[str]:
-        """Yield a sentence for each effect that the section leaves out, and that is not small."""
+    def warnings(self, structure: Structure | None) -> Iterator[str]:
+        """Yield a sentence for each number that is doubtful, and each effect that is left out.
+
+        Args:
+            structure: The structure of the section, if all its values are known.
+        """
         yield from ()
 
 
@@ -273,14 +292,14 @@ class Frame(StructureSection):
         """Whether some floor may be displaced or move at the start."""
         return any(any(start.support) for start in (*self.displacements, *self.velocities))
 
-    def warnings(self, structure: Structure) -> Iterator[str]:
+    def warnings(self, structure: Structure | None) -> Iterator[str]:
         """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta)."""
         for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
             sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
             if max(sizes) > MAX_RATIO_OF_STOREYS * min(sizes):
                 ratio = max(sizes) / min(sizes)
                 yield f"frame.{key} of two storeys differ {ratio:,.0f}-fold: is a unit wrong?"
-        if self.gravity or self.lengths is None:
+        if self.gravity or self.lengths is None or structure is None:
             return
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
@@ -290,27 +309,36 @@ class Frame(StructureSection):
                 yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
-        """One value for each floor; a single one holds for all of them."""
-        return values * self.floors if values and len(values) == 1 else values or ()
+        """Return one value for each floor; a single one holds for all of them."""
+        if not values:
+            return ()
+        return values * self.floors if len(values) == 1 else values
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The frame with its fuzzy parameters, and the heights of storeys by their drifts."""
-        # values by floor or storey, by the frame's own arguments
-        lists = {x: self.per_floor(getattr(self, NAMES.get(x, x))) for x in SYMBOLS}
+        """Return the frame with its fuzzy parameters, and the heights of storeys by their drifts.
+
+        See `StructureSection.structure`.
+        """
+        # numbers by floor or storey, by the names of the frame's own arguments
+        lists = {name: self.per_floor(getattr(self, NAMES.get(name, name))) for name in SYMBOLS}
         lists["second_moment"] = self.second_moment or ()  # of all storeys, where it is one
         if self.stiffness:  # which needs neither columns nor a modulus
             lists["columns"], young = (), self.modulus
         else:
             young = modulus or self.modulus or STAND_IN
         ratios = damping_ratios_by_name(self.damping_ratio, loss)
-        nominal: dict[str, Any] = {x: tuple(y.nominal for y in lists[x]) for x in lists}
-        nominal["second_moment"] = nominal["second_moment"] or None
-        nominal_ratios = tuple(x.nominal for x in ratios.values())
+        arguments: dict[str, Any] = {
+            name: tuple(number.nominal for number in numbers) for name, numbers in lists.items()
+        }
+        arguments["second_moment"] = arguments["second_moment"] or None
+        if ratios:
+            nominal_ratios = [ratio.nominal for ratio in ratios.values()]
+            arguments["damping_ratio"] = nominal_ratios if len(ratios) > 1 else nominal_ratios[0]
         try:
             model = StoreyFrame(
-                **nominal,
+                **arguments,
                 modulus=None if young is None else young.nominal,
                 damper_placement=self.damper_placement or "ground",
                 outputs=self.outputs,
@@ -319,24 +347,29 @@ class Frame(StructureSection):
                 ground=self.accelerogram,
                 # whether a storey buckles under its weight is not to be judged by a stand-in
                 gravity=0.0 if young is STAND_IN else self.gravity,
-                damping_ratio=nominal_ratios[0] if len(ratios) == 1 else nominal_ratios or None,
             )
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        factors = {x: getattr(self, x) for x in ("rayleigh_mass", "rayleigh_stiffness")}
-        numbers = {"E": young or STAND_IN, **factors, **ratios}
-        if self.second_moment:
-            numbers["I"] = self.second_moment[0]
-        for x, values in lists.items():
-            numbers |= {SYMBOLS[x].format(z): number for z, number in enumerate(values, start=1)}
-        numbers |= {x: Crisp(y) for x, y in model.parameters.items() if x not in numbers}
-        numbered = list(enumerate(lists["lengths"], start=1))
-        heights = {f"{x}{z}": height for x in ("drift", "residual") for z, height in numbered}
-        return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
+
+        stated: dict[str, FuzzyNumber | None] = {
+            "E": young,
+            "I": self.second_moment[0] if self.second_moment else None,
+            "rayleigh_mass": self.rayleigh_mass,
+            "rayleigh_stiffness": self.rayleigh_stiffness,
+            **ratios,
+        }
+        for name, numbers in lists.items():
+            for z, number in enumerate(numbers, start=1):
+                stated[SYMBOLS[name].format(z)] = number
+        by_name = {name: stated.get(name) or Crisp(x) for name, x in model.parameters.items()}
+        heights: dict[str, FuzzyNumber] = {}
+        for z, height in enumerate(lists["lengths"], start=1):
+            heights[f"drift{z}"] = heights[f"residual{z}"] = height
+        return Structure(model, by_name, heights)
 
     def require_consistent(self) -> None:
-        """Refuses a frame without damping, with contradictory damping or impossible values."""
+        """Refuse a frame without damping, with contradictory damping or impossible values."""
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"

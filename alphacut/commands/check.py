@@ -88,7 +88,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             )
         text += modes_text(modes)
     section = content.structure_section
-    if section is not None and structure is not None:
+    if section is not None:
         text += "".join(f"warning: {line}\n" for line in section.warnings(structure))
     if structure and linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
