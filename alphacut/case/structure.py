@@ -334,7 +334,7 @@ class Frame(StructureSection):
         }
         arguments["second_moment"] = arguments["second_moment"] or None
         if ratios:
-            nominal_ratios = [ratio.nominal for ratio in ratios.values()]
+            nominal_ratios = tuple(ratio.nominal for ratio in ratios.values())
             arguments["damping_ratio"] = nominal_ratios if len(ratios) > 1 else nominal_ratios[0]
         try:
             model = StoreyFrame(
