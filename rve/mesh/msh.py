@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +29,9 @@ SOLIDS = {
     29: "Tetrahedron", 30: "Tetrahedron", 31: "Tetrahedron", 92: "Hexahedron", 93: "Hexahedron",
 }  # fmt: skip
 """Names of the elements of three dimensions by their type."""
-VERSIONS = ("2", "2.0", "2.1", "2.2", "4.1")
 REWRITE = "write it as MSH 4.1 or 2.2"
-FORMAT = re.compile(rb"\s*(\S+)\s+([01])\s+(\d+)[ \t\r]*\n")
-NAME = re.compile(rb'\s*(\d+)\s+(-?\d+)\s+"([^"]*)"')
-SECTION = re.compile(rb"^\$(\w+)[ \t\r]*\n", re.MULTILINE)
-VOLUME = 3  # dimension of the entities that hold prisms
-
+VOLUME = 3
+"""Dimension of the entities that hold prisms."""
 
 _Source = Callable[[bytes], "_Numbers"]
 """The numbers of a section by its name."""
@@ -50,11 +47,11 @@ class MshFile:
 
     Args:
         points: Coordinates of the nodes, shape (n, 3).
-        elements: Of each volume and type of element, the indices of the nodes in `points`, shape
-            (elements, nodes of one).
-        groups: Volumes of each physical group.
+        elements: Indices of the nodes in `points`, shape (elements, nodes of one), by the tag of
+            the volume and the type of the element.
+        groups: Tags of the volumes of each physical group.
         names: Names of physical groups, of those that have one.
-        volumes: All volumes that have elements or are named among the entities.
+        volumes: Tags of all volumes that have elements or are named among the entities.
         partitions: Number of parts into which the mesh is divided; 0 if it is whole.
     """
 
@@ -73,14 +70,17 @@ def parse_msh(content: bytes) -> MshFile:
         DamagedMeshError: The file is cut off, contradicts itself, or is of another version.
     """
     sections = _sections(content)
-    match = FORMAT.match(sections.get(b"MeshFormat", b""))
+    match = re.match(rb"\s*(\S+)\s+([01])\s+(\d+)[ \t\r]*\n", sections.get(b"MeshFormat", b""))
     if match is None:
         raise DamagedMeshError('without the line "4.1 0 8" or "2.2 0 8" below $MeshFormat')
-    version, is_binary, size = match[1].decode("latin-1"), match[2] == b"1", int(match[3])
-    if version not in VERSIONS or size != 8:
+    version = match[1].decode("latin-1")
+    is_binary = match[2] == b"1"
+    size = int(match[3])
+    if version not in ("2", "2.0", "2.1", "2.2", "4.1") or size != 8:
         raise DamagedMeshError(f"of version {version} with numbers of {size} bytes; {REWRITE}")
     order = "<"
     if is_binary:
+        # The number 1 in four bytes tells their order.
         one = sections[b"MeshFormat"][match.end() : match.end() + 4]
         if one not in (b"\x01\0\0\0", b"\0\0\0\x01"):
             raise DamagedMeshError("in text, where the line below $MeshFormat says bytes (1)")
@@ -91,25 +91,34 @@ def parse_msh(content: bytes) -> MshFile:
     def numbers(name: bytes) -> _Numbers:
         if name not in sections:
             raise DamagedMeshError(f"without ${name.decode()}")
-        kind = _Binary if is_binary else _Text
-        return kind(sections[name], order)
+        return _Binary(sections[name], order) if is_binary else _Text(sections[name])
 
-    read = _read_version_4 if version == "4.1" else _read_version_2
-    mesh = read(numbers, b"Entities" in sections)
+    if version == "4.1":
+        mesh = _read_version_4(numbers, has_entities=b"Entities" in sections)
+    else:
+        mesh = _read_version_2(numbers)
     if b"PartitionedEntities" in sections:
-        partitions = numbers(b"PartitionedEntities").sizes(1)[0]
-        mesh.partitions = max(int(partitions), 1)
-    for dimension, tag, name in NAME.findall(sections.get(b"PhysicalNames", b"")):
+        mesh.partitions = max(numbers(b"PartitionedEntities").count(), 1)
+    names = re.findall(rb'\s*(\d+)\s+(-?\d+)\s+"([^"]*)"', sections.get(b"PhysicalNames", b""))
+    for dimension, tag, name in names:
         if int(dimension) == VOLUME:
             mesh.names[int(tag)] = name.decode("utf-8", "replace")
     return mesh
 
 
 class _Numbers:
-    """Numbers of a section, taken one after another; raises DamagedMeshError where it ends."""
+    """Numbers of a section, taken one after another; DamagedMeshError is raised where it ends."""
 
     def take(self, count: int, kind: str) -> NDArray[np.generic]:
-        """Return the next numbers of a type of NumPy without its byte order, as "f8"."""
+        """Return the next numbers.
+
+        Args:
+            count: How many.
+            kind: Type of NumPy without its byte order: "i4", "u8" or "f8".
+
+        Raises:
+            DamagedMeshError: There are fewer, or a number is not of the type.
+        """
         raise NotImplementedError
 
     def ints(self, count: int) -> Ints:
@@ -117,7 +126,11 @@ class _Numbers:
         return self.take(count, "i4").astype(np.int64)
 
     def sizes(self, count: int) -> Ints:
-        """Return the next numbers that version 4.1 calls size_t; they are less than 2⁵³."""
+        """Return the next numbers that version 4.1 calls size_t.
+
+        Raises:
+            DamagedMeshError: One is 2⁵³ or more, which no mesh has and a float does not hold.
+        """
         values = self.take(count, "u8").astype(float)
         if (values >= 2.0**53).any():
             raise DamagedMeshError(f"with a count or tag of {values.max():.3g}")
@@ -125,11 +138,11 @@ class _Numbers:
 
     def int_list(self, count: int) -> list[int]:
         """Return the next ints as a list."""
-        return [int(x) for x in self.ints(count)]
+        return [int(number) for number in self.ints(count)]
 
     def size_list(self, count: int) -> list[int]:
         """Return the next numbers, size_t each, as a list."""
-        return [int(x) for x in self.sizes(count)]
+        return [int(number) for number in self.sizes(count)]
 
     def count(self) -> int:
         """Return the next number, a size_t."""
@@ -143,11 +156,12 @@ class _Numbers:
 class _Text(_Numbers):
     """Numbers of a section in text."""
 
-    def __init__(self, content: bytes, order: str) -> None:
+    def __init__(self, content: bytes) -> None:
         try:
             self.values = np.array(content.split(), float)
         except ValueError as error:
-            raise DamagedMeshError(f"with {error}") from None
+            reason = "decimal commas: write points" if b"," in content else str(error)
+            raise DamagedMeshError(f"with {reason}") from None
         self.place = 0
 
     def take(self, count: int, kind: str) -> NDArray[np.generic]:
@@ -164,25 +178,43 @@ class _Text(_Numbers):
 
 
 class _Binary(_Numbers):
-    """Numbers of a section in bytes."""
+    """Numbers of a section in bytes, whose order is that of NumPy, < or >."""
 
     def __init__(self, content: bytes, order: str) -> None:
-        self.content, self.order, self.place = content, order, 0
+        self.content = content
+        self.order = order
+        self.place = 0
 
     def take(self, count: int, kind: str) -> NDArray[np.generic]:
-        dtype = np.dtype(self.order + kind)
+        return self.records(count, np.dtype(self.order + kind))
+
+    def records(self, count: int, dtype: np.dtype[Any]) -> NDArray[np.generic]:
+        """Return the next records of a type of NumPy, shape (count,); errors as of `take`."""
         if not 0 <= count * dtype.itemsize <= len(self.content) - self.place:
             raise DamagedMeshError(f"with {count} numbers promised and fewer there")
         values = np.frombuffer(self.content, dtype, count, self.place)
         self.place += count * dtype.itemsize
         return values
 
+    def line_with_count(self) -> int:
+        """Return the count in the line of text before the bytes of a section of version 2."""
+        line = self.content[self.place : self.place + 32].partition(b"\n")[0]
+        if not re.fullmatch(rb"\s*\d{1,15}\s*", line):
+            raise DamagedMeshError("without a count")
+        self.place += len(line) + 1
+        return int(line)
+
 
 def _sections(content: bytes) -> dict[bytes, bytes]:
-    """What stands between $NAME and $EndNAME, by name; of a name that comes twice the first."""
+    """Return what stands between $NAME and $EndNAME, by name; the first of a name that comes twice.
+
+    Raises:
+        DamagedMeshError: A section does not end.
+    """
     sections: dict[bytes, bytes] = {}
+    begins = re.compile(rb"^\$(\w+)[ \t\r]*\n", re.MULTILINE)
     place = 0
-    while match := SECTION.search(content, place):
+    while match := begins.search(content, place):
         end = content.find(b"$End" + match[1], match.end())
         if end < 0:
             raise DamagedMeshError(f"cut off inside ${match[1].decode('latin-1')}")
@@ -191,108 +223,142 @@ def _sections(content: bytes) -> dict[bytes, bytes]:
     return sections
 
 
-def _read_version_4(numbers: _Source, has_entities: bool) -> MshFile:
-    """The volumes of version 4.1, whose physical groups stand with the entities."""
+def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
+    """Return the volumes of version 4.1, whose physical groups stand with the entities.
+
+    Args:
+        numbers: Function that returns the numbers of a section.
+        has_entities: Whether the file has the section $Entities.
+
+    Raises:
+        DamagedMeshError: The sections contradict themselves or one another.
+    """
     mesh = MshFile(np.empty((0, 3)), {})
     groups = defaultdict[int, list[int]](list)
     if has_entities:
-        for volume, physical in _entities(numbers(b"Entities")):
+        for volume, physical_groups in _volumes_of_version_4(numbers(b"Entities")):
             mesh.volumes.add(volume)
-            for group in physical:
+            for group in physical_groups:
                 groups[group].append(volume)
     mesh.groups = dict(groups)
+
     source = numbers(b"Nodes")
     n_blocks, n_nodes, _, _ = source.size_list(4)
-    tags, points = [], []
+    tags = [np.empty(0, np.int64)]
+    points = [np.empty((0, 3))]
     for _ in range(n_blocks):
         dimension, _, is_parametric = source.int_list(3)
         count = source.count()
         if is_parametric not in (0, 1) or dimension not in range(4):
             raise DamagedMeshError("with a block of nodes of an unknown kind")
         tags.append(source.sizes(count))
+        # Behind the coordinates may stand as many parameters as the entity has dimensions.
         width = 3 + dimension * is_parametric
         points.append(source.floats(count * width).reshape(count, width)[:, :3])
-    all_tags = np.concatenate([np.empty(0, np.int64), *tags])
-    mesh.points = np.concatenate([np.empty((0, 3)), *points])
-    if len(all_tags) != n_nodes:
-        raise DamagedMeshError(f"with {n_nodes} nodes promised and {len(all_tags)} there")
+    mesh.points = np.concatenate(points)
+    if len(mesh.points) != n_nodes:
+        raise DamagedMeshError(f"with {n_nodes} nodes promised and {len(mesh.points)} there")
+
     source = numbers(b"Elements")
     n_blocks, _, _, _ = source.size_list(4)
-    cells = defaultdict[tuple[int, int], list[Ints]](list)
+    runs = defaultdict[tuple[int, int], list[Ints]](list)
     for _ in range(n_blocks):
         dimension, entity, kind = source.int_list(3)
-        width = _node_count(kind)
+        width = 1 + _node_count(kind)  # a tag before the nodes
         count = source.count()
-        block = source.sizes(count * (1 + width)).reshape(count, 1 + width)
+        block = source.sizes(count * width).reshape(count, width)
         if dimension == VOLUME:
-            cells[entity, kind].append(block[:, 1:])
-    return _with_elements(mesh, all_tags, cells)
+            runs[entity, kind].append(block[:, 1:])
+    return _with_elements(mesh, np.concatenate(tags), runs)
 
 
-def _entities(source: _Numbers) -> Iterator[tuple[int, list[int]]]:
-    """Yield each volume of version 4.1 and the physical groups that it is in."""
-    counts = source.size_list(4)
+def _volumes_of_version_4(source: _Numbers) -> Iterator[tuple[int, list[int]]]:
+    """Yield the tag of each volume in a section $Entities, and the groups that it is in."""
+    counts = source.size_list(4)  # of points, curves, surfaces and volumes
     for dimension, count in enumerate(counts):
         for _ in range(count):
             tag = int(source.ints(1)[0])
-            source.floats(3 if dimension == 0 else 6)  # the point, or its box
-            physical = source.int_list(source.count())
+            source.floats(3 if dimension == 0 else 6)  # the point, or the box around the entity
+            groups = source.int_list(source.count())
             if dimension > 0:
                 source.ints(source.count())  # the entities that bound it
             if dimension == VOLUME:
-                yield tag, physical
+                yield tag, groups
 
 
-def _read_version_2(numbers: _Source, has_entities: bool) -> MshFile:
-    """The volumes of version 2, whose elements name their physical group and their entity."""
-    source = numbers(b"Nodes")
-    tags, points = _nodes_of_version_2(source)
+def _read_version_2(numbers: _Source) -> MshFile:
+    """Return the volumes of version 2, whose elements name their physical group and their entity.
+
+    Args:
+        numbers: Function that returns the numbers of a section.
+
+    Raises:
+        DamagedMeshError: The sections contradict themselves or one another.
+    """
+    tags, points = _nodes_of_version_2(numbers(b"Nodes"))
     mesh = MshFile(points, {})
-    source = numbers(b"Elements")
     groups = defaultdict[int, set[int]](set)
-    cells = defaultdict[tuple[int, int], list[Ints]](list)
-    for kind, labels, nodes in _elements_of_version_2(source):
-        if kind not in SOLIDS:
+    runs = defaultdict[tuple[int, int], list[Ints]](list)
+    for run in _runs_of_version_2(numbers(b"Elements")):
+        if run.kind not in SOLIDS:
             continue
-        if labels.shape[1] < 2:
+        if run.labels.shape[1] < 2:
             raise DamagedMeshError("with elements that name no entity")
-        # behind group and entity stand the number of an element's parts, and these; − if a ghost
-        mesh.partitions = max(mesh.partitions, int(np.abs(labels[:, 3:]).max(initial=0)))
-        for entity in map(int, np.unique(labels[:, 1])):
-            is_inside = labels[:, 1] == entity
-            cells[entity, kind].append(nodes[is_inside])
-            for group in map(int, np.unique(labels[is_inside, 0])):
-                if group:
+        # Behind group and entity stand the number of an element's partitions, and these; a ghost
+        # element has them with the sign −.
+        partitions = np.abs(run.labels[:, 3:]).max(initial=0)
+        mesh.partitions = max(mesh.partitions, int(partitions))
+        for entity in map(int, np.unique(run.labels[:, 1])):
+            is_inside = run.labels[:, 1] == entity
+            runs[entity, run.kind].append(run.nodes[is_inside])
+            for group in map(int, np.unique(run.labels[is_inside, 0])):
+                if group:  # 0 stands for none
                     groups[group].add(entity)
     mesh.groups = {group: sorted(groups[group]) for group in sorted(groups)}
-    return _with_elements(mesh, tags, cells)
+    return _with_elements(mesh, tags, runs)
 
 
 def _nodes_of_version_2(source: _Numbers) -> tuple[Ints, Array]:
-    """Tags (n,) and points (n, 3) of the nodes of version 2."""
+    """Return the tags, shape (n,), and the points, shape (n, 3), of the nodes of version 2."""
     if isinstance(source, _Binary):
-        count = _count_line(source)
-        kind = np.dtype([("tag", f"{source.order}i4"), ("point", f"{source.order}f8", (3,))])
-        if count * kind.itemsize > len(source.content) - source.place:
-            raise DamagedMeshError(f"with {count} nodes promised and fewer there")
-        table = np.frombuffer(source.content, kind, count, source.place)
+        order = source.order
+        kind = np.dtype([("tag", f"{order}i4"), ("point", f"{order}f8", (3,))])
+        table: Any = source.records(source.line_with_count(), kind)
         return table["tag"].astype(np.int64), table["point"].astype(float)
     count = source.count()
     rows = source.floats(4 * count).reshape(count, 4)
     return rows[:, 0].astype(np.int64), rows[:, 1:].copy()
 
 
-def _elements_of_version_2(source: _Numbers) -> Iterator[tuple[int, Ints, Ints]]:
-    """Yield types, labels (m, labels) and tags of nodes (m, nodes) of runs of elements."""
+class _Run(NamedTuple):
+    """Elements of one type of version 2.
+
+    Args:
+        kind: Gmsh's number of the type.
+        labels: Physical group, entity and partitions of each, shape (elements, labels).
+        nodes: Tags of their nodes, shape (elements, nodes of one).
+    """
+
+    kind: int
+    labels: Ints
+    nodes: Ints
+
+
+def _runs_of_version_2(source: _Numbers) -> Iterator[_Run]:
+    """Yield the elements of version 2, of one type and number of labels at a time.
+
+    Raises:
+        DamagedMeshError: A run has more elements than remain, or an element is of no known type.
+    """
     if isinstance(source, _Binary):
-        remaining = _count_line(source)
+        remaining = source.line_with_count()
         while remaining > 0:
             kind, count, n_labels = source.int_list(3)
             width = 1 + _label_count(n_labels) + _node_count(kind)
             if not 0 < count <= remaining:
                 raise DamagedMeshError(f"with a run of {count} elements")
             run = source.ints(count * width).reshape(count, width)
-            yield kind, run[:, 1 : 1 + n_labels], run[:, 1 + n_labels :]
+            yield _Run(kind, run[:, 1 : 1 + n_labels], run[:, 1 + n_labels :])
             remaining -= count
         return
     rows = defaultdict[tuple[int, int], list[Ints]](list)
@@ -302,42 +368,50 @@ def _elements_of_version_2(source: _Numbers) -> Iterator[tuple[int, Ints, Ints]]
         rows[kind, n_labels].append(row)
     for (kind, n_labels), rows_of_kind in rows.items():
         table = np.array(rows_of_kind)
-        yield kind, table[:, :n_labels], table[:, n_labels:]
-
-
-def _count_line(source: _Binary) -> int:
-    """The count that stands as a line of text before the bytes of a section of version 2."""
-    line = source.content[source.place : source.place + 32].partition(b"\n")[0]
-    if not re.fullmatch(rb"\s*\d{1,15}\s*", line):
-        raise DamagedMeshError("without a count")
-    source.place += len(line) + 1
-    return int(line)
+        yield _Run(kind, table[:, :n_labels], table[:, n_labels:])
 
 
 def element_name(kind: int) -> str:
     """Return Gmsh's name of a type of element, as "Prism 15"."""
-    return f"{SOLIDS.get(kind, 'type ' + str(kind))} {NODES[kind]}"
+    return f"{SOLIDS.get(kind, f'type {kind}')} {NODES[kind]}"
 
 
 def _node_count(kind: int) -> int:
+    """Return the number of nodes of an element of a type.
+
+    Raises:
+        DamagedMeshError: Gmsh has no such type.
+    """
     if kind not in NODES:
         raise DamagedMeshError(f"with elements of the unknown type {kind}")
     return NODES[kind]
 
 
 def _label_count(count: int) -> int:
+    """Return the number of labels of an element of version 2, if it is a believable one.
+
+    Raises:
+        DamagedMeshError: It is not.
+    """
     if not 0 <= count <= 1000:
         raise DamagedMeshError(f"with {count} tags of an element")
     return count
 
 
-def _with_elements(mesh: MshFile, tags: Ints, cells: dict[tuple[int, int], list[Ints]]) -> MshFile:
-    """The mesh with its elements, whose nodes are turned from tags into indices.
+def _with_elements(
+    mesh: MshFile, tags: Ints, runs: Mapping[tuple[int, int], list[Ints]]
+) -> MshFile:
+    """Return a mesh to which its elements were added, whose tags of nodes become indices.
 
     Args:
-        mesh: Its points, shape (n, 3).
+        mesh: The mesh with its points, shape (n, 3); it is changed in place.
         tags: Tags of the points, shape (n,).
-        cells: Runs of elements of a volume and a type, each the tags of nodes, shape (m, nodes).
+        runs: Elements of a volume and a type, each an array of tags of nodes, shape (elements,
+            nodes of one).
+
+    Raises:
+        DamagedMeshError: A point is not finite, two have one tag, or an element names a tag that no
+            point has.
     """
     if not np.isfinite(mesh.points).all():
         raise DamagedMeshError("with a node whose place is no number")
@@ -345,8 +419,8 @@ def _with_elements(mesh: MshFile, tags: Ints, cells: dict[tuple[int, int], list[
     rising = tags[order]
     if (np.diff(rising) == 0).any():
         raise DamagedMeshError("with two nodes of one tag")
-    for key, runs in cells.items():
-        wanted = np.concatenate(runs)
+    for key, arrays in runs.items():
+        wanted = np.concatenate(arrays)
         place = np.minimum(np.searchsorted(rising, wanted), max(len(rising) - 1, 0))
         if wanted.size and (not len(rising) or (rising[place] != wanted).any()):
             raise DamagedMeshError("with an element whose node is not there")

@@ -320,6 +320,7 @@ $EndElements
         ("1 1\n$EndE", "1 1.5\n$EndE", "no whole number"),
         ("0 0 0\n$End", "0 0 nan\n$End", "whose place is no number"),
         ("0 0 0\n$End", "0 0 0x\n$End", "could not convert"),
+        ("0 0 0\n$End", "0 0,5 0\n$End", "decimal commas: write points"),
         ("$EndElements", "", "cut off inside .Elements"),
         ("$Nodes", "$Knots", "cut off inside .Knots"),
     ],
