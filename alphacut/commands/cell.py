@@ -17,7 +17,7 @@ from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.case.structures import with_structures
 from alphacut.commands.options import Command, add_common, require_petsc, write_answer
-from alphacut.io.files import Document, ranks, say
+from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
 from alphacut.rve.result.engineering_constants import NAMES, engineering_constants
@@ -46,7 +46,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     change, about = "modulus.method={}".format, "prism, slices, series or auto; short for --set"
     parser.add_argument("--method", dest="set", action="append", type=change, help=about)
     parser.add_argument(
-        "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf, .inp"
+        "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf"
     )
 
 
@@ -86,8 +86,6 @@ def export(problem: CellProblem, path: Path) -> Document:
         nominal = problem.nominal
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
         fields = model.fields(nominal.radius_map, nominal.matrix, [nominal.inclusion])
-    if path.suffix == ".inp":
-        say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
     with whole_file(path) as partial:
         nodes = fields.write(partial)
     return {"file": str(path), "nodes": nodes}

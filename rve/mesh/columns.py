@@ -39,53 +39,81 @@ def extrude(
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
         radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
             it.
-        layers: Along θ, at least 1.
-        outline: Of the particle.
-        refinement: Of the edges along an outline that is not round; see `bend_grading`.
+        layers: Number of layers along θ, at least 1.
+        outline: Outline of the particle.
+        refinement: Refinement of the edges along an outline that is not round; see `bend_grading`.
         parallel: Whether Gmsh runs on the first MPI rank, for all of them.
     """
     has_bends = bool(radius) and not is_round(outline)
     bends = refinement if has_bends else 0.0
     make = partial(square.triangles, size, radius, outline, refinement=bends)
     points, triangles, phase = from_first_rank(make) if parallel else make()
-    order = np.lexsort(np.sort(triangles, axis=1).T[::-1])  # neighbours are near in memory
-    triangles, phase = triangles[order], phase[order]
+    # Sorted by their vertices, neighbours are near one another in memory.
+    order = np.lexsort(np.sort(triangles, axis=1).T[::-1])
+    triangles = triangles[order]
+    phase = phase[order]
     plane = _quadratic(points, triangles, phase, radius, outline)
-    # nodes level by level, then mid-level by mid-level
-    on_levels = np.arange(layers + 1)[:, None, None] * len(plane.points) + plane.triangles
-    first_on_mid_level = (layers + 1) * len(plane.points) + np.arange(layers) * len(points)
+
+    # The nodes of all levels come first, then those of all mid-levels.
+    num_vertices = len(points)
+    num_nodes = len(plane.points)
+    on_levels = np.arange(layers + 1)[:, np.newaxis, np.newaxis] * num_nodes + plane.triangles
+    first_on_mid_level = (layers + 1) * num_nodes + np.arange(layers) * num_vertices
     cells = np.empty((layers, len(triangles), 15), np.int64)
-    cells[..., BELOW], cells[..., ABOVE] = on_levels[:-1], on_levels[1:]
-    cells[..., MID_LEVEL] = first_on_mid_level[:, None, None] + triangles
-    names = NAMES if radius else NAMES[:1]
-    heights: Array = np.asarray(np.linspace(0, 1, layers + 1), float)
-    prism_phase = np.tile(phase, layers)
-    return PrismGrid(plane, cells.reshape(-1, 15), heights, prism_phase, names, radius > 0)
+    cells[..., BELOW] = on_levels[:-1]
+    cells[..., ABOVE] = on_levels[1:]
+    cells[..., MID_LEVEL] = first_on_mid_level[:, np.newaxis, np.newaxis] + triangles
+    return PrismGrid(
+        plane,
+        cells=cells.reshape(-1, 15),
+        heights=np.asarray(np.linspace(0, 1, layers + 1), float),
+        phase=np.tile(phase, layers),
+        names=NAMES if radius else NAMES[:1],
+        conforming=radius > 0,
+    )
 
 
 def _quadratic(
     points: Array, triangles: Ints, phase: Ints, radius: float, outline: Outline
 ) -> Triangulation:
-    """Triangulation of straight-sided triangles with the middles of their edges."""
+    """Return straight-sided triangles with the midpoints of their edges as nodes.
+
+    Args:
+        points: Vertices, shape (n, 2).
+        triangles: Vertices of each triangle, shape (m, 3).
+        phase: Phase of each triangle, shape (m,).
+        radius: Radius of the particle, 0 for none.
+        outline: Outline of the particle.
+    """
     inside = phase == NAMES.index("inclusion")
     ends, edges, on_interface = square.edges(triangles, inside)
-    nodes = np.hstack([triangles, len(points) + edges[:, ::-1]])  # edges 01, 02, 12
     arc = np.zeros(len(points) + len(ends), bool)
     arc[ends[on_interface]] = True
     arc[len(points) :] = on_interface
-    positions = np.concatenate([points, points[ends].mean(axis=1)])
-    return Triangulation(positions, len(points), ends, nodes, inside, arc, radius, outline)
+    return Triangulation(
+        points=np.concatenate([points, points[ends].mean(axis=1)]),
+        vertices=len(points),
+        ends=ends,
+        triangles=np.hstack([triangles, len(points) + edges[:, ::-1]]),  # edges 01, 02, 12
+        inside=inside,
+        arc=arc,
+        radius=radius,
+        outline=outline,
+    )
 
 
 def from_first_rank(make: Callable[[], T]) -> T:
-    """Result of `make` on the first MPI rank, sent to all; its exception is raised on all."""
-    from alphacut.rve.fenicsx import MPI  # which meshes of one process do without
+    """Return on all MPI ranks the result of `make` on the first one, or raise its exception.
+
+    MPI is imported here, since a process of its own does without.
+    """
+    from alphacut.rve.fenicsx import MPI
 
     result: T | Exception | None = None
     if MPI.COMM_WORLD.rank == 0:
         try:
             result = make()
-        except Exception as error:  # the other ranks wait for it
+        except Exception as error:  # which the other ranks wait for
             result = error
     result = MPI.COMM_WORLD.bcast(result)
     if isinstance(result, Exception):
@@ -94,56 +122,79 @@ def from_first_rank(make: Callable[[], T]) -> T:
 
 
 def grid_of(prisms: Prisms) -> PrismGrid:
-    """Grid of prisms where they are, their nodes numbered level by level, and the mesh below them.
+    """Return the grid of prisms where they are, with the plane mesh below them.
+
+    Nodes are numbered level by level, and prisms layer by layer.
 
     Raises:
-        MeshError: They do not lie in columns, or a column does not pass all levels.
+        MeshError: The prisms do not lie in columns, or a column does not pass all levels.
     """
     thetas, level = _levels(prisms)
-    # columns are what the vertical edges connect
+    layers = len(thetas) - 1
+
+    # Nodes that vertical edges connect are one column.
     below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
     above = prisms.cells[:, ABOVE + MID_LEVEL].ravel()
-    links = np.ones(len(below), np.int8), (below, above)
-    graph = sp.coo_matrix(links, (len(prisms.points),) * 2)
-    num_columns, column = connected_components(graph, directed=False)
+    num_points = len(prisms.points)
+    links = sp.coo_matrix((np.ones(len(below), np.int8), (below, above)), (num_points, num_points))
+    num_columns, column = connected_components(links, directed=False)
+
+    # Each column is a node of the plane mesh, where vertices stand before midpoints of edges.
     layer = level[prisms.cells[:, 0]]
     lowest = column[prisms.cells[layer == 0]]
-    # planar nodes are the columns, vertices before edge midpoints
     vertices = np.unique(lowest[:, :3])
     midpoints = np.setdiff1d(lowest[:, BELOW], vertices)
     planar_of_column: Ints = np.full(num_columns, -1)
     planar_of_column[vertices] = np.arange(len(vertices))
     planar_of_column[midpoints] = len(vertices) + np.arange(len(midpoints))
     planar = planar_of_column[column]
-    number = _number_nodes(prisms, level, planar, len(thetas) - 1, len(vertices))
+    number = _number_nodes(prisms, level, planar=planar, layers=layers, vertices=len(vertices))
+
+    # Prisms above one triangle have the same three planar vertices.
     below_prisms = np.sort(planar[prisms.cells[:, :3]], axis=1)
     triangle = np.unique(below_prisms, axis=0, return_inverse=True)[1].ravel()
-    if (np.bincount(triangle) != len(thetas) - 1).any():
+    if (np.bincount(triangle) != layers).any():
         raise MeshError("layers of prisms differ", "extrude the whole plane")
     order = np.lexsort((triangle, layer))
-    cells, fixed = number[prisms.cells[order]], np.empty_like(prisms.points)
+    cells = number[prisms.cells[order]]
+    fixed = np.empty_like(prisms.points)
     fixed[number] = prisms.points
+
     triangles = cells[: int(triangle.max()) + 1, BELOW]
     ends: Ints = np.empty((len(midpoints), 2), np.intp)
-    for middle, corners in zip((3, 4, 5), ([0, 1], [0, 2], [1, 2]), strict=True):
+    for middle, corners in ((3, [0, 1]), (4, [0, 2]), (5, [1, 2])):
         ends[triangles[:, middle] - len(vertices)] = triangles[:, corners]
-    inside, arc = (np.zeros(count, bool) for count in (len(triangles), num_columns))
-    lowest_points = fixed[:num_columns, :2]
-    plane = Triangulation(lowest_points, len(vertices), ends, triangles, inside, arc, radius=0.0)
+    plane = Triangulation(
+        points=fixed[:num_columns, :2],
+        vertices=len(vertices),
+        ends=ends,
+        triangles=triangles,
+        inside=np.zeros(len(triangles), bool),
+        arc=np.zeros(num_columns, bool),
+        radius=0.0,
+    )
     heights = (thetas - thetas[0]) / (thetas[-1] - thetas[0])
     return PrismGrid(plane, cells, heights, prisms.phase[order], prisms.names, fixed=fixed)
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Ints]:
-    """θ of the k levels, rising, and the level of each node, −1 on mid-levels, shape (n,)."""
+    """Return θ of the levels, rising, and the level of each node, shape (nodes,).
+
+    Nodes on mid-levels have the level −1.
+
+    Raises:
+        MeshError: A prism does not stand on one level with its top on the next.
+    """
     on_levels = np.unique(prisms.cells[:, BELOW + ABOVE])
     theta = prisms.points[:, 2]
     rising = np.sort(theta[on_levels])
     thetas = rising[np.append(True, np.diff(rising) > SAME_PLACE)]
     level: Ints = np.full(len(theta), -1)
     level[on_levels] = np.searchsorted(thetas, theta[on_levels] + SAME_PLACE, side="right") - 1
-    below, above = level[prisms.cells[:, BELOW]], level[prisms.cells[:, ABOVE]]
-    is_tilted = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
+    below = level[prisms.cells[:, BELOW]]
+    above = level[prisms.cells[:, ABOVE]]
+    lowest = below[:, :1]
+    is_tilted = (below != lowest).any(axis=1) | (above != lowest + 1).any(axis=1)
     if is_tilted.any():
         x, y, z = prisms.points[prisms.cells[np.argmax(is_tilted), 0]]
         raise MeshError(
@@ -154,13 +205,25 @@ def _levels(prisms: Prisms) -> tuple[Array, Ints]:
     return np.asarray(thetas), level
 
 
-def _number_nodes(prisms: Prisms, level: Ints, planar: Ints, layers: int, vertices: int) -> Ints:
-    """New number of each node, (n,): all levels, then the mid-levels, vertices first."""
+def _number_nodes(prisms: Prisms, level: Ints, *, planar: Ints, layers: int, vertices: int) -> Ints:
+    """Return the new number of each node: all levels, then the mid-levels, vertices first.
+
+    Args:
+        prisms: The prisms.
+        level: Level of each node, −1 on mid-levels.
+        planar: Node of the plane mesh below each node, −1 where its column is not a lowest one.
+        layers: Number of layers.
+        vertices: Number of vertices of the plane mesh.
+
+    Raises:
+        MeshError: A column does not pass all levels, so that numbers are missing.
+    """
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
-    half = prisms.cells[:, MID_LEVEL]
-    below = level[prisms.cells[:, :3]]
-    number[half] = (layers + 1) * per_level + below * vertices + planar[half]
+    on_mid_levels = prisms.cells[:, MID_LEVEL]
+    level_below = level[prisms.cells[:, :3]]
+    first_on_mid_level = (layers + 1) * per_level + level_below * vertices
+    number[on_mid_levels] = first_on_mid_level + planar[on_mid_levels]
     expected = (layers + 1) * per_level + layers * vertices
     if (planar < 0).any() or not np.array_equal(np.sort(number), np.arange(expected)):
         raise MeshError("columns of prisms do not pass all levels", "extrude the whole plane")

@@ -24,8 +24,6 @@ from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
 PRISM_15 = 18  # Gmsh's type of the element
-ABAQUS_ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
-"""Of a prism in Abaqus and VTK: edges of the lower triangle, of the upper, and vertical ones."""
 MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms"
 PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2"
 EXTRUDE = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"

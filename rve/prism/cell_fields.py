@@ -1,4 +1,4 @@
-"""Fields of a cell at its nodes, and their files: Gmsh's, VTK's, XDMF and Abaqus's."""
+"""Fields of a cell at its nodes, and their files: Gmsh's, VTK's and XDMF."""
 
 from __future__ import annotations
 
@@ -10,17 +10,10 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
-from alphacut.rve.mesh.file import ABAQUS_ORDER, write
+from alphacut.rve.mesh.file import write
 
-COMPONENTS = ("11", "22", "12")
-FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf", ".inp": "abaqus"}
+FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf"}
 """Endings of names with the format that they mean."""
-VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])
-EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]
-SIDES = np.array(
-    [[0, 1, 3, 4, 6, 8, 10, 12], [0, 2, 3, 5, 7, 8, 11, 13], [1, 2, 4, 5, 9, 10, 11, 14]]
-)
-"""Corners of Basix's prism, ends of its edges, and of each side the corners and middle nodes."""
 
 
 @dataclass(frozen=True)
@@ -49,117 +42,125 @@ class CellFields:
     def write(self, path: Path | str) -> int:
         """Write mesh, phases, displacements and stresses; return the number of nodes written.
 
-        The name ends in .vtu or .xdmf (tetrahedra that ParaView and PyVista draw), .msh or .inp
-        (without fields); see `write_fields`.
+        The ending of the name chooses the format. A file of Gmsh (.msh) holds the mesh once, with
+        fields as values at the nodes of its elements. In those of VTK (.vtu) and in XDMF (.xdmf)
+        nodes of the interface stand twice, since stresses jump there, and each prism is three
+        quadratic tetrahedra, which ParaView and PyVista draw.
+
+        Raises:
+            RefusedError: The name has none of these endings.
         """
-        return write_fields(self, Path(path))
+        path = Path(path)
+        kind = FORMATS.get(path.suffix)
+        if kind is None:
+            raise RefusedError("file", str(path), f"names that end in {', '.join(FORMATS)}")
+        if kind == "gmsh":
+            return self._write_gmsh(path)
+        import meshio
+
+        fine = self.in_tetrahedra()
+        mesh = meshio.Mesh(
+            fine.points,
+            [("tetra10", fine.cells)],
+            point_data=fine._point_fields(),
+            cell_data={"phase": [fine.phase]},
+        )
+        options = {"data_format": "XML"} if kind == "xdmf" else {}
+        meshio.write(path, mesh, file_format=kind, **options)
+        return len(fine.points)
+
+    def _write_gmsh(self, path: Path) -> int:
+        """Write the mesh with its fields by Gmsh, and return the number of its nodes."""
+        points: Array = np.empty((self.node.max() + 1, 3))
+        points[self.node] = self.points
+        values = {
+            name: data[self.cells].reshape(*self.cells.shape, -1)
+            for name, data in self._point_fields().items()
+        }
+        write(path, points, self.node[self.cells], self.phase, self.names, values)
+        return len(points)
+
+    def _point_fields(self) -> dict[str, Array]:
+        """Return displacements, (n, 3), and stresses, (n,), of each load by name with unit."""
+        data = {}
+        for load in range(self.displacement.shape[-1]):
+            in_space = np.pad(self.displacement[..., load], ((0, 0), (0, 1)))  # none along θ
+            data[f"displacement_{load + 1}_in_half_sides"] = in_space
+            for row, name in enumerate(("11", "22", "12")):
+                data[f"stress_{load + 1}_{name}_Pa"] = self.stress[:, row, load]
+        return data
 
     def in_tetrahedra(self) -> CellFields:
-        """The same with each prism as three quadratic tetrahedra in VTK's order, (3 m, 10).
+        """Return the fields with each prism as three quadratic tetrahedra.
 
-        Centres of the prisms' sides, where diagonals have their middle nodes, come last among the
-        points, with values interpolated as in the prism and −1 as their `node`.
+        Returns:
+            Fields whose `cells` are nodes of tetrahedra in VTK's order, shape (3 m, 10). The
+            centres of the prisms' sides, where diagonals have their midpoints, come last among the
+            points. Their values are interpolated as in the prism, and their `node` is −1.
         """
-        columns = np.argsort(self.node[self.cells[:, :3]], axis=1)  # same diagonals from both sides
+        # Sides that two prisms share get one number, by their corners.
         prism_sides = self.cells[:, SIDES].reshape(-1, 8)
         corners = np.sort(prism_sides[:, :4], axis=1)
         _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
         nodes = np.column_stack([self.cells, len(self.points) + number.reshape(-1, 3)])
+
+        # Diagonals rise from the smaller to the larger number of the mesh's nodes, so that both
+        # prisms of a side have the same one.
+        columns = np.argsort(self.node[self.cells[:, :3]], axis=1)
         cells = np.empty((len(nodes), 3, 10), int)
         for order in permutations(range(3)):
             chosen = (columns == order).all(axis=1)
             cells[chosen] = nodes[chosen][:, _tetrahedra_nodes(order)]
+
         sides = prism_sides[first]
-        points, displacement, stress = (
-            np.concatenate([x, x[sides[:, 4:]].sum(axis=1) / 2 - x[sides[:, :4]].sum(axis=1) / 4])
-            for x in (self.points, self.displacement, self.stress)
+
+        def with_centres(values: Array) -> Array:
+            """Return values at points with those at centres of sides, by shape functions there."""
+            at_midpoints = values[sides[:, 4:]].sum(axis=1) / 2
+            at_corners = values[sides[:, :4]].sum(axis=1) / 4
+            return np.concatenate([values, at_midpoints - at_corners])
+
+        return CellFields(
+            points=with_centres(self.points),
+            cells=cells.reshape(-1, 10),
+            phase=np.repeat(self.phase, 3),
+            displacement=with_centres(self.displacement),
+            stress=with_centres(self.stress),
+            names=self.names,
+            node=np.concatenate([self.node, np.full(len(sides), -1)]),
         )
-        phase, names = np.repeat(self.phase, 3), self.names
-        node = np.concatenate([self.node, np.full(len(sides), -1)])
-        return CellFields(points, cells.reshape(-1, 10), phase, displacement, stress, names, node)
+
+
+SIDES = np.array(
+    [[0, 1, 3, 4, 6, 8, 10, 12], [0, 2, 3, 5, 7, 8, 11, 13], [1, 2, 4, 5, 9, 10, 11, 14]]
+)
+"""Nodes of the three rectangular sides of Basix's prism: four corners, then four midpoints."""
 
 
 def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
-    """Nodes, shape (3, 10), of a prism's tetrahedra; its diagonals rise along `columns`."""
-    lower, upper = list(columns), [3 + column for column in columns]
-    middles = {frozenset(edge): 6 + k for k, edge in enumerate(EDGES)}
-    for k, (a, b, c, d, *_) in enumerate(SIDES):
-        middles |= dict.fromkeys([frozenset((a, d)), frozenset((b, c))], 15 + k)
+    """Return the nodes of the three tetrahedra of a prism, shape (3, 10), in VTK's order.
+
+    Args:
+        columns: Vertical edges of the prism, 0 to 2, in the order in which diagonals rise: from
+            the lower end of an earlier one to the upper end of a later one.
+    """
+    edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # of Basix
+    midpoints = {frozenset(edge): 6 + number for number, edge in enumerate(edges)}
+    for number, side in enumerate(SIDES):
+        # Both diagonals of a side, between its corners 0 and 3 and 1 and 2, have their midpoint in
+        # its centre.
+        midpoints[frozenset((int(side[0]), int(side[3])))] = 15 + number
+        midpoints[frozenset((int(side[1]), int(side[2])))] = 15 + number
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    lower = list(columns)
+    upper = [3 + column for column in columns]
     tetrahedra = []
     for k in range(3):
         corners = lower[: k + 1] + upper[k:]
-        if np.linalg.det(VERTICES[corners[1:]] - VERTICES[corners[0]]) < 0:
+        if np.linalg.det(vertices[corners[1:]] - vertices[corners[0]]) < 0:
             corners[:2] = corners[1], corners[0]
-        ends = [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]
-        tetrahedra.append(corners + [middles[frozenset((corners[i], corners[j]))] for i, j in ends])
+        nodes = list(corners)
+        for i, j in ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)):  # edges in VTK's order
+            nodes.append(midpoints[frozenset((corners[i], corners[j]))])
+        tetrahedra.append(nodes)
     return np.array(tetrahedra)
-
-
-def write_fields(fields: CellFields, path: Path) -> int:
-    """Write mesh, phases, displacements and stresses, and return the number of nodes written.
-
-    The ending of the file's name chooses the format. Gmsh's file holds the mesh once, with fields
-    as values at the nodes of its elements; in VTK's and XDMF nodes of the interface stand twice,
-    since stresses jump there, and each prism is three quadratic tetrahedra. Abaqus's has no fields.
-
-    Raises:
-        RefusedError: The name has none of the endings `FORMATS`.
-    """
-    kind = FORMATS.get(path.suffix)
-    if kind is None:
-        raise RefusedError("file", str(path), f"names that end in {', '.join(FORMATS)}")
-    if kind == "gmsh":
-        return _write_gmsh(fields, path)
-    if kind == "abaqus":
-        return _write_abaqus(fields, path)
-    import meshio
-
-    fine = fields.in_tetrahedra()
-    cells, phase = [("tetra10", fine.cells)], {"phase": [fine.phase]}
-    mesh = meshio.Mesh(fine.points, cells, _point_fields(fine), phase)
-    options = {"data_format": "XML"} if kind == "xdmf" else {}
-    meshio.write(path, mesh, file_format=kind, **options)
-    return len(fine.points)
-
-
-def _write_gmsh(fields: CellFields, path: Path) -> int:
-    """Write a mesh with its fields by Gmsh, nodes of the interface once; return their number."""
-    points = _node_points(fields)
-    values = {name: data[fields.cells] for name, data in _point_fields(fields).items()}
-    shaped = {name: x.reshape(len(x), 15, -1) for name, x in values.items()}
-    write(path, points, fields.node[fields.cells], fields.phase, fields.names, shaped)
-    return len(points)
-
-
-def _point_fields(fields: CellFields) -> dict[str, Array]:
-    """Displacements, (n, 3), and stresses, (n,), of each load case by name with their unit."""
-    data = {}
-    for load in range(fields.displacement.shape[-1]):
-        in_space = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))  # none along θ
-        data[f"displacement_{load + 1}_in_half_sides"] = in_space
-        for row, name in enumerate(COMPONENTS):
-            data[f"stress_{load + 1}_{name}_Pa"] = fields.stress[:, row, load]
-    return data
-
-
-def _node_points(fields: CellFields) -> Array:
-    """Points of the nodes, (n, 3); on the interface a point of each phase has the same node."""
-    points: Array = np.empty((fields.node.max() + 1, 3))
-    points[fields.node] = fields.points
-    return points
-
-
-def _write_abaqus(fields: CellFields, path: Path) -> int:
-    """Write nodes, prisms and a set of elements for each phase; return the number of nodes."""
-    points, cells = _node_points(fields), 1 + fields.node[fields.cells][:, ABAQUS_ORDER]
-    numbers = np.arange(1, 1 + max(len(points), len(cells)))
-    with path.open("wb") as file:
-        file.write(b"*HEADING\nx1 and x2 in halves of the side of the cell, x3 is theta\n*NODE\n")
-        rows = np.column_stack([numbers[: len(points)], points])
-        np.savetxt(file, rows, "%d, %.16g, %.16g, %.16g")
-        for phase, name in enumerate(fields.names):
-            chosen = fields.phase == phase
-            file.write(f"*ELEMENT, TYPE=C3D15, ELSET={name}\n".encode())
-            rows = np.column_stack([numbers[: len(cells)], cells])[chosen]
-            np.savetxt(file, rows, "%d", delimiter=", ")  # 16 numbers, the most of a line
-    return len(points)

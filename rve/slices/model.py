@@ -1,7 +1,8 @@
 """Slices: two-dimensional cell problems at the nodes of a rule in θ, by curved Lagrange triangles.
 
 The product-space form has no θ-derivative, so its exact solution at each θ is the plane problem
-with radius r(θ). The error of a slice is told by orders and meshes.
+with radius r(θ). The error of a slice is estimated from elements of the next order and from a
+second mesh.
 """
 
 from __future__ import annotations
@@ -47,28 +48,22 @@ from alphacut.rve.solver.krylov import ConvergenceError, solve
 from alphacut.rve.solver.numbering import Elimination
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
-PREFIX = "rve_slice_"
-RESIDUAL = 1e-8  # relative, of a factorisation
-ORDER, REFERENCE_ORDER = 4, 5
-"""Polynomial degree of the elements, and the next, which estimates their error."""
-LIMIT = 0.7
-"""Mesh size up to which the second mesh is twice as coarse, in halves of the cell's side: there
-size ends to matter. Where it would lie above, the second mesh is twice as fine."""
-ORDER_SAFETY = 1.6
-"""True error of order 4 over its distance from order 5: 1.02 … 1.59 of 216 moduli (ellipses and
-stars, contrasts 1e-3 … 1e3, mesh sizes 0.15, 0.3, 0.6)."""
-MESH_SAFETY = 1.1
-"""The same over the distance from order 5 on the finer mesh: 1.00 … 1.07."""
-NOISE = 1e-12  # of an energy, over the modulus
-ROUND_OFF = 1e-13
-CANCELLATION = 2e-14  # relative round-off for each unit of radius and contrast
+MAX_SECOND_SIZE = 0.7
+"""Largest size of the second mesh, in halves of the cell's side. On coarser meshes small particles
+fix the size of all elements, so that two sizes give one mesh. Tuned."""
 
 
 class PlaneCell:
     """Periodic cell in plane strain of isoparametric triangles; sides are paired by elimination.
 
-    `order` is the polynomial degree of field and geometry, `unknowns` their number, `weights` those
-    of the quadrature points in each phase over the area, shape (phases, points).
+    Args:
+        mesh: Straight-sided triangles.
+        order: Polynomial degree of displacements and geometry.
+
+    Attributes:
+        unknowns: Number of unknowns of the linear system.
+        weights: Weights of the quadrature points in each phase, over the area of the cell, shape
+            (phases, points).
     """
 
     def __init__(self, mesh: PlaneMesh, order: int) -> None:
@@ -77,48 +72,68 @@ class PlaneCell:
         element = basix.ufl.element("P", "triangle", order, variant, shape=(2,))
         plane = mesh_of(MPI.COMM_SELF, cells, len(nodes), element)
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
-        space, degree = fem.functionspace(plane, element), quadrature_degree(order)
+        space = fem.functionspace(plane, element)
         self._phase = mesh.phase[plane.topology.original_cell_index]
-        is_phase = np.equal.outer(np.arange(int(mesh.phase.max()) + 1), self._phase)
+
+        degree = quadrature_degree(order)
         dx = ufl.Measure("dx", plane, metadata={"quadrature_degree": degree})
         self._form = CellForm(space, fem.functionspace(plane, ("DG", 0, (3, 3))), dx)
         points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
         self._point_strains = PointStrains(space, points)
         areas = abs(self._point_strains.determinants()) * weights / AREA
-        self.weights: Array = (is_phase[:, :, None] * areas).reshape(len(is_phase), -1)
+        is_phase = np.equal.outer(np.arange(int(mesh.phase.max()) + 1), self._phase)
+        self.weights: Array = (is_phase[:, :, np.newaxis] * areas).reshape(len(is_phase), -1)
+
+        # Nodes on opposite sides have one pair of unknowns.
         positions: Array = np.empty((len(nodes), 2))
         positions[space.dofmap.list] = plane.geometry.x[plane.geometry.dofmap, :2]
         pairs = unknowns(positions)
         self.unknowns = 2 * (int(pairs.max()) + 1)
-        cells, rows = pairs[space.dofmap.list], range(self.unknowns)
-        self._elimination = Elimination(pairs, cells, rows, self.unknowns, MPI.COMM_SELF)
+        self._elimination = Elimination(
+            pairs,
+            cells=pairs[space.dofmap.list],
+            rows=range(self.unknowns),
+            size=self.unknowns,
+            comm=MPI.COMM_SELF,
+        )
 
     def strains(self, phases: Sequence[Array]) -> Array:
-        """Strains at the quadrature points under unit strains, (points, 3, 3); stiffness in Pa.
+        """Return the strains at the quadrature points under three unit strains.
+
+        Args:
+            phases: Stiffness of each phase, (3, 3) each, in Pa.
+
+        Returns:
+            (ε11, ε22, 2 ε12) under each unit strain (last axis), shape (points, 3, 3).
 
         Raises:
             ConvergenceError: The linear system was not solved.
         """
-        matrix, unit_strains = self._elimination.matrix, np.eye(3)
+        matrix = self._elimination.matrix
+        unit_strains = np.eye(3)
         self._form.stiffness.x.array[:] = np.array(phases)[self._phase].ravel()
         self._form.assemble(matrix)
         loads = [self._elimination.forces(self._form.load(strain)) for strain in unit_strains]
-        solved = solve(cholesky(matrix, PREFIX), loads)
-        if not solved.residual <= RESIDUAL:
+        solved = solve(cholesky(matrix, "rve_slice_"), loads)
+        allowed = 1e-8  # far above the round-off of a factorisation, far below declared errors
+        if not solved.residual <= allowed:
             raise ConvergenceError(
                 f"the factorisation of a plane cell leaves a relative residual of"
-                f" {solved.residual:.1e}; {RESIDUAL:g} is allowed",
+                f" {solved.residual:.1e}; {allowed:g} is allowed",
                 "check the moduli, or take the series",
             )
-        displacements = map(self._elimination.displacements, solved.vectors)
-        fields = [self._point_strains(u) for u in displacements]
-        return np.asarray((np.stack(fields, axis=-1) + unit_strains).reshape(-1, 3, 3))
+        displacements = [self._elimination.displacements(vector) for vector in solved.vectors]
+        fluctuations = np.stack([self._point_strains(u) for u in displacements], axis=-1)
+        return np.asarray((fluctuations + unit_strains).reshape(-1, 3, 3))
 
     def solve(self, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:
-        """Homogenised stiffness, (3, 3), and energies of the phases, (phases, 2, 3), in Pa."""
+        """Return the homogenised stiffness and the energies of the phases, both in Pa.
+
+        Their shapes are (3, 3) and (phases, 2, 3); see `energies_by_phase`.
+        """
         stiffness = [phase.stiffness for phase in phases]
-        # means of ε_a ⊗ ε_b by phase under unit strains, of which `THREE_LOADS` are sums
         products = strain_products(self.strains(stiffness), self.weights)
+        # Each of `THREE_LOADS` is a sum of the unit strains.
         load_products = np.einsum("piajb,ka,lb->pikjl", products, THREE_LOADS, THREE_LOADS)
         energies = energies_by_phase(load_products, phases, THREE_LOADS)
         return total_energy(products, stiffness), energies
@@ -153,41 +168,60 @@ def solve_slice(
 
     The error is the larger of two distances of order 4 from order 5, on the same mesh and on a
     second one, each with a safety factor. Without the symmetry of the square, the larger of the
-    errors with C11 and with C22 counts. `radius` and `mesh_size` are in halves of the cell's side.
+    errors with C11 and with C22 counts.
+
+    Args:
+        radius: Radius of the particle, in halves of the cell's side.
+        matrix: Material outside the particle.
+        inclusions: Materials of the particle.
+        mesh_size: Edge length far from the interface, in halves of the cell's side.
+        outline: Outline of the particle.
     """
-    second_size = 2 * mesh_size if 2 * mesh_size <= LIMIT else mesh_size / 2
-    first, second = (
-        plane_mesh(radius, size=size, outline=outline) for size in (mesh_size, second_size)
-    )
-    cells = [PlaneCell(first, ORDER), *(PlaneCell(x, REFERENCE_ORDER) for x in (first, second))]
+    is_coarser = 2 * mesh_size <= MAX_SECOND_SIZE
+    second_size = 2 * mesh_size if is_coarser else mesh_size / 2
+    first_mesh = plane_mesh(radius, size=mesh_size, outline=outline)
+    second_mesh = plane_mesh(radius, size=second_size, outline=outline)
+    cell = PlaneCell(first_mesh, order=4)
+    higher_order_cell = PlaneCell(first_mesh, order=5)
+    second_cell = PlaneCell(second_mesh, order=5)
     slices = []
     for inclusion in inclusions:
         phases = matrix, inclusion
+        stiffness, energies = cell.solve(phases)
+        higher_stiffness, higher_energies = higher_order_cell.solve(phases)
+        second_stiffness, _ = second_cell.solve(phases)
+
+        # The safety factors are tuned on 216 moduli (ellipses and stars, contrasts 1e-3 … 1e3, mesh
+        # sizes .15, .3, .6): the true error of order 4 was 1.02 … 1.59 times its distance from
+        # order 5, and 1.00 … 1.07 times that from order 5 on the finer mesh.
         square = is_round(outline) and all(isinstance(phase, Phase) for phase in phases)
-        (stiffness, energies), (higher, reference_energies), (on_second_mesh, _) = (
-            cell.solve(phases) for cell in cells
-        )
-        by_order = ORDER_SAFETY * _distance(stiffness, higher, square=square)
-        by_mesh = MESH_SAFETY * _distance(stiffness, on_second_mesh, square=square)
+        by_order = 1.6 * _distance(stiffness, higher_stiffness, square=square)
+        by_mesh = 1.1 * _distance(stiffness, second_stiffness, square=square)
+        # Round-off grows with the contrast, since displacements of the particle cancel.
         contrast = inclusion.stiffness[2, 2] / matrix.stiffness[2, 2]
-        errors = np.maximum(by_order, by_mesh) + ROUND_OFF + CANCELLATION * radius * contrast
-        noise = NOISE * energies.sum(axis=(0, 1))
-        energy_errors = ORDER_SAFETY * abs(energies - reference_energies) + noise
-        energies = np.array([energies, energy_errors])
-        slices.append(Slice(stiffness, errors, energies, cells[0].unknowns))
+        round_off = 1e-13 + 2e-14 * radius * contrast
+        energy_round_off = 1e-12 * energies.sum(axis=(0, 1))
+        energy_errors = 1.6 * abs(energies - higher_energies) + energy_round_off
+        slices.append(
+            Slice(
+                stiffness,
+                errors=np.maximum(by_order, by_mesh) + round_off,
+                energies=np.array([energies, energy_errors]),
+                unknowns=cell.unknowns,
+            )
+        )
     return slices
 
 
 def _distance(first: Array, second: Array, *, square: bool) -> Array:
-    """Largest relative distance of each modulus along either axis, shape (3,)."""
+    """Return the largest relative distance of each modulus along either axis, shape (3,)."""
     ratio = axial_moduli(first, square=square) / axial_moduli(second, square=square)
     return np.asarray((np.maximum(ratio, 1 / ratio) - 1).max(axis=0))
 
 
-_DIGITS = 12  # radii equal to so many decimals are one slice
-_FINE = 128  # points of a rule in θ whose error is below rounding
-_SAFETY = 1.6  # of the error in θ
-_NOISE = 1e-13  # of a declared error: what rounding leaves
+def _rounded(radii: Array) -> Array:
+    """Return radii to twelve decimals: those that agree in them are solved as one slice."""
+    return np.round(radii, 12)
 
 
 @dataclass(frozen=True)
@@ -213,12 +247,12 @@ class SlicesModel(CellModel):
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
-        """The slices of a mesh size and an outline; see `CellModel`."""
+        """Return the slices of a mesh size and an outline; see `CellModel`."""
         return cls(mesh_size=resolution.mesh_size, outline=resolution.outline)
 
     @property
     def is_exact(self) -> bool:
-        """Whether the particle is round, of which mechanics proves signs; see `CellModel`."""
+        """Whether the particle is round, of which mechanics proves signs; see `AnyModel`."""
         return is_round(self.outline)
 
     @property
@@ -227,13 +261,15 @@ class SlicesModel(CellModel):
         return "one UFL form over curved triangles by DOLFINx, solved by PETSc's cholesky"
 
     def coarser(self) -> Self:
-        """Slices on elements twice as large."""
-        return replace(self, mesh_size=min(2 * self.mesh_size, LIMIT))
+        """Return slices on elements twice as large."""
+        return replace(self, mesh_size=min(2 * self.mesh_size, MAX_SECOND_SIZE))
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """Homogenised stiffness for each of `inclusions`, in their order, with energies of phases.
+        """Return the homogenised stiffness for each of `inclusions`, in their order.
+
+        The results have the energies of the phases.
 
         Raises:
             ConvergenceError: A linear system was not solved.
@@ -244,79 +280,109 @@ class SlicesModel(CellModel):
         fine_radii = continuous_radii(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
-        extremes = [fine_radii.min(), fine_radii.max()]  # for the error in θ
-        all_radii = np.concatenate([radius_map(rule.nodes), extremes])
-        radii, indices = np.unique(np.round(all_radii, _DIGITS), return_inverse=True)
-        nodes = indices[: rule.nodes.size]  # index among the radii of each node in θ
-        size, outline = self.mesh_size, self.outline
+        # The smallest and the largest radius are solved too, for the error in θ.
+        extremes = [fine_radii.min(), fine_radii.max()]
+        radii = np.unique(_rounded(np.concatenate([radius_map(rule.nodes), extremes])))
         by_radius = [
-            solve_slice(radius, matrix, inclusions, mesh_size=size, outline=outline)
+            solve_slice(radius, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline)
             for radius in radii
         ]
         seconds = perf_counter() - start
         results = []
-        for inclusion, *slices in zip(inclusions, *by_radius, strict=True):
+        for number, inclusion in enumerate(inclusions):
             cell = Cell(matrix, inclusion, radius_map, self.outline)
-            stiffness, errors, energies, unknowns = map(np.array, zip(*slices, strict=True))
-            curve = StressCurve.from_stiffness(rule, stiffness[nodes])
-            moduli = square_moduli(stiffness)
-            mean = rule.mean(moduli[nodes])
-            space_errors = rule.mean((moduli * errors)[nodes]) / mean
-            # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
-            if cell.square:
-                space_errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
-            theta_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
-            result = HomogenisedStiffness(
-                curve=curve,
-                method=self.name,
-                solver="cholesky",
-                unknowns=int(unknowns.max()),
-                seconds=seconds,
-                errors={"space": space_errors, "theta": theta_errors},
-                cell=cell,
-                energies=_mean_energies(cell, rule, radii, nodes, energies),
-            )
-            results.append(with_checks(result))
+            slices = [of_inclusions[number] for of_inclusions in by_radius]
+            result = _mean_of_slices(cell, rule, radii=radii, slices=slices)
+            results.append(with_checks(replace(result, seconds=seconds)))
         return results
 
 
-def _mean_energies(
-    cell: Cell, rule: ThetaRule, radii: Array, nodes: Ints, energies: Array
-) -> PhaseEnergies:
-    """Mean energies over θ from values and errors at n radii, shape (n, 2, phases, 2, 3), in Pa."""
-
-    def absolute_theta_error(moduli: Array) -> Array:
-        return theta_error(cell, rule, radii=radii, moduli=moduli) * rule.mean(moduli[nodes])
-
-    values, errors = energies[:, 0], energies[:, 1]
-    # energies X ∂c/∂X may change sign, but c + X ∂c/∂X are moduli with stiffer phases
-    moduli = values.sum(axis=(1, 2))
-    stiffer_errors = [
-        [absolute_theta_error(moduli + values[:, phase, kind]) for kind in range(2)]
-        for phase in range(len(cell.phases))
-    ]
-    error_in_theta = np.array(stiffer_errors) + absolute_theta_error(moduli)
-    return PhaseEnergies(rule.mean(values[nodes]), rule.mean(errors[nodes]) + error_in_theta)
-
-
-def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> Array:
-    """Declared relative errors of the mean C11 + C12, C11 − C12 and C33 by `rule`, shape (3,).
-
-    The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
-    particles or an incompressible matrix make the modulus itself steep. Its weighted least-squares
-    polynomials of several degrees are averaged by a rule of `_FINE` points; the error is the
-    largest distance of these means from that by `rule`, with a safety factor.
+def _mean_of_slices(
+    cell: Cell, rule: ThetaRule, *, radii: Array, slices: Sequence[Slice]
+) -> HomogenisedStiffness:
+    """Return the mean over θ of a cell with its declared errors.
 
     Args:
         cell: The cell.
-        rule: Its n nodes.
-        radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
-        moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
+        rule: Nodes in θ.
+        radii: Radii of the slices, rising, among them those of the nodes and the two extreme ones.
+        slices: Slice of each radius.
     """
-    nodes = np.searchsorted(radii, np.round(cell.radius_map(rule.nodes), _DIGITS))
+    nodes = _radius_of_nodes(cell, rule, radii)
+    stiffness = np.array([one.stiffness for one in slices])
+    curve = StressCurve.from_stiffness(rule, stiffness[nodes])
+    moduli = square_moduli(stiffness)
+    mean = rule.mean(moduli[nodes])
+    absolute_errors = moduli * np.array([one.errors for one in slices])
+    space_errors = rule.mean(absolute_errors[nodes]) / mean
+    if cell.square:
+        # C11 and C22 differ by the mesh alone. s11 has C11, and the moduli have their mean.
+        space_errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
+    theta_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
+    energies = np.array([one.energies for one in slices])
+    return HomogenisedStiffness(
+        curve=curve,
+        method=SlicesModel.name,
+        solver="cholesky",
+        unknowns=max(one.unknowns for one in slices),
+        errors={"space": space_errors, "theta": theta_errors},
+        cell=cell,
+        energies=_mean_energies(cell, rule, radii=radii, energies=energies),
+    )
+
+
+def _radius_of_nodes(cell: Cell, rule: ThetaRule, radii: Array) -> Ints:
+    """Return the index among rising `radii` of the radius at each node of a rule."""
+    return np.searchsorted(radii, _rounded(cell.radius_map(rule.nodes)))
+
+
+def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array) -> PhaseEnergies:
+    """Return mean energies of the phases over θ with their declared errors.
+
+    Args:
+        cell: The cell.
+        rule: Nodes in θ.
+        radii: Radii of the slices, shape (n,).
+        energies: Energies and their errors at the radii, shape (n, 2, phases, 2, 3), in Pa.
+    """
+    nodes = _radius_of_nodes(cell, rule, radii)
+
+    def absolute_theta_error(moduli: Array) -> Array:
+        relative_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
+        return relative_errors * rule.mean(moduli[nodes])
+
+    values = energies[:, 0]
+    errors = energies[:, 1]
+    # `theta_error` takes moduli, which are positive, but the energies X ∂c/∂X may change sign. The
+    # sum c + X ∂c/∂X is to first order the modulus with a stiffer phase, so that the error of an
+    # energy is at most that of this sum and that of c.
+    moduli = values.sum(axis=(1, 2))
+    theta_errors = np.empty(values.shape[1:])
+    for part in np.ndindex(theta_errors.shape[:2]):
+        theta_errors[part] = absolute_theta_error(moduli + values[:, part[0], part[1]])
+    theta_errors += absolute_theta_error(moduli)
+    return PhaseEnergies(rule.mean(values[nodes]), rule.mean(errors[nodes]) + theta_errors)
+
+
+def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> Array:
+    """Return the declared relative errors of the mean of three moduli by a rule in θ, shape (3,).
+
+    The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
+    particles or an incompressible matrix make the modulus itself steep. Its weighted least-squares
+    polynomials of several degrees are averaged by a fine rule. The error is the largest distance of
+    these means from that by `rule`, with a safety factor.
+
+    Args:
+        cell: The cell.
+        rule: The rule in θ.
+        radii: Radii of the slices, rising, shape (m,): those of the nodes and the two extreme ones.
+        moduli: C11 + C12, C11 − C12 and C33 at `radii`, or others, positive, shape (m, 3).
+    """
+    # Radii that are no node of the rule have a small weight, so that fits do not leave them.
+    nodes = _radius_of_nodes(cell, rule, radii)
     weights = np.maximum(np.bincount(nodes, rule.weights, minlength=radii.size), 1e-6)
-    root = np.sqrt(weights)[:, None]
-    fine = gauss_rule(cell.radius_map.distribution, points=_FINE)
+    root = np.sqrt(weights)[:, np.newaxis]
+    fine = gauss_rule(cell.radius_map.distribution, points=128)  # whose error is below round-off
     fine_radii = cell.radius_map(fine.nodes)
 
     def mori_tanaka_moduli(r: Array) -> Array:
@@ -325,15 +391,25 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
 
     scale = mori_tanaka_moduli(fine_radii)
     logarithm = np.log(moduli / mori_tanaka_moduli(radii))
-    low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
-    x, fine_x = (np.sqrt(1 - r**2) for r in (radii, fine_radii))
-    middle, half_width = (x.min() + x.max()) / 2, max(np.ptp(x), 1e-12) / 2
-    mean, distances = rule.weights @ moduli[nodes], []
-    # up to the interpolating polynomial, from a degree with some freedom to spare on
-    for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
-        basis = chebvander((x - middle) / half_width, degree)
+    # Fits are cut off at this distance from the values: beyond it a polynomial only oscillates.
+    span = np.ptp(logarithm, axis=0)
+    lowest = logarithm.min(axis=0) - span
+    highest = logarithm.max(axis=0) + span
+    x = np.sqrt(1 - radii**2)
+    fine_x = np.sqrt(1 - fine_radii**2)
+    midpoint = (x.min() + x.max()) / 2
+    half_width = max(np.ptp(x), 1e-12) / 2
+    mean = rule.weights @ moduli[nodes]
+
+    # From a degree that leaves some freedom up to that of the interpolating polynomial.
+    first_degree = min(max(0, radii.size - 4), 9)
+    last_degree = min(radii.size, 15)
+    distances = []
+    for degree in range(first_degree, last_degree):
+        basis = chebvander((x - midpoint) / half_width, degree)
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
-        fit = chebvander((fine_x - middle) / half_width, degree) @ coefficients
-        fine_moduli = scale * np.exp(np.clip(fit, low - span, high + span))
+        fit = chebvander((fine_x - midpoint) / half_width, degree) @ coefficients
+        fine_moduli = scale * np.exp(np.clip(fit, lowest, highest))
         distances.append(fine.weights @ fine_moduli / mean - 1)
-    return np.asarray(_SAFETY * np.abs(distances).max(axis=0) + _NOISE)
+    # The safety factor is tuned; round-off leaves 1e-13.
+    return np.asarray(1.6 * np.abs(distances).max(axis=0) + 1e-13)

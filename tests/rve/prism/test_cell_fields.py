@@ -14,7 +14,6 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.base.errors import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.file import ABAQUS_ORDER
 from alphacut.rve.prism.cell_fields import FORMATS
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes
@@ -107,23 +106,6 @@ def test_centres_of_sides_take_the_value_of_the_prism():
     assert (fine.node[centres] == -1).all()
     assert (flat & centres).sum() > 20
     assert values[flat] == pytest.approx(fine.points[flat, :2] ** 2)
-
-
-def test_meshio_reads_abaqus(tmp_path):
-    import meshio
-    from meshio._mesh import topological_dimension
-
-    path = tmp_path / "cell.inp"
-    assert fields().write(path) == fields().node.max() + 1
-    topological_dimension.setdefault("wedge15", 3)  # which meshio 5.3 forgets
-    mesh = meshio.read(path)
-    assert [block.type for block in mesh.cells] == ["wedge15", "wedge15"]
-    assert path.read_text().count("TYPE=C3D15,") == 2
-    for name, block in zip(mesh.cell_sets, mesh.cells, strict=True):
-        each = volumes(mesh.points, block.data[:, np.argsort(ABAQUS_ORDER)])
-        assert (each > 0).all()
-        whole = VOLUME - particle_volume() if name == "matrix" else particle_volume()
-        assert each.sum() == pytest.approx(whole, rel=1e-10)
 
 
 def test_other_endings_are_refused(tmp_path):
