@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,17 +17,19 @@ from alphacut.base.memory import require_text
 
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6}
 METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}
-DIAMETERS, RADII = ("d", "diameter", "size"), ("r", "radius")
-HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*"
-"""Name of a column, and its unit in brackets."""
-MAX_LENGTH = 100  # characters of a number; a longer field is none
+"""Metres in a unit of length."""
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+"""A number in plain ASCII digits."""
 
 
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     """Read columns of lengths from a CSV file, separated by commas, semicolons or tabs.
 
     Empty lines and comments behind # are skipped. A column d of diameters may stand in for "r".
+
+    Args:
+        path: The file.
+        columns: Names of the columns.
 
     Returns:
         Row numbers as an editor shows them, shape (n,), and the columns in m, shape (n, columns).
@@ -35,24 +38,39 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
         RefusedError: The file cannot be read, a column or its unit is missing, or a field is no
             number.
     """
-    (_, header), *rows = fields(path)
-    found = [_column(header, name, path) for name in columns]
-    values = [[factor * number(path, row, cells, k) for k, factor in found] for row, cells in rows]
-    return np.array([row for row, _ in rows]), np.array(values)
+    header, *rows = fields(path)
+    found = [_column(header.cells, name, path) for name in columns]
+    values = np.empty((len(rows), len(columns)))
+    for k, line in enumerate(rows):
+        numbers = [number(path, line.row, line.cells, column) for column, _ in found]
+        values[k] = np.multiply(numbers, [factor for _, factor in found])
+    return np.array([line.row for line in rows]), values
 
 
-def fields(path: Path) -> list[tuple[int, list[str]]]:
-    """Return number and fields of each line of a CSV file that is neither empty nor a comment."""
-    lines = [*enumerate(text_of(path).splitlines(), 1)]
-    lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
-    if len(lines) < 2:
+class Line(NamedTuple):
+    """Number of a line, as an editor shows it, and its fields."""
+
+    row: int
+    cells: list[str]
+
+
+def fields(path: Path) -> list[Line]:
+    """Return each line of a CSV file that is neither empty nor a comment, the header first.
+
+    Raises:
+        RefusedError: The file cannot be read, has fewer than two lines, or too long a field.
+    """
+    texts = dict(enumerate(text_of(path).splitlines(), 1))
+    texts = {row: x for row, x in texts.items() if x.strip() and not x.startswith("#")}
+    if len(texts) < 2:
         allowed = "a header with units, and rows of numbers below it"
-        raise RefusedError(path.name, f"{len(lines)} lines", allowed)
-    separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
+        raise RefusedError(path.name, f"{len(texts)} lines", allowed)
+    header = next(iter(texts.values()))
+    separator = next((mark for mark in ";\t" if mark in header), ",")
     rows = []
-    for row, line in lines:
+    for row, line in texts.items():
         try:
-            rows.append((row, next(csv.reader([line], delimiter=separator))))
+            rows.append(Line(row, next(csv.reader([line], delimiter=separator))))
         except csv.Error:  # a field is too long
             what, most = f"{len(line):,} letters", f"{csv.field_size_limit():,}"
             allowed = f"fields up to {most} letters"
@@ -71,23 +89,42 @@ def text_of(path: Path) -> str:
 
 
 def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
-    """Return the number in a field of a row, in plain ASCII digits; refuse what is none."""
+    """Return the number in a field of a row.
+
+    Args:
+        path: The file, for the message.
+        row: Number of the row, for the message.
+        cells: Fields of the row.
+        column: Index of the field.
+
+    Raises:
+        RefusedError: The field is missing, or no finite number of at most 100 plain ASCII digits.
+    """
     text = cells[column].strip() if column < len(cells) else ""
-    if len(text) > MAX_LENGTH or not NUMBER.fullmatch(text) or not isfinite(float(text)):
+    if len(text) > 100 or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
         raise RefusedError(f"{path.name}, row {row}, column {column + 1}", repr(text[:40]), allowed)
     return float(text)
 
 
 def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
-    """Return the index of the column `name` in the header, and the factor of its unit to m."""
-    is_radius = name == "r"
-    accepted = (*RADII, *DIAMETERS) if is_radius else (name,)
+    """Return the index of the column `name` in the header, and the factor that makes it metres.
+
+    A column of diameters stands in for "r", with half the factor.
+
+    Raises:
+        RefusedError: There is no such column, or its unit is missing or unknown.
+    """
+    factors = {name: 1.0}
+    if name == "r":
+        factors = {"r": 1.0, "radius": 1.0, "d": 0.5, "diameter": 0.5, "size": 0.5}
     for column, cell in enumerate(header):
-        match = re.fullmatch(HEADER, cell)
-        if match and match[1].lower() in accepted and match[2] in METRES:
-            is_diameter = match[1].lower() in DIAMETERS
-            return column, METRES[match[2]] * (0.5 if is_diameter else 1.0)
-    allowed = f"a column '{name} [mm]'" + (" or 'd [mm]'" if is_radius else "")
+        # the name of the column, and its unit in brackets
+        match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
+        if match and match[1].lower() in factors and match[2] in METRES:
+            return column, METRES[match[2]] * factors[match[1].lower()]
+    allowed = f"a column '{name} [mm]'"
+    if name == "r":
+        allowed += " or 'd [mm]'"
     units = f"units are {', '.join(METRES)}"
     raise RefusedError(f"{path.name}, header", ",".join(header)[:80], allowed, units)

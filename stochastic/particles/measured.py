@@ -22,14 +22,9 @@ from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_distributions import require_radii
 
-SMOOTHING = 1.5  # standard deviation, in pixels
-SMALLEST = 4.0  # least radius of a particle, in pixels
-ROUND = 0.9  # share of its convex hull that a round piece fills
-MAX_NOT_ROUND = 0.02  # share of the particles' area in pieces that are not round
-NOISE = 3.0  # distance of the two greys over their standard deviation, at least
-MAX_UNEVENNESS = 0.2  # of the contrast, by which the matrix may differ between tiles
-TILES = 8  # along each side of the image
-ROUNDING = 1e-9  # overlap over the smaller radius that is no overlap
+MIN_RADIUS = 4.0
+"""Smallest radius of a particle in an image, in pixels. Smaller spots are noise, and their area is
+known too badly."""
 
 
 def read_particles(
@@ -75,25 +70,29 @@ def read_particles(
 
 
 def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
-    """Return the circles of a CSV file, all inside the section and without overlap."""
+    """Return the circles of a CSV file in a section of some width and height, in m.
+
+    Raises:
+        RefusedError: The file cannot be read, or circles leave the section or overlap.
+    """
     rows, values = length_columns(path, ("x", "y", "r"))
-    centres, radii = values[:, :2], values[:, 2]
+    centres = values[:, :2]
+    radii = values[:, 2]
     for row, centre, radius in zip(rows, centres, radii, strict=True):
         require_radii(f"{path.name}, row {row}", radius)
         if not ((centre >= 0) & (centre <= size)).all():
             value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
-            width, height = (f"{1e3 * side:g}" for side in size)
-            allowed = f"places in the section of {width} × {height} mm"
+            allowed = f"places in the section of {1e3 * size[0]:g} × {1e3 * size[1]:g} mm"
             raise RefusedError(f"{path.name}, row {row}", value, allowed)
     discs = Particles(centres, radii, np.array(size), periodic=False)
     first, second = close_pairs(discs, 0.0)
     overlap = -surface_distance(discs, first, second) / np.minimum(radii[first], radii[second])
-    if overlap.max(initial=0.0) > ROUNDING:
+    if overlap.max(initial=0.0) > 1e-9:  # of the smaller radius; less is rounding
         worst = int(np.argmax(overlap))
-        upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
+        upper, lower = sorted([int(rows[first[worst]]), int(rows[second[worst]])])
         value = f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius"
-        key, allowed = f"{path.name}, row {lower}", "circles that do not overlap"
-        raise RefusedError(key, value, allowed, "mend the row")
+        key = f"{path.name}, row {lower}"
+        raise RefusedError(key, value, "circles that do not overlap", "mend the row")
     return discs
 
 
@@ -111,75 +110,105 @@ def section_picture(path: Path) -> Array:
 
 
 def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
-    """Return the circles, of equal area and centroid, of the particles in a grey image, in m.
+    """Find the particles in a grey image, and return circles of equal area and centroid, in m.
 
     The particles are the phase whose pieces fill more of their convex hulls. Those that touch the
-    edge are left out. An image whose particles noise or light hide, or of which too many are not
-    round, is refused.
+    edge are left out.
 
     Args:
         picture: Grey values, shape (rows, columns); y rises from the lower edge.
         pixel: Side of a pixel, in m.
         name: Name of the image in messages.
+
+    Raises:
+        RefusedError: Noise or light hides the particles, or more than 2 % of their area is in
+            pieces that are not round: too small, or with a convex hull of which they fill less than
+            90 %.
     """
     from skimage import measure
 
     phase = _particle_mask(picture, name)
     rows, columns = phase.shape
-    circles, not_round_area = [], 0.0
+    circles = []
+    not_round_area = 0.0
     for piece in measure.regionprops(_label_particles(phase)):  # type: ignore[no-untyped-call]
         top, left, bottom, right = piece.bbox
         if min(top, left) == 0 or bottom == rows or right == columns:
             continue
-        if piece.area < np.pi * SMALLEST**2 or piece.solidity < ROUND:
+        if piece.area < np.pi * MIN_RADIUS**2 or piece.solidity < 0.9:
             not_round_area += piece.area
         else:
-            circles.append((*piece.centroid, piece.equivalent_diameter_area / 2))
+            row, column = piece.centroid
+            circles.append((row, column, piece.equivalent_diameter_area / 2))
     fraction = not_round_area / max(phase.sum(), 1)
-    value = f"{fraction:.1%} of the particles' area in pieces that are not round, beside"
-    value += f" {len(circles)} that are"
-    is_round = bool(circles) and fraction <= MAX_NOT_ROUND
-    allowed = f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others"
-    cure = "take the image itself as the cell: cell.image"
-    require(is_round, name, value=value, allowed=allowed, cure=cure)
+    max_fraction = 0.02
+    require(
+        bool(circles) and fraction <= max_fraction,
+        name,
+        value=f"{fraction:.1%} of the particles' area in pieces that are not round, beside"
+        f" {len(circles)} that are",
+        allowed=f"images with round particles, up to {max_fraction:.0%} of others",
+        cure="take the image itself as the cell: cell.image",
+    )
+    # Indices count from the centre of the upper left pixel; y rises from the lower edge.
     row, column, radius = np.array(circles).T
-    centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)  # y from the lower edge
+    centres = np.stack([column + 0.5, rows - row - 0.5], axis=1)
     size = np.array([columns, rows]) * pixel
     return Particles(centres * pixel, radius * pixel, size, periodic=False)
 
 
 def _particle_mask(picture: Array, name: str) -> Mask:
-    """Mask of the particles' pixels, by Otsu's threshold of the smoothed image."""
-    # the phase whose pieces fill more of their convex hulls is that of the particles
+    """Return the pixels of the particles, by Otsu's threshold of the smoothed image.
+
+    Of the two phases, that of the particles is the one whose pieces fill more of their convex
+    hulls.
+
+    Args:
+        picture: Grey values, shape (rows, columns).
+        name: Name of the image in messages.
+
+    Raises:
+        RefusedError: The grey values of the phases are closer than three standard deviations of the
+            noise, or the light changes the matrix by more than a fifth of the contrast.
+    """
     from skimage import filters
 
-    smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
+    # The smoothing, by 1.5 pixels, is below the smallest radius.
+    smooth = filters.gaussian(picture, 1.5, preserve_range=True)  # type: ignore[no-untyped-call]
     bright = smooth > filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
     greys = [smooth[part] for part in (bright, ~bright) if part.any()]
     contrast = float(np.ptp([np.median(grey) for grey in greys]))
     noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
-    is_clear = len(greys) == 2 and contrast >= NOISE * noise
-    value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
-    allowed = f"images of two greys, {NOISE:g} standard deviations apart"
-    cure = "average the image before"
-    require(is_clear, name, value=value, allowed=allowed, cure=cure)
+    require(
+        len(greys) == 2 and contrast >= 3.0 * noise,
+        name,
+        value=f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises",
+        allowed="images of two greys, 3 standard deviations apart",
+        cure="average the image before",
+    )
     phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
     unevenness = _unevenness(smooth, ~phase) / contrast
-    value = f"light that differs by {unevenness:.2g} of the contrast"
-    is_even, allowed = unevenness <= MAX_UNEVENNESS, f"values up to {MAX_UNEVENNESS:g}"
-    cure = "subtract the background, for example by skimage.restoration.rolling_ball"
-    require(is_even, name, value=value, allowed=allowed, cure=cure)
+    require(
+        unevenness <= 0.2,
+        name,
+        value=f"light that differs by {unevenness:.2g} of the contrast",
+        allowed="values up to 0.2",
+        cure="subtract the background, for example by skimage.restoration.rolling_ball",
+    )
     return phase
 
 
 def _label_particles(phase: Mask) -> NDArray[np.int_]:
-    """Number of the particle at each pixel, 0 outside; touching ones are parted by a watershed."""
+    """Return the number of the particle at each pixel of a mask, 0 outside.
+
+    Particles that touch are parted by a watershed on the distance to the background.
+    """
     from scipy import ndimage
     from skimage import feature, measure, segmentation
 
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(phase), 1.0)
     parts = measure.label(phase)  # type: ignore[no-untyped-call]
-    peaks = feature.peak_local_max(depth, round(SMALLEST), labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
+    peaks = feature.peak_local_max(depth, round(MIN_RADIUS), labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
     seeds = np.zeros(phase.shape, int)
     seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
     labels: NDArray[np.int_] = segmentation.watershed(-depth, seeds, mask=phase)  # type: ignore[no-untyped-call]
@@ -187,21 +216,32 @@ def _label_particles(phase: Mask) -> NDArray[np.int_]:
 
 
 def _convexity(phase: Mask) -> float:
-    """Return the area of all particles of a phase over that of their convex hulls."""
+    """Return the area of all particles of a phase over the area of their convex hulls."""
     from skimage import measure
 
     pieces = measure.regionprops(_label_particles(phase))  # type: ignore[no-untyped-call]
-    large = [piece for piece in pieces if piece.area >= np.pi * SMALLEST**2]
+    large = [piece for piece in pieces if piece.area >= np.pi * MIN_RADIUS**2]
     hulls = sum(piece.area_convex for piece in large)
     return float(sum(piece.area for piece in large) / hulls) if hulls else 0.0
 
 
 def _unevenness(smooth: Array, matrix: Mask) -> float:
-    """Return the range of the matrix's median grey value over 8 × 8 tiles of the image."""
+    """Return the range of the matrix's median grey value over 8 × 8 tiles of the image.
+
+    Pixels near particles, where smoothing mixes greys, and tiles of fewer than 64 pixels do not
+    count.
+
+    Args:
+        smooth: Smoothed grey values, shape (rows, columns).
+        matrix: Pixels of the matrix.
+    """
     from scipy import ndimage
 
     core = ndimage.binary_erosion(matrix, iterations=4)
     greys = np.where(core, smooth, np.nan)
-    rows = np.array_split(greys, TILES)
-    tiles = [tile[~np.isnan(tile)] for row in rows for tile in np.array_split(row, TILES, axis=1)]
-    return float(np.ptp([np.median(tile) for tile in tiles if len(tile) >= 64] or [0.0]))
+    medians = [0.0]
+    for band in np.array_split(greys, 8):
+        for tile in np.array_split(band, 8, axis=1):
+            if np.count_nonzero(~np.isnan(tile)) >= 64:
+                medians.append(float(np.nanmedian(tile)))
+    return float(np.ptp(medians[1:] or medians))

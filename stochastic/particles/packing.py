@@ -26,12 +26,6 @@ from alphacut.stochastic.particles.particles import (
 from alphacut.stochastic.particles.radius_distributions import RadiusDistribution
 from alphacut.stochastic.particles.shapes import DISCS, Shape
 
-MAX_PROPOSALS = 1000  # for a particle, before random sequential addition ends without a packing
-MAX_NUMBER = 100_000  # particles to which their number is raised where the largest needs more room
-HEADROOM = 0.3  # growth of the fraction while particles repel, over that up to the densest packing
-MAX_STEPS = 4000  # of the relaxation
-MOVES, MOVES_PER_SEARCH = 60, 5  # random moves of a particle, and between searches of neighbours
-
 
 @dataclass(frozen=True)
 class Packing:
@@ -39,8 +33,8 @@ class Packing:
 
     Args:
         number: Number of particles; more are drawn until the box holds the largest.
-        fraction: Share of the square or cube that they take, above 0 and below `Shape.densest`.
-        radii: Law of the radii, by number.
+        fraction: Fraction of the square or cube that they take, above 0 and below `Shape.densest`.
+        radii: Distribution of the radii, by number.
         shape: Discs or spheres.
     """
 
@@ -54,28 +48,48 @@ class Packing:
         checked_number(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
-        """Return a random packing in a square or cube that it fills to `fraction`, if it can."""
+        """Return a random packing in a square or cube that it fills to `fraction`.
+
+        Raises:
+            RefusedError: The box of too many particles has no room for the largest one.
+            FailedError: The particles still overlap after all steps.
+        """
         radii, side = self._radii(generator)
-        box, is_loose = np.full(self.shape.dimensions, side), self.fraction <= self.shape.sequential
-        centres = random_sequential(radii, box, generator) if is_loose else None
+        box = np.full(self.shape.dimensions, side)
+        centres = None
+        if self.fraction <= self.shape.sequential:
+            centres = random_sequential(radii, box, generator)
         if centres is None:
             centres = relax_random_centres(radii, box, generator)
         return Particles(centres, radii, box)
 
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
-        """Draw radii until their box has room for the largest: radii (n,) and side, in m."""
-        # on average this keeps the frequencies of the law (Wald's identity), as drawing all anew
-        # does not
+        """Draw radii until their box has room for the largest particle.
+
+        Further radii are added to the ones that have been drawn. On average this keeps the
+        frequencies of the distribution (Wald's identity), as drawing all radii anew does not.
+
+        Returns:
+            Radii, shape (n,), and the side of the box, in m.
+
+        Raises:
+            RefusedError: There is no room with 100,000 particles.
+        """
         radii: Array = np.empty(0)
         side = -np.inf
-        # a diameter of a disc, and two of a sphere, so that its cell is apart from its own images
+        # The side must hold a diameter of a disc, and two diameters of a sphere, so that the cell
+        # of a sphere does not touch the cells of its own images.
         radii_in_side = 2.0 * (self.shape.dimensions - 1)
+        max_number = 100_000
         while not len(radii) or radii_in_side * radii.max() > side:
-            largest, key = radii.max(initial=0.0), f"packing.{self.shape.particles}"
-            allowed = f"more than {MAX_NUMBER}, where the largest radius is {largest:.3g} m"
-            cure = "leave out the smallest sizes, or lower the fraction"
-            is_within_limit = len(radii) < max(MAX_NUMBER, self.number)
-            require(is_within_limit, key, value=self.number, allowed=allowed, cure=cure)
+            largest = radii.max(initial=0.0)
+            require(
+                len(radii) < max(max_number, self.number),
+                f"packing.{self.shape.particles}",
+                value=self.number,
+                allowed=f"more than {max_number}, where the largest radius is {largest:.3g} m",
+                cure="leave out the smallest sizes, or lower the fraction",
+            )
             radii = np.append(radii, self.radii.sample(self.number, generator))
             measure = float(self.shape.measure(radii).sum()) / self.fraction
             side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))
@@ -83,10 +97,19 @@ class Packing:
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
-    """Centres (n, d) of particles without overlap, by random sequential addition; None if it fails.
+    """Place particles in a periodic box by random sequential addition.
 
-    Particles are added from the largest down, in blocks, to a periodic box with sides (d,); each
-    one that overlaps is proposed again at a new centre, at most `MAX_PROPOSALS` times.
+    Particles are added from the largest down, in blocks. Each one that overlaps is proposed again
+    at a new random centre.
+
+    Args:
+        radii: Radii in m, shape (n,).
+        box: Sides of the box in m, shape (d,).
+        generator: Source of the centres.
+
+    Returns:
+        Centres in m, shape (n, d), of particles without overlap; None if one of them was proposed
+        1,000 times in vain.
     """
     order = np.argsort(-radii, kind="stable")
     sorted_radii = radii[order]
@@ -104,7 +127,16 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
 
 
 class _Obstacles:
-    """Particles with centres (n, d) and radii (n,) in a periodic box, for tests of overlap."""
+    """Particles in a periodic box, for tests of overlap.
+
+    They are searched by classes of similar size: in one tree of all sizes the largest particle
+    would decide how far to look for the smallest ones.
+
+    Args:
+        centres: Centres in m, shape (n, d).
+        radii: Radii in m, shape (n,).
+        box: Sides of the box in m, shape (d,).
+    """
 
     def __init__(self, centres: Array, radii: Array, box: Array) -> None:
         classes = list(size_classes(radii)) if len(radii) else []
@@ -114,7 +146,12 @@ class _Obstacles:
         ]
 
     def overlapped_by(self, proposal: Array, radii: Array) -> Mask:
-        """Mask of the proposed particles, centres (n, d), radii (n,), that overlap a placed one."""
+        """Return which of some proposed particles overlap an obstacle, shape (n,).
+
+        Args:
+            proposal: Centres in m, shape (n, d).
+            radii: Radii in m, shape (n,).
+        """
         overlaps = np.zeros(len(proposal), bool)
         for tree, centres, placed_radii in self.size_classes:
             candidates = np.flatnonzero(~overlaps)
@@ -128,11 +165,20 @@ class _Obstacles:
 
 
 def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generator) -> Array | None:
-    """Centres (n, d) of further particles without overlap; None if `MAX_PROPOSALS` fail for one."""
+    """Place a block of particles beside obstacles and without overlap among each other.
+
+    Args:
+        obstacles: Particles that are placed already.
+        radii: Radii of the block in m, shape (n,).
+        generator: Source of the centres.
+
+    Returns:
+        Centres in m, shape (n, d); None if a particle was proposed 1,000 times in vain.
+    """
     box = obstacles.box
-    centres = np.full((len(radii), len(box)), np.nan)
+    centres = np.full((len(radii), len(box)), np.nan)  # of pending particles
     new_obstacles = _Obstacles(centres[:0], radii[:0], box)
-    for _ in range(MAX_PROPOSALS):
+    for _ in range(1000):
         pending = np.flatnonzero(np.isnan(centres[:, 0]))
         if not len(pending):
             return centres
@@ -148,25 +194,40 @@ def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generat
 
 
 def _accepted_in_order(proposal: Array, radii: Array, box: Array) -> Mask:
-    """Mask of the proposals that overlap no earlier accepted one, shape (n,)."""
-    OPEN, ACCEPTED, REJECTED = 0, 1, -1
-    state = np.full(len(proposal), OPEN)
+    """Return which proposals overlap no earlier accepted one, shape (n,).
+
+    This is what a loop over the proposals would accept, for all proposals at once: in each round
+    those are accepted that wait for no earlier proposal, and the ones that overlap them rejected.
+
+    Args:
+        proposal: Centres in m, shape (n, d).
+        radii: Radii in m, shape (n,).
+        box: Sides of the periodic box in m, shape (d,).
+    """
+    is_accepted = np.zeros(len(proposal), bool)
     if len(proposal) < 2:
-        return np.asarray(state == OPEN)
+        return ~is_accepted
     earlier, later = np.sort(close_pairs(Particles(proposal, radii, box), 0.0), axis=0)
-    while (state == OPEN).any():
-        is_waiting = np.zeros(len(state), bool)  # for an earlier one that it overlaps
-        is_waiting[later[state[earlier] == OPEN]] = True
-        state[(state == OPEN) & ~is_waiting] = ACCEPTED
-        state[later[state[earlier] == ACCEPTED]] = REJECTED
-    return np.asarray(state == ACCEPTED)
+    is_open = np.ones(len(proposal), bool)
+    while is_open.any():
+        is_waiting = np.zeros(len(proposal), bool)
+        is_waiting[later[is_open[earlier]]] = True
+        is_accepted |= is_open & ~is_waiting
+        is_open &= is_waiting
+        is_open[later[is_accepted[earlier]]] = False
+    return is_accepted
 
 
 def relax_random_centres(radii: Array, box: Array, generator: np.random.Generator) -> Array:
-    """Centres (n, d), in m, of particles in a periodic box, by relaxation of random ones.
+    """Place particles in a periodic box at random, push them apart, and move them at random.
 
-    They are pushed apart (`_push`) and then moved at random (`_shake`). The arguments are as of
-    `random_sequential`.
+    Args:
+        radii: Radii in m, shape (n,).
+        box: Sides of the box in m, shape (d,).
+        generator: Source of the centres and of the moves.
+
+    Returns:
+        Centres in m, shape (n, d).
 
     Raises:
         FailedError: The particles still overlap after all steps.
@@ -174,66 +235,124 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
     start = box * generator.random((len(radii), len(box)))
     particles = Particles(start, radii, box)
     fraction = particles.fraction
-    grown_fraction = fraction + HEADROOM * (particles.shape.densest - fraction)
+    # While they repel, the particles are larger, so that none touch in the end: their fraction is
+    # three tenths nearer to the densest packing. With more headroom the relaxation takes longer.
+    grown_fraction = fraction + 0.3 * (particles.shape.densest - fraction)
     growth = max(1 + 1e-4, float((grown_fraction / fraction) ** (1 / len(box))))
     return _shake(_push(particles, growth), generator)
 
 
 def _push(particles: Particles, growth: float) -> Particles:
-    """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006)."""
-    centres, box, radii = particles.centres, particles.size, particles.radii * growth
-    velocity, step, mixing, n_downhill = np.zeros_like(centres), 0.1, 0.1, 0
-    # pairs within the skin are searched anew when a particle has moved half of it
-    skin, overlap = 0.6 * float(particles.radii.mean()), 0.0
-    pairs, searched_at = None, centres
-    for _ in range(MAX_STEPS):
+    """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006).
+
+    The constants of the method are those of its authors, but for the time steps.
+
+    Args:
+        particles: Particles in a periodic box, which may overlap.
+        growth: Factor of the radii, above 1, with which they repel each other.
+
+    Returns:
+        The particles at new places.
+
+    Raises:
+        FailedError: The particles still overlap after 4,000 steps.
+    """
+    max_steps = 4000
+    box = particles.size
+    radii = particles.radii * growth
+    centres = particles.centres
+    allowed_overlap = (growth - 1) * 2 * float(particles.radii.min())
+    velocity = np.zeros_like(centres)
+    time_step = 0.1
+    mixing = 0.1
+    n_downhill = 0
+    # Pairs closer than the skin are searched anew when a particle has moved half of it.
+    skin = 0.6 * float(particles.radii.mean())
+    pairs = None
+    searched_at = centres
+    overlap = 0.0
+    for _ in range(max_steps):
         path = float(np.linalg.norm(nearest_image(centres - searched_at, box), axis=1).max())
         if pairs is None or 2 * path > skin:
-            pairs, searched_at = close_pairs(Particles(centres, radii, box), skin), centres
-        force, overlap = _repulsion(centres, radii, pairs, box)
-        if overlap < (growth - 1) * 2 * float(particles.radii.min()):
+            pairs = close_pairs(Particles(centres, radii, box), skin)
+            searched_at = centres
+        force, overlap = _repulsion(centres, radii, pairs=pairs, box=box)
+        if overlap < allowed_overlap:
             return Particles(centres, particles.radii, box)
         if float((force * velocity).sum()) > 0:
+            # Downhill the velocity is turned towards the force, and later the steps grow.
             n_downhill += 1
             speed_per_force = np.sqrt((velocity**2).sum() / max((force**2).sum(), 1e-300))
             velocity = (1 - mixing) * velocity + mixing * speed_per_force * force
             if n_downhill > 5:
-                step, mixing = min(1.1 * step, 0.6), 0.99 * mixing
+                time_step = min(1.1 * time_step, 0.6)
+                mixing = 0.99 * mixing
         else:
-            velocity, mixing, n_downhill = np.zeros_like(velocity), 0.1, 0
-            step = max(0.5 * step, 0.02)
-        velocity = velocity + step * force
-        centres = centres + step * velocity
+            velocity = np.zeros_like(velocity)
+            mixing = 0.1
+            n_downhill = 0
+            time_step = max(0.5 * time_step, 0.02)
+        velocity = velocity + time_step * force
+        centres = centres + time_step * velocity
     kind = f"{particles.shape.particles} on a share {particles.fraction:.3f} of the box"
-    what = f"{kind} still overlap by {overlap:.3g} m after {MAX_STEPS} steps"
+    what = f"{kind} still overlap by {overlap:.3g} m after {max_steps} steps"
     raise FailedError(what, "lower the fraction")
 
 
 def _repulsion(
-    centres: Array, radii: Array, pairs: tuple[Ints, Ints], box: Array
+    centres: Array, radii: Array, *, pairs: tuple[Ints, Ints], box: Array
 ) -> tuple[Array, float]:
-    """Force on each particle, (n, d), equal to its overlaps, and the greatest overlap, in m."""
+    """Return the force on each particle, which is the sum of its overlaps as vectors.
+
+    Args:
+        centres: Centres in m, shape (n, d).
+        radii: Radii in m, shape (n,).
+        pairs: First and second particle of each pair that may overlap.
+        box: Sides of the periodic box in m, shape (d,).
+
+    Returns:
+        Forces of shape (n, d), and the largest overlap, in m.
+    """
     first, second = pairs
     offset = nearest_image(centres[second] - centres[first], box)
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-300)
     overlap = np.maximum(radii[first] + radii[second] - distance, 0)
     pair_force = (overlap / distance)[:, None] * offset  # on the second of each pair
     count = len(centres)
-    force = [np.bincount(second, x, count) - np.bincount(first, x, count) for x in pair_force.T]
-    return np.stack(force, axis=1), float(overlap.max(initial=0.0))
+    force = np.empty_like(centres)
+    for axis, component in enumerate(pair_force.T):
+        on_second = np.bincount(second, component, count)
+        force[:, axis] = on_second - np.bincount(first, component, count)
+    return force, float(overlap.max(initial=0.0))
 
 
 def _shake(particles: Particles, generator: np.random.Generator) -> Array:
-    """Centres (n, d), in m, after `MOVES` random moves of each particle without overlap."""
-    # a move is made if it keeps clear of both old and new positions of the neighbours
-    box, dimensions, radii = particles.size, len(particles.size), particles.radii
-    # longest move: a quarter of the mean gap between particles
+    """Move each particle 60 times at random, where it overlaps none.
+
+    All particles move at once. A move is made if it keeps clear of both old and new positions of
+    the neighbours, since these may move or not. Neighbours are searched after each five moves.
+
+    Args:
+        particles: Particles without overlap in a periodic box.
+        generator: Source of the moves.
+
+    Returns:
+        Centres in m, shape (n, d).
+    """
+    n_searches = 12
+    moves_per_search = 5
+    box = particles.size
+    radii = particles.radii
+    dimensions = len(box)
+    # The longest move is a quarter of the mean gap between particles.
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
     centres = particles.centres
-    for _ in range(0, MOVES, MOVES_PER_SEARCH):
-        first, second = close_pairs(Particles(centres, radii, box), 4 * MOVES_PER_SEARCH * reach)
+    for _ in range(n_searches):
+        # Between two searches a pair may come closer by two moves each time.
+        gap = 4 * moves_per_search * reach
+        first, second = close_pairs(Particles(centres, radii, box), gap)
         contact = radii[first] + radii[second]  # distance of centres that touch
-        for _ in range(MOVES_PER_SEARCH):
+        for _ in range(moves_per_search):
             direction = generator.standard_normal(centres.shape)
             direction /= np.linalg.norm(direction, axis=1)[:, None]
             length = reach * generator.random(len(radii)) ** (1 / dimensions)

@@ -28,7 +28,7 @@ class Packings(Sequence[Particles]):
     """Independent periodic packings of one kind, a sequence of `Particles`.
 
     Args:
-        packing: How each of them is made.
+        packing: Specification of each of them.
         seed: The k-th packing depends on this seed and k only.
         sections: The packings.
     """
@@ -47,7 +47,15 @@ class Packings(Sequence[Particles]):
         executor: Executor | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Packings:
-        """Return `count` packings; an `executor` makes the same ones."""
+        """Return `count` independent packings.
+
+        Args:
+            packing: Specification of each of them.
+            count: Number of packings.
+            seed: Seed of all packings.
+            executor: Makes the packings; None for this process. The packings are the same.
+            progress: Function that takes the completed fraction.
+        """
         seeds = np.random.SeedSequence(seed).spawn(count)
         map_function = executor.map if executor else map
         sections: list[Particles] = []
@@ -71,6 +79,7 @@ class Packings(Sequence[Particles]):
 
 
 def _make(packing: Packing, seed: np.random.SeedSequence) -> Particles:
+    """Return a random packing; a function of the module, so that processes can be sent it."""
     return packing.make(np.random.default_rng(seed))
 
 
@@ -91,8 +100,8 @@ def pack(
         particles: Number of particles in each packing.
         packings: Number of independent packings.
         fraction: Fraction of the area or volume that the particles take.
-        radii: Smallest and largest radius, in m, of a log-normal law (eq. 11); or a law, as
-            `MeasuredRadii.read` has it from a file.
+        radii: Smallest and largest radius, in m, of a log-normal distribution (eq. 11); or a
+            distribution, as `MeasuredRadii.read` has it from a file.
         shape: "discs" or "spheres".
         seed: Seed of everything left to chance.
         workers: Processes that pack; the packings do not depend on their number.
@@ -111,11 +120,11 @@ def pack(
         checked_number(key, number, whole=True, positive=key != "seed")
     require_choice("shape", shape, SHAPES)
     if isinstance(radii, LogNormalRadii | MeasuredRadii):
-        law: RadiusDistribution = radii
+        distribution: RadiusDistribution = radii
     else:
         require_numbers("radii", radii)
         require(len(radii) == 2, "radii", radii, allowed="the smallest and the largest, or a law")
-        law = LogNormalRadii(*radii)
-    packing = Packing(particles, fraction, law, shape=SHAPES[shape])
+        distribution = LogNormalRadii(smallest=radii[0], largest=radii[1])
+    packing = Packing(particles, fraction, distribution, shape=SHAPES[shape])
     with pool(workers) as executor:
         return Packings.make(packing, packings, seed=seed, executor=executor, progress=progress)

@@ -18,8 +18,9 @@ class Particles:
     """Discs in the rectangle [0, width] × [0, height], or spheres in a box.
 
     Args:
-        centres: shape (n, 2) or (n, 3), in m, inside the rectangle or box.
-        radii: shape (n,), in m, not negative.
+        centres: Centres in m, shape (n, 2) or (n, 3), inside the rectangle or box; in a periodic
+            one they are moved there.
+        radii: Radii in m, shape (n,), not negative.
         size: Sides of the rectangle or box, shape (2,) or (3,), in m.
         periodic: Whether it repeats itself; otherwise it is a window on a larger section.
     """
@@ -34,10 +35,10 @@ class Particles:
         centres: Array = np.array(self.centres, float)
         if self.periodic:
             wrapped = np.mod(centres, size)
-            centres = np.where(wrapped < size, wrapped, 0.0)
-        radii = np.array(self.radii, float)
-        for name, array in (("centres", centres), ("radii", radii), ("size", size)):
-            object.__setattr__(self, name, array)
+            centres = np.where(wrapped < size, wrapped, 0.0)  # rounding may give `size` itself
+        object.__setattr__(self, "centres", centres)
+        object.__setattr__(self, "radii", np.array(self.radii, float))
+        object.__setattr__(self, "size", size)
 
     def __len__(self) -> int:
         return len(self.radii)
@@ -54,30 +55,38 @@ class Particles:
 
     @property
     def fraction(self) -> float:
-        """Measure of all particles over that of the rectangle or box."""
+        """Fraction of the rectangle or box that the particles take."""
         return float(self.shape.measure(self.radii).sum() / self.measure)
 
     @property
     def spacing(self) -> float:
-        """Side of the square or cube of one particle's share, in m."""
+        """Side of a square or cube as large as the mean cell of a particle, in m."""
         return float((self.measure / len(self)) ** (1 / len(self.size)))
 
     def separation(self, first: Ints, second: Ints) -> Array:
-        """Return vectors from centres `first` to the nearest images of `second`, (…, d), in m."""
+        """Return vectors from centres `first` to the nearest images of `second`, (…, d), in m.
+
+        In a window they go to the centres themselves.
+        """
         offset: Array = self.centres[second] - self.centres[first]
         return nearest_image(offset, self.size) if self.periodic else offset
 
 
 def nearest_image(offset: Array, size: Array) -> Array:
-    """Return vectors between centres (…, d) to the nearest image in a periodic box of `size`."""
+    """Return vectors between centres to the nearest image in a periodic box.
+
+    Args:
+        offset: Vectors to any image in m, shape (…, d).
+        size: Sides of the box in m, shape (d,).
+    """
     return np.asarray(offset - size * np.round(offset / size))
 
 
-MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory
-
-
 def size_classes(radii: Array) -> Iterator[Ints]:
-    """Yield the indices of particles by class: radii of a class lie within a factor of two."""
+    """Yield the indices of particles by class: radii of a class lie within a factor of two.
+
+    Radii below 1e-6 of the largest one are in one class.
+    """
     number = np.zeros(len(radii))
     largest = radii.max(initial=0.0)
     if largest > 0:
@@ -87,9 +96,14 @@ def size_classes(radii: Array) -> Iterator[Ints]:
 
 
 def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
-    """Return first and second index of unordered pairs with surfaces closer than `gap`, (m,) each.
+    """Return the unordered pairs of particles whose surfaces are closer than a gap.
 
-    The gap is in m, 0 finds overlaps; particles are in a periodic box or a window.
+    Args:
+        particles: Particles in a periodic box or a window.
+        gap: The gap in m; 0 finds overlaps.
+
+    Returns:
+        First and second index of each pair, shape (m,) each.
     """
     box = particles.size if particles.periodic else None
     classes = list(size_classes(particles.radii))
@@ -97,7 +111,7 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
     largest = [particles.radii[members].max() for members in classes]
     pairs = []
     for k, members in enumerate(classes):
-        # within a class, then between it and each class before
+        # Pairs within the class, and then pairs with each class before
         pairs.append(members[trees[k].query_pairs(2 * largest[k] + gap, output_type="ndarray")])
         for m in range(k):
             reach = largest[k] + largest[m] + gap
@@ -109,16 +123,31 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
 
 
 def surface_distance(particles: Particles, first: Ints, second: Ints) -> Array:
-    """Distance between the surfaces of pairs (nearest image), negative where they overlap, in m."""
+    """Return the distance between the surfaces of pairs, in m, negative where they overlap.
+
+    Args:
+        particles: The particles.
+        first: Index of the first particle of each pair, shape (m,).
+        second: Index of the second particle, of which the nearest image counts.
+    """
     distance = np.linalg.norm(particles.separation(first, second), axis=-1)
     return np.asarray(distance - particles.radii[first] - particles.radii[second])
 
 
 def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Ints, Ints]:
-    """Number of points in each ball, shape (n,), and indices of all points, ball after ball."""
+    """Return the points of a tree that lie in some balls.
+
+    Args:
+        tree: The points.
+        centres: Centres of the balls, shape (n, d).
+        reach: Radii of the balls, shape (n,).
+
+    Returns:
+        Number of points in each ball, shape (n,), and the indices of all points, ball after ball.
+    """
     near = tree.query_ball_point(centres, reach, return_sorted=False)
-    counts = np.fromiter(map(len, near), int, len(near))
-    return counts, np.fromiter((k for ball in near for k in ball), int, counts.sum())
+    counts = np.array([len(ball) for ball in near], int)
+    return counts, np.array(list(itertools.chain.from_iterable(near)), int)
 
 
 @dataclass(frozen=True)
@@ -136,50 +165,65 @@ class Pairs:
     offset: Array
 
     def select(self, keep: Mask | Ints) -> Pairs:
-        """The pairs of a mask, or of indices."""
+        """Return the pairs of a mask, or of indices."""
         return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
-    @staticmethod
-    def join(parts: list[Pairs]) -> Pairs:
-        """All pairs of `parts`, grouped by i again."""
-        first = np.concatenate([part.first for part in parts])
-        order = np.argsort(first, kind="stable")
-        second = np.concatenate([part.second for part in parts])
-        offset = np.concatenate([part.offset for part in parts])
-        return Pairs(first[order], second[order], offset[order])
+    def joined(self, other: Pairs) -> Pairs:
+        """Return the pairs of both, grouped by i again."""
+        both = Pairs(
+            first=np.concatenate([self.first, other.first]),
+            second=np.concatenate([self.second, other.second]),
+            offset=np.concatenate([self.offset, other.offset]),
+        )
+        return both.select(np.argsort(both.first, kind="stable"))
 
 
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]:
     """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
-    They come in portions of `MAX_PAIRS` pairs or so, with the indices i of each; `reach` is in m,
-    shape (n,).
+    They come in portions of three million pairs or so, which fit into memory.
+
+    Args:
+        discs: The discs.
+        reach: Largest distance of the centres for each i, in m, shape (n,).
+
+    Yields:
+        The indices i of a portion, and its pairs.
     """
     disc_of_image, shift = _periodic_images(discs, float(reach.max()))
     tree = KDTree(discs.centres[disc_of_image] + shift)
     n_pairs = tree.query_ball_point(discs.centres, reach, return_length=True)
-    portion_number = np.cumsum(n_pairs) // MAX_PAIRS
+    portion_number = np.cumsum(n_pairs) // 3_000_000
     for value in np.unique(portion_number):
         portion = np.flatnonzero(portion_number == value)
         counts, images = points_in_balls(tree, discs.centres[portion], reach[portion])
-        first, second = np.repeat(portion, counts), disc_of_image[images]
-        # by the centres, so that the pair (j, i) has exactly the negative offset
+        first = np.repeat(portion, counts)
+        second = disc_of_image[images]
+        # Computed by the centres, the pair (j, i) has exactly the negative offset.
         offset = discs.centres[second] - discs.centres[first] + shift[images]
         is_pair = (first != second) | (offset != 0).any(axis=1)
         yield portion, Pairs(first, second, offset).select(is_pair)
 
 
 def _periodic_images(discs: Particles, margin: float) -> tuple[Ints, Array]:
-    """Disc and shift of all periodic images within `margin` of the box, originals first."""
+    """Return all periodic images whose centres are within `margin` of the box, originals first.
+
+    A window has the originals alone.
+
+    Returns:
+        Index of the disc of each image, shape (k,), and its shift in m, shape (k, 2).
+    """
     originals = np.arange(len(discs), dtype=np.intp)
     indices: list[Ints] = [originals]
     shifts: list[Array] = [np.zeros((len(discs), 2))]
-    tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else (0, 0)
-    for tile in itertools.product(*(range(-number, number + 1) for number in tiles)):
+    n_tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else np.zeros(2, int)
+    tiles_along_sides = [range(-count, count + 1) for count in n_tiles]
+    for tile in itertools.product(*tiles_along_sides):
         if not any(tile):  # the discs themselves
             continue
-        image = discs.centres + discs.size * tile
+        shift = discs.size * tile
+        image = discs.centres + shift
         is_near = ((image > -margin) & (image < discs.size + margin)).all(axis=1)
         indices.append(originals[is_near])
-        shifts.append(np.broadcast_to(discs.size * tile, (int(is_near.sum()), 2)))
+        shifts.append(np.broadcast_to(shift, (int(is_near.sum()), 2)))
     return np.concatenate(indices), np.concatenate(shifts)

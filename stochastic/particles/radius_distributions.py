@@ -1,4 +1,4 @@
-"""Laws of the particle radius: log-normal, cut at both ends (eq. 11, Fig. 11), or measured."""
+"""Distributions of the particle radius: truncated log-normal (eq. 11, Fig. 11), or measured."""
 
 from __future__ import annotations
 
@@ -11,25 +11,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import require
+from alphacut.base.errors import RefusedError, require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.distribution import TruncatedNormal
-
-MIN_RADIUS, MAX_RADIUS = 1e-12, 1e6  # m; no particle of a material is smaller or larger
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
     """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit."""
     radii = np.atleast_1d(np.asarray(radii, float))
-    wrong = radii[~((radii >= MIN_RADIUS) & (radii <= MAX_RADIUS))]
-    value, are_allowed = f"{wrong[0]:.6g} m" if len(wrong) else None, len(radii) and not len(wrong)
-    allowed = f"radii from {MIN_RADIUS:g} to {MAX_RADIUS:g} m"
-    require(bool(are_allowed), key, value=value, allowed=allowed)
+    wrong = radii[~((radii >= 1e-12) & (radii <= 1e6))]
+    allowed = "radii from 1e-12 to 1e+06 m"
+    require(len(radii) > 0, key, value=None, allowed=allowed)
+    if len(wrong):
+        raise RefusedError(key, f"{wrong[0]:.6g} m", allowed)
 
 
 @dataclass(frozen=True)
 class LogNormalRadii:
-    """r(θ) = exp(μ_r + σ_r θ), θ truncated normal, from `smallest` to `largest` in m (eq. 11).
+    """Log-normal radii r(θ) = exp(μ_r + σ_r θ) of a truncated normal θ (eq. 11).
+
+    Args:
+        smallest: Smallest radius in m, at the lower end of θ.
+        largest: Largest radius in m, at its upper end.
 
     Raises:
         RefusedError: The radii are out of range or not in order.
@@ -49,7 +52,7 @@ class LogNormalRadii:
 
     @property
     def label(self) -> str:
-        """The law in words."""
+        """The distribution in words."""
         return f"log-normal, σ$_r$ = {self.sigma:.4f}"
 
     @property
@@ -64,28 +67,30 @@ class LogNormalRadii:
         return float(np.log(self.smallest)) - self.sigma * self.distribution.lower
 
     def __call__(self, theta: ArrayLike) -> Array:
-        """Radius at `theta` (any shape), in m."""
+        """Return the radius at `theta` (any shape), in m."""
         radius = np.exp(self.mu + self.sigma * np.asarray(theta, float))  # eq. 11
         return np.clip(radius, self.smallest, self.largest)
 
     def cdf(self, radius: ArrayLike) -> Array:
-        """P(r ≤ radius), any shape, `radius` in m."""
+        """Return P(r ≤ radius), any shape, `radius` in m."""
         radius = np.asarray(radius, float)
         if self.sigma == 0:
             return np.where(radius < self.smallest, 0.0, 1.0)
-        theta = (np.log(np.maximum(radius, MIN_RADIUS**2)) - self.mu) / self.sigma
-        return self.distribution.cdf(theta)
+        positive = np.maximum(radius, 1e-24)  # below all radii that are allowed
+        return self.distribution.cdf((np.log(positive) - self.mu) / self.sigma)
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
-        """`number` independent radii, shape (number,), in m."""
+        """Draw independent radii, shape (number,), in m."""
         return self(self.distribution.sample(number, generator))
 
 
 @dataclass(frozen=True)
 class MeasuredRadii:
-    """Radii of a list, in m; the distribution function is linear between neighbouring values.
+    """Radii of a list; their distribution function is linear between neighbouring values.
 
-    `source` is the name of the list.
+    Args:
+        values: The radii in m.
+        source: Name of the list.
 
     Raises:
         RefusedError: The list is empty, or a value is out of range.
@@ -108,17 +113,17 @@ class MeasuredRadii:
 
     @property
     def smallest(self) -> float:
-        """Least radius, in m."""
+        """Smallest radius, in m."""
         return self.values[0]
 
     @property
     def largest(self) -> float:
-        """Greatest radius, in m."""
+        """Largest radius, in m."""
         return self.values[-1]
 
     @property
     def label(self) -> str:
-        """The law in words."""
+        """The distribution in words."""
         return f"{len(self.values)} values of {self.source}"
 
     @cached_property
@@ -128,12 +133,12 @@ class MeasuredRadii:
         return np.asarray(np.linspace(0, 1, count) if count > 1 else np.ones(1), float)
 
     def cdf(self, radius: ArrayLike) -> Array:
-        """P(r ≤ radius), any shape, `radius` in m."""
-        # of equal values `interp` takes the last at them, and the first below them
+        """Return P(r ≤ radius), any shape, `radius` in m."""
+        # At equal values `interp` takes the last one, and below them the first one.
         return np.asarray(np.interp(np.asarray(radius, float), self.values, self._grade, left=0))
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
-        """`number` independent radii, shape (number,), in m."""
+        """Draw independent radii, shape (number,), in m."""
         return np.asarray(np.interp(generator.random(number), self._grade, self.values), float)
 
 

@@ -142,7 +142,7 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
         walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
-        pairs = Pairs.join([walls, _bounding_pairs(discs, portion)])
+        pairs = walls.joined(_bounding_pairs(discs, portion))
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]
         a, b = (1 / near + 1 / far) * direction.T
