@@ -17,6 +17,7 @@ solver make this bound sharp (Neumaier and Shcherbina, Mathematical Programming 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array, hstack
@@ -225,7 +226,8 @@ class ChainRelaxation(LinearRelaxation):
         # products at each floor.
         super().__init__(1 + len(lower) + 2 * n + len(modes) * (4 * n + 1))
         self.chain = chain
-        self.logs = [self.variable(*ends) for ends in zip(lower, upper, strict=True)]
+        ends = zip(lower, upper, strict=True)
+        self.logs = [self.variable(low, high) for low, high in ends]
         logs = np.array(self.logs)
         stiffness_powers, mass_powers = chain.powers
         self.stiffness = [self.exponential(row @ logs) for row in stiffness_powers]
@@ -272,7 +274,8 @@ class ChainRelaxation(LinearRelaxation):
             return
         shape: dict[int, Array] = {}
         for floor in sorted(ends):
-            shape[floor] = self.variable(*known.get((cut.mode, floor), ends[floor]))
+            smallest, largest = known.get((cut.mode, floor), ends[floor])
+            shape[floor] = self.variable(smallest, largest)
             if floor not in cut.shape:
                 self.unmeasured[cut.mode, floor] = shape[floor]
         relative_eigenvalue = self.variable(low / high, 1.0)
@@ -323,11 +326,12 @@ class ChainRelaxation(LinearRelaxation):
         amplitudes = dict(cut.shape)
         k = np.array([self.range(x) for x in self.stiffness]) * self.chain.stiffness[:, np.newaxis]
         m = np.array([self.range(x) for x in self.mass]) * self.chain.mass[:, np.newaxis]
-        supports = [0, *sorted(cut.shape)]  # 0 is the ground
+        measured = sorted(cut.shape)
         support_amplitudes = {0: 0.0}
         for floor, ends in cut.shape.items():
             support_amplitudes[floor] = float(np.abs(ends).max())
-        for support, following in zip(supports, [*supports[1:], n + 1], strict=True):
+        # Each support, first the ground, and the next one; above the last floor there is none.
+        for support, following in pairwise([0, *measured, n + 1]):
             floors = np.arange(support, min(following, n + 1) - 1)  # indices from 0
             if not len(floors):
                 continue
@@ -371,8 +375,9 @@ class ChainRelaxation(LinearRelaxation):
         """
         chain = self.chain
         k = cut.mode - 1
-        below = self.eigenvalue_upper[k - 1] if k else -np.inf
-        above = self.eigenvalue_lower[k + 1] if k + 1 < len(self.eigenvalue_lower) else np.inf
+        # Bounds of the neighbouring eigenvalues, infinite where there is none.
+        below = np.append(-np.inf, self.eigenvalue_upper)[k]
+        above = np.append(self.eigenvalue_lower, np.inf)[k + 1]
         midpoint = (low + high) / 2
         radius = (high - low) / 2
         values, vectors = chain_modes(chain.stiffness * midpoint[0], chain.mass * midpoint[1])
@@ -396,7 +401,7 @@ class ChainRelaxation(LinearRelaxation):
         residual = shears + np.append(shears[1:], 0.0) + value * radius[1] * force
         residual += 1e-12 * value * force + 1e-13 * np.abs(chain.stiffness).max()
         squared_residual = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
-        error_below = squared_residual / (smallest_quotient - below) if k else 0.0
+        error_below = squared_residual / (smallest_quotient - below)  # 0 for the first mode
         error_above = squared_residual / (above - largest_quotient)
 
         unit = float(inertia.sum() * value)

@@ -105,7 +105,9 @@ def identify(
 
 def widest_cut(number: FuzzyNumber) -> Cut:
     """Return the support of a number, or the widest cut that a claim determines."""
-    return number.cut(number.decided) if isinstance(number, ClaimedNumber) else number.support
+    if isinstance(number, ClaimedNumber):
+        return number.cut(number.decided)
+    return number.support
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +160,12 @@ class Evidence:
             allowed = f"modes and floors from 1 to {frame.floors}"
             require(largest <= frame.floors, "identify.modes", value=largest, allowed=allowed)
             mode.require_scatter()
-        prior = {}
+        prior: dict[str, FuzzyNumber] = {}
         for name, number in inputs.items():
-            prior[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+            if isinstance(number, FuzzyNumber):
+                prior[name] = number
+            else:
+                prior[name] = Crisp(float(number))
         chain = Chain(frame, tuple(prior))
         smallest = min(widest_cut(number).lower for number in prior.values())
         require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
@@ -178,8 +183,10 @@ class Evidence:
     def joint(self) -> JointRule | None:
         """Rule by which the claims hold together; None if there is no claim."""
         names = tuple(name for name, x in self.numbers.items() if isinstance(x, ClaimedNumber))
+        if not names:
+            return None
         means = "parameter of the measured frame"
-        return JointRule(names, independent=False, means=means, named=True) if names else None
+        return JointRule(names, independent=False, means=means, named=True)
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
         """Return the α-cut of a number.
@@ -303,7 +310,7 @@ class Identified:
                 high = np.log(self.upper[k] / chain.nominal)
                 eigenvalues = np.maximum(eigenvalue_ranges(chain, low, high), 0.0)
                 lower[k], upper[k] = np.sqrt(eigenvalues) / (2 * np.pi)
-        modes = (*self.evidence.measured, *self.evidence.held_out)
+        modes = self.evidence.measured + self.evidence.held_out
         return Predictions(
             self.alpha,
             lower,

@@ -176,5 +176,6 @@ def _record(
 
 def outer_text(ends: tuple[float, float], unit: str) -> str:
     """Return a range with its unit, rounded outwards, or one number if its ends agree."""
-    texts = [engineering(end, unit) for end in rounded_ends(*ends, Nature.GUARANTEED)]
+    low, high = ends
+    texts = [engineering(end, unit) for end in rounded_ends(low, high, Nature.GUARANTEED)]
     return " … ".join(dict.fromkeys(texts))

@@ -51,7 +51,9 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     columns: dict[str, int] = {}
     for column, cell in enumerate(header):
         title = re.fullmatch(r"\s*(mode|shape_std|q[1-9]\d*|frequency(_std)?\s*(\[Hz\])?)\s*", cell)
-        name = title[1].partition("[")[0].strip() if title else ""
+        name = ""  # of an unknown column
+        if title is not None:
+            name = title[1].partition("[")[0].strip()
         columns[name] = column
     is_complete = {"mode", "frequency"} <= columns.keys() and len(columns) == len(header)
     allowed = (
@@ -64,10 +66,10 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
-        values = []
+        values = [np.nan] * len(header)
         for column in range(len(header)):
-            is_empty = cells[column : column + 1] == [""]
-            values.append(np.nan if is_empty else number(path, row, cells, column))
+            if cells[column : column + 1] != [""]:
+                values[column] = number(path, row, cells, column)
         mode = values[columns["mode"]]
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         allowed = "a mode from 1, frequency and deviations above 0"

@@ -58,8 +58,11 @@ class Chain:
             if match is None or name not in values:
                 raise RefusedError("identify.parameters", name, allowed)
             kind, number = match.groups()
-            floors = int(number) - 1 if number else slice(None)
-            self.powers[int(kind == "m"), floors, column] = -3 if kind == "l" else 1
+            floors = slice(None)  # a name without a number stands for all floors
+            if number:
+                floors = slice(int(number) - 1, int(number))
+            exponent = {"l": -3}.get(kind, 1)
+            self.powers[int(kind == "m"), floors, column] = exponent
         constants = {name: Jet.constant([value], 0) for name, value in values.items()}
         self.nominal = np.array([values[name] for name in names])
         self.stiffness = frame.springs(constants).value[0]
@@ -278,8 +281,9 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     # The last factor bounds the terms of second order from above.
     widening = float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance))
     mean_of_inverse = 1 + variance + 3 * variance**2  # of 1 / (1 + x) for a normal x
-    ratio_deviation = None if deviation is None else deviation * widening
-    return _mean(np.asarray(ratios / mean_of_inverse), ratio_deviation, what, "shape_deviation")
+    if deviation is not None:
+        deviation *= widening
+    return _mean(np.asarray(ratios / mean_of_inverse), deviation, what, "shape_deviation")
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyNumber:
@@ -302,7 +306,9 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyN
         return from_data(values, "mean", law="normal")
     checked_number(f"{what}: {key}", deviation, positive=True)
     # Chi-squared test: the scatter would be this large with a probability of 1e-6 at most.
-    scatter = float(values.std(ddof=1)) if count > 1 else 0.0
+    scatter = 0.0
+    if count > 1:
+        scatter = float(values.std(ddof=1))
     threshold = chdtri(max(count - 1, 1), 1e-6)
     is_plausible = (count - 1) * (scatter / deviation) ** 2 <= threshold
     allowed = f"values that explain the scatter, {scatter:.3g}"

@@ -51,11 +51,14 @@ def read_modes(
         if deviation is not None:
             checked_number(key, deviation, positive=True)
     file = path_of("path", path)
-    is_universal = file.suffix.lower() in (".uff", ".unv")
-    allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
-    require(bool(floors) == is_universal, "floors", floors or None, allowed)
+    if file.suffix.lower() in (".uff", ".unv"):
+        require(bool(floors), "floors", None, "the floors of its unknowns")
+        found = uff_mode_rows(file, floors or {})
+    else:
+        require(not floors, "floors", floors, "left out beside a CSV file")
+        found = mode_rows(file)
     modes = []
-    for rows in uff_mode_rows(file, floors or {}) if is_universal else mode_rows(file):
+    for rows in found:
         mode = measured_mode(
             rows.mode,
             rows.frequencies,

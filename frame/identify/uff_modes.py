@@ -44,8 +44,9 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         key = f"{path.name}, mode {mode}"
         require(0 < hertz < np.inf, f"{key}: frequency", f"{hertz:g} Hz", "above 0 Hz")
         shape = _real_amplitudes(key, found.amplitudes, floors)
-        # The amplitude of one floor alone says nothing.
-        modes[mode] = ModeRows(mode, np.array([hertz]), shape if len(shape) > 1 else {})
+        if len(shape) < 2:
+            shape = {}  # the amplitude of one floor alone says nothing
+        modes[mode] = ModeRows(mode, np.array([hertz]), shape)
     require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
     return tuple(modes[number] for number in sorted(modes))
 
@@ -84,7 +85,7 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     hertz = numbers_of_head[0]
     if is_complex:
         # The first two numbers are the complex eigenvalue s; its frequency is |s| / 2π.
-        hertz = abs(complex(*numbers_of_head[:2])) / (2 * np.pi)
+        hertz = np.hypot(numbers_of_head[0], numbers_of_head[1]) / (2 * np.pi)
 
     # Each node has a line with its number, and then its numbers, six in a line.
     numbers_of_value = 2 if kind in COMPLEX else 1

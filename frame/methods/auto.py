@@ -115,7 +115,8 @@ class Auto:
             followed = follower.run_pass(flow, next(attempts), asked)
             return _noted(_with_reached(best, flow, followed), f"{best.method} and {follower.name}")
         found = follower.run(flow, next(attempts))
-        found = replace(found, outer=best.proved if best else None)
+        if best is not None:
+            found = replace(found, outer=best.proved)
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
@@ -154,21 +155,26 @@ class Auto:
             dual = replace(dual, below=1.0)
         if self.is_for_all_nodes:
             return dual  # gaps below the peaks stay wide in any case
-        max_inputs = MAX_PARAMETERS if self.tolerance else FEW_INPUTS
+        max_inputs = FEW_INPUTS
+        if self.tolerance:
+            max_inputs = MAX_PARAMETERS
         if flow.relative and len(flow.boxes.names) <= max_inputs:
             # With a smaller gap of peaks than 1e-4 the dual bound takes too long (tuned).
             gap = max(self.tolerance or DEFAULT_TOLERANCE, 1e-4)
             return replace(dual, gap=gap, peaks=gap)
-        return dual if self.tolerance is None else replace(dual, peaks=WIDE)
+        if self.tolerance is not None:
+            return replace(dual, peaks=WIDE)
+        return dual
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
         """Return whether the gap of a guaranteed envelope suffices."""
         if self.is_for_all_nodes:
             allowed = flow.tolerance(self.tolerance) * flow.scale * (1 + 1e-9)  # rounding
             return bool((proved.error <= allowed).all())
-        has_few_inputs = flow.relative and len(flow.boxes.names) <= FEW_INPUTS
-        peak_gap = 2 * self.tolerance if self.tolerance and has_few_inputs else WIDE
-        return _gap(proved, flow) <= peak_gap
+        allowed_gap = WIDE
+        if self.tolerance and flow.relative and len(flow.boxes.names) <= FEW_INPUTS:
+            allowed_gap = 2 * self.tolerance
+        return _gap(proved, flow) <= allowed_gap
 
 
 def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None]:
@@ -179,8 +185,7 @@ def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None
     """
     left = 1.0
     while True:
-        ends = 1 - left, 1 - 0.2 * left
-        yield None if progress is None else subprogress(progress, *ends)
+        yield progress and subprogress(progress, 1 - left, 1 - 0.2 * left)
         left *= 0.2
 
 

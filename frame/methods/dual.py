@@ -159,10 +159,12 @@ class DualProof:
         nodes = np.flatnonzero(needed.any(axis=(1, 2)))
         outputs = np.flatnonzero(needed.any(axis=(0, 2)))
         is_complete = bool(needed.all())
-        gap = (self.gap if is_complete else self.peaks) * goal.peak
+        gap = self.peaks * goal.peak
+        if is_complete:
+            gap = self.gap * goal.peak
         level = box.level(nodes, numbers.TRUNCATION * gap[outputs], outputs)
         problems: Problems = {}
-        for o, s in zip(*np.nonzero(needed.any(axis=0)), strict=True):
+        for o, s in np.argwhere(needed.any(axis=0)):
             index = int(np.searchsorted(outputs, o))
             problem = OutputBounds.initial(level, index, int(s), gap[o], goal.incumbent[k, o, s])
             problem.upper[:] = upper[nodes, o, s]
@@ -279,6 +281,9 @@ class DualProof:
                 problem.model_inputs[:] = 0.0
 
         alone = self.bounds_peaks_alone
+        first_cells = self.slabs
+        if alone:
+            first_cells = numbers.FIRST_CELLS
         self._improve(
             problems, pool, 1, 1, slack=float(alone), tick=subprogress(progress, 0.0, 0.05)
         )
@@ -287,7 +292,7 @@ class DualProof:
         self._improve(
             problems,
             pool,
-            numbers.FIRST_CELLS if alone else self.slabs,
+            first_cells,
             self.steps,
             slack=self.below,
             multiple=numbers.REMAINDER_MULTIPLE,
@@ -394,7 +399,7 @@ def _least_peaks(
         A lower bound, and the peak of a response that has a small one, shape (outputs,) each.
     """
     count = len(level.structure.derivative_orders)
-    found = [*pool.map(partial(least_peak, level), range(count))]
+    found = list(pool.map(partial(least_peak, level), range(count)))
     lower = np.array([bound for bound, _ in found])
     unit = np.stack([point for _, point in found])
     # Steepest descent over the corners of the box, from the points at which the bounds are taken.

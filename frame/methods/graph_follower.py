@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -211,28 +211,45 @@ class GraphFollower:
             predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
 
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
-        diverges = trajectories_diverge(storage.steepest, bounds[0])
         error = predicted_gain.max(axis=-1) + SAFETY * missed[:, np.newaxis]
-        return flow.envelope(
+        return estimated_envelope(
+            flow,
             bounds,
-            flow.boxes.to_physical(storage.points[best]),
-            None if diverges else error,
+            storage.points[best],
+            error=error,
+            steepest=storage.steepest,
             method=self.name,
-            nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=len(storage) + count,
             facts={"order": self.order, "gain": self.tolerance},
         )
 
 
-def trajectories_diverge(steepest: Array, bounds: Array) -> bool:
-    """Return whether neighbouring trajectories diverge, so that Taylor models predict nothing.
+def estimated_envelope(
+    flow: UnitFlow,
+    bounds: Array,
+    points: Array,
+    *,
+    error: Array,
+    steepest: Array,
+    **fields: Any,
+) -> Envelope:
+    """Return an estimated envelope, or an attained one if neighbouring trajectories diverge.
 
-    This is assumed if some first derivative exceeds 8 times the half range of the output (tuned: a
+    If they diverge, Taylor models predict nothing, and the estimate of the error is left out. This
+    is assumed if some first derivative exceeds 8 times the half range of the output (tuned: a
     chaotic pendulum exceeds it many times, and other structures stay well below).
 
     Args:
+        flow: The problem.
+        bounds: Upper bounds of (-output, output), shape (levels, times, outputs, 2).
+        points: Unit coordinates that attain them, shape (levels, times, outputs, 2, inputs).
+        error: Estimated error of the bounds, shape (levels, times, outputs).
         steepest: Largest first derivative of each output by a unit coordinate, shape (outputs,).
-        bounds: Upper bounds of (-output, output), shape (times, outputs, 2).
+        fields: Further fields of `Envelope` by name.
     """
-    half_range = (bounds[..., 0].max(axis=0) + bounds[..., 1].max(axis=0)) / 2
-    return bool((steepest > 8.0 * half_range).any())
+    at = flow.boxes.to_physical(points)
+    widest = bounds[0]
+    half_range = (widest[..., 0].max(axis=0) + widest[..., 1].max(axis=0)) / 2
+    if (steepest > 8.0 * half_range).any():
+        return flow.envelope(bounds, at, nature=Nature.ATTAINED, **fields)
+    return flow.envelope(bounds, at, error, nature=Nature.ESTIMATED, **fields)

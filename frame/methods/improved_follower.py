@@ -11,6 +11,7 @@ more than other nodes, are followed to a smaller gain.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isqrt
 from typing import ClassVar
@@ -24,10 +25,9 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.methods.graph_follower import Places, Storage, trajectories_diverge
+from alphacut.frame.methods.graph_follower import Places, Storage, estimated_envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_values, spread_points
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy.result import Nature
 
 BATCH = 32
 """Graphs that are computed together (tuned: more are faster, but know less of each other)."""
@@ -93,18 +93,19 @@ class ImprovedFollower:
         difference = np.maximum(nearby, 0.1 * difference.max(axis=1, keepdims=True))
         left_aside = predicted.max(axis=-1) + limit[:, 0] / 2
         error = SAFETY * (left_aside + difference + missed[:, np.newaxis])
-        steepest = np.maximum(first.storage.steepest, second.storage.steepest)
-        diverges = trajectories_diverge(steepest, bounds[0])
-        note = f"stopped at the budget of {self.budget} trajectories"
-        return flow.envelope(
+        notes: tuple[str, ...] = ()
+        if is_large.any():
+            notes = (f"stopped at the budget of {self.budget} trajectories",)
+        return estimated_envelope(
+            flow,
             bounds,
-            flow.boxes.to_physical(points),
-            None if diverges else error,
+            points,
+            error=error,
+            steepest=np.maximum(first.storage.steepest, second.storage.steepest),
             method=self.name,
-            nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=first.evaluations + second.evaluations + count,
             facts={"gain": self.tolerance, "order": 2},
-            notes=(note,) if is_large.any() else (),
+            notes=notes,
         )
 
     def run_pass(
@@ -123,6 +124,8 @@ class ImprovedFollower:
         storage = Storage(flow)
         shape = (n_levels, *storage.top.shape)
         out = PassBounds(np.zeros(shape), np.zeros((*shape, d)), np.zeros(shape), storage)
+        if asked is None:
+            asked = np.ones(shape, bool)
         chunk_size = _chunk_size(flow)
         nominal = flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis]
         has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
@@ -134,22 +137,24 @@ class ImprovedFollower:
             max_graphs = self.budget * (done + 1) // n_levels
             first = len(storage)
             has_width = bool((box[1] > box[0]).any())
+            explored = points = nominal
             if has_width:
                 # The values alone of 256 trajectories of each kind are looked at, and 64 graphs are
                 # computed (tuned: fewer miss basins, more take longer).
-                explored = spread_points(*box, count=256, skip=skip)
+                lower, upper = box
+                explored = spread_points(lower, upper, count=256, skip=skip)
                 points = np.vstack([nominal, explored[:64]])
-            else:
-                explored = nominal
-                points = nominal if len(storage) == 0 else nominal[:0]
-            asked_on_level = None if asked is None else asked[level]
-            models = _LevelModels(storage, box, self._limit(flow), asked_on_level)
+            elif len(storage):
+                points = nominal[:0]  # the only point of the box has a graph
+            models = _LevelModels(storage, box, self._limit(flow), asked[level])
             if done:  # a wider box contains what a narrower one attains
                 models.sampled[:] = out.bounds[level + 1]
                 models.sampled_at[:] = out.points[level + 1]
             models.explore(explored)
-            n_crossings = 8 if has_crossings and has_width else 0  # tuned
-            for crossing in range(1 + n_crossings):
+            rounds = 1
+            if has_crossings and has_width:
+                rounds += 8  # tuned: later rounds rarely find a new basin
+            for crossing in range(rounds):
                 if crossing:
                     explored = models.crossed_optima(np.random.default_rng([skip, crossing]))
                     models.explore(explored)
@@ -193,8 +198,10 @@ def _chunk_size(flow: UnitFlow) -> int:
     """
     d = len(flow.boxes.names)
     n_times = flow.time.size
-    states = 2 * len(frequencies(flow.flow.system)) if isinstance(flow.flow, LinearFlow) else 0
-    count = max(n_times * len(flow.outputs), (isqrt(n_times) + 1) * states**2)
+    count = n_times * len(flow.outputs)
+    if isinstance(flow.flow, LinearFlow):
+        states = 2 * len(frequencies(flow.flow.system))
+        count = max(count, (isqrt(n_times) + 1) * states**2)
     return int(np.clip(64e6 / (count * (1 + d + d * d)), 1, BATCH))
 
 
@@ -225,7 +232,7 @@ class _LevelModels:
         storage: The graphs.
         box: Lower and upper ends of the box in unit coordinates, shape (inputs,) each.
         limit: Gain of each output that is not worth a graph, shape (outputs, 1).
-        asked: Bounds whose gain counts, shape (times, outputs, 2); None for all.
+        asked: Bounds whose gain counts, shape (times, outputs, 2).
 
     Attributes:
         sampled: Largest values of explored trajectories, shape (times, outputs, 2).
@@ -235,7 +242,7 @@ class _LevelModels:
     """
 
     def __init__(
-        self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask | None
+        self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask
     ) -> None:
         self.storage = storage
         self.box = box
@@ -288,7 +295,9 @@ class _LevelModels:
     def predict(self, places: Places) -> None:
         """Update predictions at places from the Taylor models of the best graphs there."""
         if len(places[0]) and (self.radius > 0).any():
-            maximise = global_maximum if len(self.radius) <= MAX_GLOBAL_INPUTS else local_maximum
+            maximise: Callable[..., Array] = local_maximum
+            if len(self.radius) <= MAX_GLOBAL_INPUTS:
+                maximise = global_maximum
             # A Taylor model is trusted up to 0.6 times the radius of the box (tuned: with a larger
             # region more proposals are wrong, with a smaller one more are needed).
             reach = 0.6 * np.maximum(self.radius, 1e-300)
@@ -305,7 +314,7 @@ class _LevelModels:
         # step or two for each peak).
         near_peak = top >= (1 - 0.02) * np.maximum(top.max(axis=0), 0.0)
         least = np.maximum(self.limit * np.where(near_peak, 0.02, 1.0), LEAST_GAIN * peak)
-        return least if self.asked is None else np.where(self.asked, least, np.inf)
+        return np.where(self.asked, least, np.inf)
 
     def proposals(self, count: int) -> Array:
         """Return distinct points that are worth a graph, at most one for each window of time.
@@ -330,8 +339,9 @@ class _LevelModels:
                 place = (window[node], output, side)
                 if gains[place] <= 1:
                     break
-                is_sampled = self.sampled[place] > self.predicted[place]
-                point = self.sampled_at[place] if is_sampled else self.target[place]
+                point = self.target[place]
+                if self.sampled[place] > self.predicted[place]:
+                    point = self.sampled_at[place]
                 if self.storage.holds(point, near=1e-7):
                     self.predicted[place] = self.storage.top[place]
                 elif all(np.abs(point - neighbour).max() > 0.02 for neighbour in chosen):

@@ -103,7 +103,9 @@ class Proof:
     def _gaps(self) -> tuple[float, ...]:
         """Gaps that are tried on a sub-box, the smallest first, in units of the outputs' scale."""
         tolerance = self.tolerance or DEFAULT_TOLERANCE
-        return (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
+        if self.gap:
+            return (self.gap,)
+        return (0.1 * tolerance, tolerance)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
         """Return the expected work on a box, in evaluations of the response of a mode at a node.
@@ -179,7 +181,9 @@ class Proof:
             decay = numbers.FIRST_DECAY
             if last_step:
                 decay = (excess / last_excess) ** (1 / last_step)
-            further = np.log(excess) / -np.log(decay) if decay < 1 else np.inf
+            further = np.inf
+            if decay < 1:
+                further = np.log(excess) / -np.log(decay)
             is_hopeless = last_step > 0 and not degree + further < max_degree + 1
             if degree == max_degree or is_hopeless:
                 raise self._gap_error(model, excess, decay)
@@ -340,16 +344,18 @@ def _line_deviation(model: ModalModel) -> Array:
 
     responses = []
     for part in motion_parts(model, growth):
-        load = None if part.load is None else part.load.history
+        load = None
+        if part.load is not None:
+            load = part.load.history
         deviations = [part.share.real.deviation(), part.share.imag.deviation()]
         radii = 2 * np.stack(deviations, axis=1)
         # What a force adds at once is proportional to the force, with the first coefficient.
-        sigmas: list[Array | None] = [*grids]
         if isinstance(part.load, Direct):
-            sigmas = [None]
-        for k, sigma in enumerate(sigmas):
-            shape = (1, 1) if sigma is None else sigma.shape
-            coefficient = np.multiply.outer(2 * part.share.value[k], np.ones(shape))
+            coefficient = np.multiply.outer(2 * part.share.value[0], np.ones((1, 1)))
+            responses.append(Response(None, load, 0, coefficient, radii[0]))
+            continue
+        for k, sigma in enumerate(grids):
+            coefficient = np.multiply.outer(2 * part.share.value[k], np.ones(sigma.shape))
             responses.append(Response(sigma, load, 0, coefficient, radii[k]))
     time = model.flow.time
     by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)

@@ -113,14 +113,14 @@ class PeakSearch:
         campaign = Campaign(call, budget=self.budget, progress=progress)
         campaign(cuts.nominal[np.newaxis])
         linkage = SingleLinkage(campaign, domain, outputs, has_kinks=True)
-        note = ""
+        notes: tuple[str, ...] = ()
         try:
             if linkage.cuts:
                 n_uncertain = len(linkage.cuts[0].uncertain_inputs)
                 linkage.run(np.random.default_rng([SEED, 0]).random((MIN_SAMPLES, n_uncertain)))
-                note = linkage.summary()
+                notes = (linkage.summary(),)
         except SpentError as spent:
-            note = str(spent)
+            notes = (str(spent),)
 
         searched = bounds_of_samples(domain, campaign.samples, self.name)
         evaluations = len(campaign)
@@ -133,7 +133,8 @@ class PeakSearch:
             excess[level] = np.maximum(np.maximum(below, above), 0.0)
             evaluations += len(points)
         is_estimate = [not linkage.cuts or linkage.is_estimate(name) for name in outputs]
-        natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimate)
+        names = {True: Nature.ESTIMATED, False: Nature.ATTAINED}
+        natures = tuple(names[x] for x in is_estimate)
         error = np.where(is_estimate, SAFETY * excess + self.tolerance * searched.upper, 0.0)
         is_point = (cuts.lower == cuts.upper).all(axis=1)
         error[is_point] = 0.0  # the only trajectory of the level is exact
@@ -144,7 +145,7 @@ class PeakSearch:
             nature=Nature.ATTAINED,
             evaluations=evaluations,
             searched_peaks=replace(searched, error=error, natures=natures),
-            notes=(note,) if note else (),
+            notes=notes,
         )
 
 
@@ -230,9 +231,12 @@ def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
         Points, shape (points, inputs).
     """
     d = len(lower)
-    inside, wide, ends = (chebyshev_points(d, count, skip=skip + k * count) for k in range(3))
-    on_faces = np.clip(2 * wide, -1, 1)
-    ends = np.sign(ends) if 2**d > count else corners(-np.ones(d), np.ones(d))
+    inside = chebyshev_points(d, count, skip=skip)
+    on_faces = np.clip(2 * chebyshev_points(d, count, skip=skip + count), -1, 1)
+    if 2**d > count:
+        ends = np.sign(chebyshev_points(d, count, skip=skip + 2 * count))
+    else:
+        ends = corners(-np.ones(d), np.ones(d))
     points = np.concatenate([inside, on_faces, ends])
     return np.asarray((lower + upper) / 2 + (upper - lower) / 2 * points)
 
