@@ -2,7 +2,7 @@
 
 Every rounding error of an energy is bounded. The floating-point numbers of a field are taken as
 exact: whatever the solver left in them, they are a field of the space. Rounded are the modes and
-the sums of some products of modes; the sum of these is exact (`math.fsum`).
+the sums of their products.
 """
 
 from __future__ import annotations
@@ -36,8 +36,6 @@ SAFETY = 1.01
 """Factor for the rounding of an error bound itself and for terms of second order."""
 COEFFICIENT = 8
 """Rounding units by which a coefficient of trace or deviator may be off."""
-PIECE = 64
-"""Number of products that are summed in rounded steps; a larger one bounds rounding more widely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,22 +43,30 @@ class Energies:
     """Mean products of the modes of pairs of fields, by trace and deviator.
 
     Args:
-        value: Products by the trace and by the deviator, symmetric, shape (2, fields, fields).
-        by_modes: Bound of what the rounding of modes adds to each, of the same shape.
-        summed: Relative rounding of products and sums.
+        value: Computed products by the trace and by the deviator, symmetric, shape (2, fields,
+            fields).
+        mode_errors: Bounds of the roots of the mean squares of the errors of modes, weighted as the
+            products are, shape (2, fields).
+        summed: Bound of the relative rounding of products and sums.
     """
 
     value: Array
-    by_modes: Array
+    mode_errors: Array
     summed: float
 
     @property
     def rounding(self) -> Array:
-        """Bound of the absolute error of each product, shape (2, fields, fields)."""
-        # |Σ a b| ≤ √(Σ a²) √(Σ b²), so the roots of the diagonal bound the sums of magnitudes.
+        """Bound of the absolute error of each product, shape (2, fields, fields).
+
+        With errors δa, δb of modes, a b is off by |a| δb + |b| δa + δa δb at most. By Cauchy and
+        Schwarz the mean of each summand is at most a product of roots of mean squares. So is the
+        mean of the magnitudes |a b|, to which the rounding of sums is relative.
+        """
         size = np.sqrt(SAFETY * np.maximum(np.diagonal(self.value, axis1=1, axis2=2), 0))
-        by_sums = self.summed * size[:, :, None] * size[:, None, :]
-        return np.asarray(SAFETY * (self.by_modes + by_sums))
+        by_one = _outer(size, self.mode_errors)
+        by_modes = by_one + np.swapaxes(by_one, 1, 2) + _outer(self.mode_errors, self.mode_errors)
+        by_sums = self.summed * _outer(size, size)
+        return np.asarray(SAFETY * (by_modes + by_sums))
 
     @property
     def upper(self) -> Array:
@@ -72,6 +78,11 @@ class Energies:
         # symmetric matrix whose entries are that small. D makes loads of any size count alike.
         scale = np.sqrt(np.maximum(np.diagonal(value), np.finfo(float).tiny))
         return np.asarray(value + np.diag(SAFETY * (error / scale).sum(axis=1) * scale))
+
+
+def _outer(first: Array, second: Array) -> Array:
+    """Return the products of all pairs, shape (2, fields, fields), of two arrays (2, fields)."""
+    return np.asarray(first[:, :, np.newaxis] * second[:, np.newaxis])
 
 
 def energies(
@@ -95,55 +106,28 @@ def energies(
     xp = namespace(fields)
     count = fields.shape[0]
     cells = math.prod(fields.shape[2:])
-    # The exact sum of many pieces would take longer than the fields of a large grid.
-    piece = PIECE if cells <= 1 << 17 else 4096
-    sums: tuple[list[Array], list[Array]] = ([], [])
-    by_modes = np.zeros((2, count, count))
+    value = np.zeros((2, count, count))
+    squared_errors = np.zeros((2, count))
+    additions = 0
+    max_cells = 0
     for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
+        errors = xp.tensordot(amplification, local, axes=1) + UNIT * xp.abs(modes)
         for k, (rows, coefficient) in enumerate(zip(element.parts, coefficients, strict=True)):
             factor = xp.reshape(coefficient[slab], (-1,))
-            weighted = modes[rows] * factor
-            products = _piecewise_products(modes[rows], weighted, piece)
-            sums[k].append(np.apply_along_axis(math.fsum, 0, products))
-            # Errors δa, δb of modes a, b change a b by at most (|a| + δa/2) δb + (|b| + δb/2) δa.
-            # Here δ = amplification @ local, and one of both summands is formed.
-            transposed = amplification[rows].T
-            larger = xp.tensordot(transposed, xp.abs(weighted), axes=1)
-            larger += xp.tensordot(transposed @ transposed.T / 2, local * factor, axes=1)
-            mixed = xp.sum(larger @ xp.moveaxis(local, 1, 2), axis=0)
-            by_modes[k] += on_host(mixed + mixed.T)
-    totals = [np.apply_along_axis(math.fsum, 0, np.array(of_slabs)) for of_slabs in sums]
-    value = np.array(totals) / cells
-    size = np.sqrt(np.diagonal(value, axis1=1, axis2=2))
-    by_modes += 2 * UNIT * cells * size[:, :, None] * size[:, None, :]  # `UNIT` · |modes| each
-    relative_rounding = SAFETY * (piece + COEFFICIENT + 5) * UNIT
-    return Energies(value, by_modes / cells, relative_rounding)
-
-
-def _piecewise_products(modes: Fields, weighted: Fields, piece: int) -> Array:
-    """Return products of all pairs of fields, summed over pieces of the cells.
-
-    Args:
-        modes: Shape (modes, fields, cells).
-        weighted: The same modes times a coefficient of each cell.
-        piece: Number of cells that are summed in rounded steps.
-
-    Returns:
-        Sums, symmetric in the fields, shape (modes × pieces, fields, fields).
-    """
-    xp = namespace(modes)
-    count, n_fields, cells = modes.shape
-    piece = min(piece, cells)
-    padding = xp.zeros((count, n_fields, -cells % piece))
-
-    def by_piece(values: Fields) -> Fields:
-        """Return values padded with zeros, shape (modes, pieces, fields, piece)."""
-        padded = xp.concatenate([values, padding], axis=2) if padding.size else values
-        return xp.moveaxis(xp.reshape(padded, (count, n_fields, -1, piece)), 1, 2)
-
-    products = on_host(by_piece(modes) @ xp.moveaxis(by_piece(weighted), 2, 3))
-    products = products.reshape(-1, n_fields, n_fields)
-    return np.asarray((products + np.swapaxes(products, 1, 2)) / 2)
+            products = modes[rows] @ xp.moveaxis(modes[rows] * factor, 1, 2)
+            value[k] += on_host(xp.sum(products, axis=0))
+            squared_errors[k] += on_host(xp.sum(factor * errors[rows] ** 2, axis=(0, 2)))
+        additions += 1
+        max_cells = max(max_cells, modes.shape[2])
+    # A sum is off by at most n units of the sum of the magnitudes of its terms, if no term takes
+    # part in more than n additions (Higham, Accuracy and Stability of Numerical Algorithms, section
+    # 4.2). Here these are the sums over the cells of a slab, over the modes, and over the slabs.
+    additions += max_cells + len(element.modes)
+    return Energies(
+        value=(value + np.swapaxes(value, 1, 2)) / (2 * cells),
+        mode_errors=SAFETY * np.sqrt(squared_errors / cells),
+        summed=SAFETY * (additions + COEFFICIENT + 5) * UNIT,
+    )
 
 
 class SlabModes(NamedTuple):

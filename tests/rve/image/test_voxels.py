@@ -75,7 +75,7 @@ def test_bounds_of_laminates_meet_at_their_exact_stiffness(axis, contrast, rng):
     fractions = np.bincount(layers) / 6
     sides = (*rng.uniform(0.7, 1.4, 2), 1.0)
     bounds = solve_image(*moduli[:, phase], sides=sides, solver=TIGHT).bounds
-    assert bounds.width < 1e-10
+    assert bounds.width < 1e-9
     assert bounds.contains(laminate(axis, fractions, moduli))
 
 
@@ -342,14 +342,14 @@ def test_a_homogeneous_volume_is_exact_and_its_constants_are_its_own():
     young, poisson = 9 * 3.0 * 2.0 / 11.0, 5 / 22
     expected = [young] * 3 + [poisson] * 3 + [2.0] * 3
     for (low, high), value in zip(bounds.constants(), expected, strict=True):
-        assert low <= value <= high < low + 1e-12
+        assert low <= value <= high < low + 5e-12
     for (low, high), value in (
         (bounds.bulk, 3.0),
         (bounds.shear(), 2.0),
         (bounds.young(), young),
         (bounds.poisson(), poisson),
     ):
-        assert low <= value <= high < low + 1e-12
+        assert low <= value <= high < low + 5e-12
 
 
 def test_losses_of_laminates_and_equal_losses_are_exact(rng):
