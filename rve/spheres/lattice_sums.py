@@ -13,19 +13,24 @@ gives D_4, convergent only in the order of spheres.
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammaincc, gammaln
 
 from alphacut.base.arrays import Array
 
-_REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out
-
 
 def harmonics(points: Array, highest: int, order: int) -> Array:
-    """Real parts of Racah's C_n^m of the directions of k points, n up to `highest`, m = `order`.
+    """Return the real parts of Racah's C_n^m of the directions of points, m being `order`.
 
-    Shape (highest + 1, k); zero where n < m.
+    Args:
+        points: Points other than the origin, shape (k, 3).
+        highest: Highest degree n.
+        order: Order m.
+
+    Returns:
+        Values for n = 0 … `highest`, shape (highest + 1, k); zero where n < m.
     """
     radius = np.linalg.norm(points, axis=1)
     cosine = points[:, 2] / radius
@@ -43,30 +48,52 @@ def harmonics(points: Array, highest: int, order: int) -> Array:
     return values
 
 
-@cache
-def lattice_sums(highest: int) -> tuple[Array, Array]:
-    """Sums Σ C_n^m(p) |p|^(−n−1) and Σ C_n^m(p) |p|^(1−n) over the simple cubic lattice.
+class LatticeSums(NamedTuple):
+    """Sums over the lattice by degree n and order m, each of shape (highest + 1, highest + 1).
 
-    By degree and order, (highest + 1, highest + 1) each; by symmetry only even n ≥ 4 and orders
-    that are multiples of 4 are not zero. Those of degree 0 diverge and are left out.
+    Attributes:
+        harmonic: S_n^m.
+        biharmonic: D_n^m.
     """
-    harmonic, biharmonic = np.zeros((2, highest + 1, highest + 1))
-    axis = np.arange(-_REACH, _REACH + 1.0)
+
+    harmonic: Array
+    biharmonic: Array
+
+
+@cache
+def lattice_sums(highest: int) -> LatticeSums:
+    """Return the sums S_n^m and D_n^m up to a degree.
+
+    By symmetry only even n ≥ 4 and orders that are multiples of 4 are not zero. The sums of degree
+    0 diverge and are left out.
+    """
+    shape = highest + 1, highest + 1
+    sums = LatticeSums(np.zeros(shape), np.zeros(shape))
+    reach = 4  # of Ewald's sums: exp(−π 17) is the first term left out
+    axis = np.arange(-reach, reach + 1.0)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     square = (points**2).sum(axis=1)
-    points = points[(square > 0) & (square <= _REACH * (_REACH + 1))]
+    points = points[(square > 0) & (square <= reach * (reach + 1))]
     for m in range(0, highest + 1, 4):
         angular = harmonics(points, highest, m)
         for n in range(max(4, m), highest + 1, 2):
-            harmonic[n, m] = _epstein(angular[n], points, n, 1)
-            biharmonic[n, m] = _epstein(angular[n], points, n, -1)
-    return harmonic, biharmonic
+            sums.harmonic[n, m] = _epstein(angular[n], points, n, power=1)
+            sums.biharmonic[n, m] = _epstein(angular[n], points, n, power=-1)
+    return sums
 
 
-def _epstein(angular: Array, points: Array, n: int, power: int) -> float:
-    """Σ C_n^m |p|^(−n−power), power ±1, from the C_n^m at lattice points p near the origin."""
+def _epstein(angular: Array, points: Array, n: int, *, power: int) -> float:
+    """Return Σ C_n^m(p) |p|^(−n − power) over the lattice, by Ewald's split.
+
+    Args:
+        angular: C_n^m at lattice points near the origin.
+        points: These points.
+        n: Degree.
+        power: 1 or −1.
+    """
     square = (points**2).sum(axis=1)
-    s, x = n + power / 2, np.pi * square
+    s = n + power / 2
+    x = np.pi * square
     direct = angular @ (square ** (-(n + power) / 2) * gammaincc(s, x))
     # the reciprocal lattice is the lattice itself: Γ(1, x)/x or Γ(2, x)/x²
     gamma = np.exp(-x) * (1 / x if power == 1 else (1 + x) / x**2)

@@ -5,30 +5,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.rve.series.means import Material, Series
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, couplings, t_matrices
+from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, TMatrices, couplings, t_matrices
 from alphacut.rve.spheres.result import HILL, HomogenisedSpheres, cubic_voigt, spheres_with_checks
 
 
 def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> Array:
-    """K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, (n, m, 3), in Pa.
+    """Return K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, (n, m, 3), in Pa.
 
     They are the matrix's less the mean dipole stress.
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,).
+        materials: Materials of the matrix and of m spheres.
+        degree: Highest degree of the multipoles.
     """
     matrix, *spheres = materials
-    (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
+    bulk, mu = matrix.bulk_and_shear
+    nu = matrix.poisson
     axial = _dipoles(radius, matrix, spheres, degree, shear=False)
     shear = _dipoles(radius, matrix, spheres, degree, shear=True)
     # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
     dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
-    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
-    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+    scale = 8 * np.pi * mu * (1 - nu) * radius[:, np.newaxis] ** 3 / VOLUME
+    return np.asarray(np.array([bulk, mu, mu]) - scale[..., np.newaxis] * dipoles)
 
 
 SPHERES = Series(
@@ -60,58 +66,78 @@ class SpheresModel(SeriesModel):
     MIN_ACCURACY: ClassVar[float] = 1e-11
     series: ClassVar[Series] = SPHERES
 
-    def _checked_result(self, **parts: Any) -> HomogenisedSpheres:
-        return spheres_with_checks(HomogenisedSpheres(**parts))
+    def _checked_result(self, **fields: Any) -> HomogenisedSpheres:
+        """Return the result with these fields and its checks."""
+        return spheres_with_checks(HomogenisedSpheres(**fields))
+
+
+class _Load(NamedTuple):
+    """A uniform strain at infinity.
+
+    Attributes:
+        far_field: Index of the regular multipole that it is.
+        amplitude: Its amplitude at unit strain.
+        dipole: Index of the singular multipole that the mean stress follows from.
+    """
+
+    far_field: int
+    amplitude: complex
+    dipole: int
+
+
+def _loads(poles: Multipoles, poisson: complex, *, shear: bool) -> list[_Load]:
+    """Return the shear ε12, or the hydrostatic and the tetragonal strain."""
+    order = 2 if shear else 0
+    deviatoric = _Load(poles.index_of(1, 2, order), 1.0, poles.index_of(3, 2, order))
+    if shear:
+        return [deviatoric]
+    amplitude = -1 / (2 * (1 - 2 * poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
+    return [_Load(poles.index_of(3, 0, 0), amplitude, poles.index_of(1, 0, 0)), deviatoric]
 
 
 def _dipoles(
     radius: Array, matrix: Material, inclusions: Sequence[Material], degree: int, *, shear: bool
 ) -> Array:
-    """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads)."""
-    # singular amplitudes = T (regular amplitudes of the far field and of all images)
+    """Return force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads).
+
+    The singular amplitudes are x = T (f + C x), with the regular amplitudes f of the far field and
+    C x of all images, and the T-matrix T of the sphere.
+
+    Args:
+        radius: Radii over half the cell's side, shape (n,).
+        matrix: Material outside the spheres.
+        inclusions: Materials of the spheres, m of them.
+        degree: Highest degree of the multipoles.
+        shear: Whether the load is ε12, else the loads are hydrostatic and tetragonal strain.
+    """
     poles = Multipoles.up_to(degree, shear=shear)
-    # powers of r scale amplitudes to r = 1, over one load's; solution 1 of degree 0 is none
-    powers = np.maximum(poles.n + poles.kind - 2, 0), poles.n + 3 - poles.kind
-    regular_scale, singular_scale = (radius[:, None] ** power for power in powers)
+    loads = _loads(poles, matrix.poisson, shear=shear)
+    # Powers of r scale amplitudes to r = 1, over those of one load. Of a regular solution 1 the
+    # degree 0 is none, so that its power does not count.
+    regular_scale = radius[:, np.newaxis] ** np.maximum(poles.n + poles.kind - 2, 0)
+    singular_scale = radius[:, np.newaxis] ** (poles.n + 3 - poles.kind)
     images = couplings(degree, matrix.poisson, shear=shear)
-    images = images * regular_scale[..., None] * singular_scale[:, None]
-    order = 2 if shear else 0
-    # of each load: index of its far field, of its dipole, and amplitude at unit strain
-    loads: list[tuple[int, int, complex]] = [
-        (poles.index_of(1, 2, order), poles.index_of(3, 2, order), 1.0)
-    ]
-    if not shear:
-        unit = -1 / (2 * (1 - 2 * matrix.poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
-        loads.insert(0, (poles.index_of(3, 0, 0), poles.index_of(1, 0, 0), unit))
-    sources, dipole_rows, units = map(list, zip(*loads, strict=True))
-    columns, shape = range(len(loads)), (radius.size, len(inclusions), len(loads))
+    images = images * regular_scale[..., np.newaxis] * singular_scale[:, np.newaxis]
     kind = np.result_type(*(x for phase in (matrix, *inclusions) for x in phase.bulk_and_shear))
-    dipoles = np.empty(shape, kind)
     far_field = np.zeros((poles.n.size, len(loads)), kind)
-    far_field[sources, columns] = units
+    for column, load in enumerate(loads):
+        far_field[load.far_field, column] = load.amplitude
+    dipoles = np.empty((radius.size, len(inclusions), len(loads)), kind)
     for j, inclusion in enumerate(inclusions):
-        sphere = cached_t_matrices(degree, matrix, inclusion, shear=shear)
-        system = np.eye(poles.n.size) - apply_t_matrices(sphere, images)
-        source = apply_t_matrices(sphere, far_field)
-        source = np.broadcast_to(source, (*system.shape[:2], len(loads)))
-        dipoles[:, j] = np.linalg.solve(system, source)[:, dipole_rows, columns]
+        sphere = _cached_t_matrices(degree, matrix, inclusion, shear=shear)
+        system = np.eye(poles.n.size) - sphere.apply(images)
+        source = np.broadcast_to(sphere.apply(far_field), (*system.shape[:2], len(loads)))
+        amplitudes = np.linalg.solve(system, source)
+        for column, load in enumerate(loads):
+            dipoles[:, j, column] = amplitudes[:, load.dipole, column]
     return dipoles
 
 
 @lru_cache(maxsize=1024)
-def cached_t_matrices(
+def _cached_t_matrices(
     degree: int, matrix: Material, inclusion: Material, *, shear: bool
-) -> tuple[Array, Array]:
-    """T-matrices of a sphere for the multipoles of one load: of solutions 1 and 3, and of 2."""
+) -> TMatrices:
+    """Return the T-matrices of a sphere for the multipoles of one load, in their order."""
     poles = Multipoles.up_to(degree, shear=shear)
-    pair, torsion = t_matrices(poles.n, matrix, inclusion)
-    return pair[poles.kind == 1], torsion[poles.kind == 2]
-
-
-def apply_t_matrices(sphere: tuple[Array, Array], regular: Array) -> Array:
-    """Singular amplitudes T @ regular, both of shape (…, N, columns), Lamé solution by solution."""
-    pair, torsion = sphere
-    first, second, third = np.split(regular, [len(pair), len(pair) + torsion.size], axis=-2)
-    (t11, t13), (t31, t33) = np.moveaxis(pair[..., None], 0, 2)
-    singular = (t11 * first + t13 * third, torsion[:, None] * second, t31 * first + t33 * third)
-    return np.concatenate(singular, axis=-2)
+    matrices = t_matrices(poles.n, matrix, inclusion)
+    return TMatrices(matrices.pair[poles.kind == 1], matrices.torsion[poles.kind == 2])

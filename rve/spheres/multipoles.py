@@ -21,15 +21,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammaln
 
 from alphacut.base.arrays import Array
 from alphacut.rve.series.means import Material
-from alphacut.rve.spheres.lattice_sums import lattice_sums
+from alphacut.rve.spheres.lattice_sums import LatticeSums, lattice_sums
 
-VOLUME = 8.0  # of the cell of side 2
+VOLUME = 8.0
+"""Volume of the cell of side 2."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Multipoles:
         n: Degrees, shape (N,): even for solutions 1 and 3, odd for 2.
         m: Orders, not negative, shape (N,); the multipole of −m has the same amplitude or its
             negative.
-        kind: Lamé solution 1, 2 or 3, shape (N,). Places of kinds 1 and 3 follow one another in the
+        kind: Lamé solution 1, 2 or 3, shape (N,). Those of kinds 1 and 3 follow one another in the
             same order of n and m.
     """
 
@@ -51,52 +53,64 @@ class Multipoles:
     @classmethod
     @lru_cache(maxsize=256)
     def up_to(cls, highest: int, *, shear: bool) -> Multipoles:
-        """All up to degree `highest`: m = 0, 4, … for axial loads, m = 2, 6, … for ε12."""
+        """Return all up to degree `highest`: m = 0, 4, … for axial loads, 2, 6, … for ε12."""
         first = 2 if shear else 0
         even = [(n, m) for n in range(first, highest + 1, 2) for m in range(first, n + 1, 4)]
         odd = [(n, m) for n in range(3, highest + 1, 2) for m in range(first or 4, n + 1, 4)]
-        rows = [(n, m, 1) for n, m in even]
-        rows += [(n, m, 2) for n, m in odd]
-        rows += [(n, m, 3) for n, m in even]
-        n, m, kind = np.array(rows).T
+        n, m = np.array(even + odd + even).T
+        kind = np.repeat([1, 2, 3], [len(even), len(odd), len(even)])
         return cls(n, m, kind)
 
     def index_of(self, kind: int, n: int, m: int) -> int:
-        """Index of one multipole."""
+        """Return the index of one multipole."""
         return int(np.flatnonzero((self.kind == kind) & (self.n == n) & (self.m == m))[0])
 
 
 @lru_cache(maxsize=96)  # as many Poisson ratios and degrees as a fuzzy modulus takes
 def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
-    """Regular amplitudes (rows) at one sphere by unit multipoles at all its images (columns).
+    """Return the regular amplitudes at one sphere by unit multipoles at all its images.
 
-    At r = 1 in the order of `Multipoles.up_to`, shape (N, N); `shear` for the load ε12.
+    Args:
+        highest: Highest degree of the multipoles.
+        poisson: Poisson's ratio of the matrix.
+        shear: Whether the load is ε12.
+
+    Returns:
+        Matrix in the order of `Multipoles.up_to`, at r = 1: rows are the regular amplitudes,
+        columns the multipoles.
     """
     poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
     coupling = np.zeros((poles.n.size, poles.n.size), np.result_type(poisson, float))
     for target, source in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
-        rows, columns = np.flatnonzero(poles.kind == target), np.flatnonzero(poles.kind == source)
-        k, j = poles.n[rows, None], poles.m[rows, None]
-        n, m = poles.n[None, columns], poles.m[None, columns]
-        # the multipole of −m has the same amplitude or its negative
-        sign = (-1.0 if source == 2 else 1.0) * (-1.0 if shear else 1.0)
-        of_m = _coupling(target, source, _Pair(n, m, k, j), poisson, sums)
-        of_minus_m = _coupling(target, source, _Pair(n, -m, k, j), poisson, sums)
-        coupling[np.ix_(rows, columns)] = of_m + np.where(m > 0, sign * of_minus_m, 0.0)
-    # less the mean strain of the sums of degree −2
+        rows = np.flatnonzero(poles.kind == target)
+        columns = np.flatnonzero(poles.kind == source)
+        pair = _Pair(
+            n=poles.n[np.newaxis, columns],
+            m=poles.m[np.newaxis, columns],
+            k=poles.n[rows, np.newaxis],
+            j=poles.m[rows, np.newaxis],
+        )
+        of_m = _coupling(target, source, pair, poisson, sums)
+        of_minus_m = _coupling(target, source, pair._replace(m=-pair.m), poisson, sums)
+        # the multipole of −m has the same amplitude, or its negative for one of both
+        is_opposite = (source == 2) != shear
+        of_minus_m = np.where(pair.m > 0, -of_minus_m if is_opposite else of_minus_m, 0.0)
+        coupling[np.ix_(rows, columns)] = of_m + of_minus_m
+
+    # The sums of degree −2 are made periodic: their mean strain, that of Eshelby's polarised ball,
+    # is taken off, and so is that of the periodic 1/r, whose Laplacian is 4π/V beside its poles.
     order = 2 if shear else 0
-    polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)  # strain of Eshelby's ball
+    polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)
     coupling[poles.index_of(1, 2, order), poles.index_of(3, 2, order)] -= polarised_ball
-    if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
+    if not shear:
         dilatation = 4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
         coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= dilatation
     return coupling
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """A multipole (n, ±m) and a regular solution (k, j); both broadcast."""
+class _Pair(NamedTuple):
+    """Degrees and orders of a multipole (n, m) and of a regular solution (k, j); all broadcast."""
 
     n: Array
     m: Array
@@ -104,69 +118,112 @@ class _Pair:
     j: Array
 
 
-def _coupling(
-    target: int, source: int, pair: _Pair, poisson: complex, sums: tuple[Array, Array]
-) -> Array:
-    """Amplitude of regular Lamé solution `target` by the images of multipoles of kind `source`."""
-    harmonic, biharmonic = sums
-    n, k = pair.n, np.maximum(pair.k, 1) if target == 1 else pair.k
+def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: LatticeSums) -> Array:
+    """Return the amplitudes of regular Lamé solutions by the images of multipoles.
+
+    The formulas are those at the head of this file.
+
+    Args:
+        target: Kind of the regular solutions.
+        source: Kind of the multipoles, at least `target`.
+        pair: Degrees and orders of both.
+        poisson: Poisson's ratio of the matrix.
+        sums: Lattice sums.
+    """
+    n = pair.n
+    k = np.maximum(pair.k, 1) if target == 1 else pair.k  # a regular solution 1 of degree 0 is none
     if target == source:
         factors = {1: pair.k > 0, 2: -n / (k + 1), 3: n * (2 * n - 1) / ((k + 1) * (2 * k + 3))}
-        return np.asarray(factors[target] * _weighted_sum(harmonic, pair, 0))
+        return np.asarray(factors[target] * _weighted_sum(sums.harmonic, pair, 0))
     if 2 in (target, source):  # by the ladder operators
-        rotated = (n * pair.j + k * pair.m) * _weighted_sum(harmonic, pair, -1)
+        rotated = (n * pair.j + k * pair.m) * _weighted_sum(sums.harmonic, pair, -1)
         if target == 1:
             return np.asarray(-rotated / k)
         return np.asarray(4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * rotated)
-    alpha, c = 4 - 4 * poisson - n, 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
+    alpha = 4 - 4 * poisson - n
+    c = 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
     projection = (2 * alpha * (k - 1) + c) / (2 * (n + k) - 1)
-    by_biharmonic = (alpha - projection) * 4 * _weighted_sum(biharmonic, pair, 0)
+    by_biharmonic = (alpha - projection) * 4 * _weighted_sum(sums.biharmonic, pair, 0)
     factor = projection / (k * (2 * k - 1)) * _projection_factor(pair)
-    by_harmonic = factor * _weighted_sum(harmonic, pair, -2)
+    by_harmonic = factor * _weighted_sum(sums.harmonic, pair, -2)
     return np.where(pair.k > 0, by_biharmonic - by_harmonic, 0.0)
 
 
 def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
-    """Σ_P f_N^M(P) (−1)^n w_N^M / (w_n^m w_k^j), N = n + k + `lower`, M = m − j, or 0."""
-    # f_N^M are irregular solid harmonics at P = 2p; w_n^m = √((n − m)! (n + m)!) makes them Racah's
-    degree, order = pair.n + pair.k + lower, abs(pair.m - pair.j)
+    """Return Σ_P f_N^M(P) (−1)^n w_N^M/(w_n^m w_k^j) with N = n + k + `lower`, M = m − j, or 0.
+
+    The f_N^M are irregular solid harmonics at P = 2p, and w_n^m = √((n − m)! (n + m)!) makes them
+    Racah's, whose lattice sums over p are `sums`. The result is 0 where N < |M|.
+    """
+    degree = pair.n + pair.k + lower
+    order = abs(pair.m - pair.j)
     exists = (order <= degree) & (degree >= 0)
-    degree, order = np.where(exists, degree, 0), np.where(exists, order, 0)
+    degree = np.where(exists, degree, 0)
+    order = np.where(exists, order, 0)
     weight = _log_weight(degree, order) - _log_weight(pair.n, pair.m) - _log_weight(pair.k, pair.j)
     value = np.exp(weight - (degree + 1) * np.log(2)) * sums[degree, order]
     return np.where(exists, np.where(pair.n % 2, -value, value), 0.0)
 
 
 def _log_weight(n: Array, m: Array) -> Array:
+    """Return the logarithm of √((n − m)! (n + m)!)."""
     return np.asarray((gammaln(n - m + 1) + gammaln(n + m + 1)) / 2)
 
 
 def _projection_factor(pair: _Pair) -> Array:
-    """Factor of f_{n+k-2}^{m-j}(P) in H[(x·P) F]_k, times (2k − 1)(2n + 2k − 1)."""
-    degree, order = pair.n + pair.k - 1, pair.m - pair.j
-    p, q = pair.k - pair.j, pair.k + pair.j
-    a, b = degree - order, degree + order
+    """Return the factor of f_{n+k-2}^{m-j}(P) in H[(x·P) F]_k, times (2k − 1)(2n + 2k − 1)."""
+    degree = pair.n + pair.k - 1
+    order = pair.m - pair.j
+    p = pair.k - pair.j
+    q = pair.k + pair.j
+    a = degree - order
+    b = degree + order
     sides = q * (q - 1) * b * (b + 1) + p * (p - 1) * a * (a + 1)
     return np.asarray(1.0 * p * q * a * b - sides / 2)
 
 
-def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[Array, Array]:
+class TMatrices(NamedTuple):
     """T-matrices of a sphere of radius 1: singular amplitudes = T @ regular amplitudes.
+
+    Attributes:
+        pair: Blocks of the coupled solutions 1 and 3, shape (k, 2, 2); rows are singular, columns
+            regular amplitudes.
+        torsion: Factors of solution 2, shape (l,).
+    """
+
+    pair: Array
+    torsion: Array
+
+    def apply(self, regular: Array) -> Array:
+        """Return the singular amplitudes by regular ones, both of shape (…, N, columns).
+
+        The rows are solutions 1, then 2, then 3.
+        """
+        ends = [len(self.pair), len(self.pair) + self.torsion.size]
+        first, second, third = np.split(regular, ends, axis=-2)
+        pair = self.pair[..., np.newaxis]
+        singular = (
+            pair[:, 0, 0] * first + pair[:, 0, 1] * third,
+            self.torsion[:, np.newaxis] * second,
+            pair[:, 1, 0] * first + pair[:, 1, 1] * third,
+        )
+        return np.concatenate(singular, axis=-2)
+
+
+def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> TMatrices:
+    """Return the T-matrices of a sphere of radius 1 for k degrees.
 
     On it the Lamé solutions 1 and 3 have displacements and tractions along x Y and ∇Y (Y the
     spherical harmonic), solution 2 along x × ∇Y alone; continuity of both leaves 2 × 2 systems for
-    each degree, whatever the order m.
-    Lamé solutions are numbered as by Kushch (2013): 1 is the gradient of a harmonic, 2 torsional,
-    3 the one with dilatation. The inclusion may be as soft as a pore or as stiff as rigid.
-
-    Returns:
-        T of the coupled solutions 1 and 3 of k degrees, rows singular, columns regular, (k, 2, 2),
-        and of solution 2, (k,).
+    each degree, whatever the order m. Lamé solutions are numbered as by Kushch (2013): 1 is the
+    gradient of a harmonic, 2 torsional, 3 the one with dilatation. The inclusion may be as soft as
+    a pore or as stiff as rigid.
     """
     n = np.asarray(degrees, float)
     ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
     # weights of tractions outside and inside, finite for pores and rigid spheres
-    outside, inside = 1 / (1 + ratio), ratio / (1 + ratio)
+    outside = 1 / (1 + ratio)
+    inside = ratio / (1 + ratio)
     displacement, traction = _surface_fields(n, inclusion.poisson)
     displacement[n == 0, 1, 0] = 1.0  # ∇1 is no displacement: keeps the matrix invertible
     stiffness = traction @ np.linalg.inv(displacement)  # traction over μ of the solid sphere
@@ -175,22 +232,35 @@ def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> tuple[A
         displacement, traction = _surface_fields(degree, matrix.poisson)
         return outside * traction - inside * stiffness @ displacement
 
-    singular, regular = traction_mismatch(-n - 1), -traction_mismatch(n)
-    is_radial = n == 0  # singular solution 1 and regular solution 3 alone
-    singular[is_radial, :, 1], singular[is_radial, 1, :] = 0.0, 0.0
-    singular[is_radial, 1, 1], regular[is_radial, 1, :] = 1.0, 0.0
+    singular = traction_mismatch(-n - 1)
+    regular = -traction_mismatch(n)
+    # of degree 0 there are the singular solution 1 and the regular solution 3 alone
+    is_radial = n == 0
+    singular[is_radial, :, 1] = 0.0
+    singular[is_radial, 1, :] = 0.0
+    singular[is_radial, 1, 1] = 1.0
+    regular[is_radial, 1, :] = 0.0
     torsion_sum = np.where(is_radial, 1.0, (n + 2) * outside + (n - 1) * inside)
     torsion = np.where(is_radial, 0.0, (n - 1) * (outside - inside) / torsion_sum)
-    return np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion)
+    return TMatrices(np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion))
 
 
 def _surface_fields(degree: Array, poisson: complex) -> tuple[Array, Array]:
-    """Displacement and traction over μ along x Y and ∇Y of solutions 1 and 3, (k, 2, 2) each."""
-    d, nu = degree, poisson
-    alpha, unit = d + 5 - 4 * nu, np.ones_like(d)
-    radial = d * alpha - 2 * (3 * d + 1 - 2 * nu * (2 * d + 1))  # α d + c
-    dilatation = -4 * nu * (d + 1) * (2 * d + 3)  # λ/μ div u
-    displacement = np.array([[d, radial], [unit, alpha]])
+    """Return displacements and tractions of the Lamé solutions 1 and 3 on the unit sphere.
+
+    Args:
+        degree: Degrees d of the solid harmonics, shape (k,).
+        poisson: Poisson's ratio ν.
+
+    Returns:
+        Displacements, and tractions over μ, shape (k, 2, 2) each: rows are the components along x Y
+        and ∇Y, columns the solutions.
+    """
+    d = degree
+    alpha = d + 5 - 4 * poisson
+    radial = d * alpha - 2 * (3 * d + 1 - 2 * poisson * (2 * d + 1))  # α d + c
+    dilatation = -4 * poisson * (d + 1) * (2 * d + 3)  # λ/μ div u
+    displacement = np.array([[d, radial], [np.ones_like(d), alpha]])
     traction = np.array(
         [[2 * (d - 1) * d, dilatation + (2 * d + 2) * radial], [2 * (d - 1), radial + d * alpha]]
     )
