@@ -55,10 +55,19 @@ class Section(BaseModel):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a key, with its SI unit (empty for none) and the range of every value of it.
+    """Type of a key that holds a quantity, as metadata of `Annotated`.
 
-    The range is open at `above` and `below`, closed at `minimum` and `maximum`. `cure` is what to
-    give in place of a value that is refused.
+    Every value that the quantity may take lies in the range: all of a fuzzy number's support.
+
+    Args:
+        si: SI unit, a key of `QUANTITIES`; empty for a number without a unit.
+        above: Value that the range does not reach from above.
+        minimum: Smallest value in the range.
+        below: Value that the range does not reach from below.
+        maximum: Largest value in the range.
+        fuzzy: Whether the quantity may be fuzzy.
+        is_integer: Whether it is a whole number.
+        cure: What to give in place of a value that is refused.
     """
 
     si: str = ""
@@ -72,56 +81,64 @@ class Quantity:
 
     @property
     def allowed(self) -> str:
-        """Allowed values in words."""
+        """The allowed values in words."""
         dimension = QUANTITIES[self.si]
-        name = "whole number" if self.is_integer else dimension.name
+        words = "whole number" if self.is_integer else dimension.name
         bounds = {
             "above": self.above,
             "from": self.minimum,
             "below": self.below,
             "up to": self.maximum,
         }
-        finite = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
-        words = " ".join([name, *finite])
+        for word, bound in bounds.items():
+            if math.isfinite(bound):
+                words += f" {word} {bound:g}"
         return f'{words}, as "{dimension.example}"' if self.si else words
 
-    def parse(self, value: object) -> object:
-        """The quantity in SI that a value of the case states, such as "80 GPa ± 5 %", in range."""
-        cure = self.cure
+    def parse(self, value: object) -> FuzzyNumber | float | int:
+        """Return the quantity in SI that a value of the case states, such as "80 GPa ± 5 %".
+
+        Raises:
+            RefusedError: The value is no such quantity, or leaves the range.
+        """
         try:
             number = self._parsed(value)
-            ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
-            fits = all(
-                self.above < end < self.below and self.minimum <= end <= self.maximum
-                for end in ends
-            )
         except ValueError as error:
-            fits, cure = False, "; ".join(filter(None, (str(error), cure)))
-        require(fits, "", value, self.allowed, cure=cure or self._percent_cure(value))
+            cure = f"{error}; {self.cure}" if self.cure else str(error)
+            raise RefusedError("", value, self.allowed, cure) from None
+        ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
+        is_inside = all(self._contains(end) for end in ends)
+        require(is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value))
         return number
 
-    def _percent_cure(self, value: object) -> str:
-        """What to write for a ratio too large by itself, that would fit as per cent."""
+    def _contains(self, value: float) -> bool:
+        """Return whether a value in SI lies in the range."""
+        return self.above < value < self.below and self.minimum <= value <= self.maximum
+
+    def _cure_of_percentage(self, value: object) -> str:
+        """Return what to write for a ratio that is too large, but would fit as a percentage."""
         if self.si or self.is_integer or not is_number(value):
             return ""
-        share = float(cast("float", value)) / 100
-        fits = self.above < share < self.below and self.minimum <= share <= self.maximum
-        return f'write "{value} %" or {share:g}' if fits and share > 0 else ""
+        ratio = float(cast("float", value)) / 100
+        is_meant = ratio > 0 and self._contains(ratio)
+        return f'write "{value} %" or {ratio:g}' if is_meant else ""
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
+        """Return the quantity of any size that a value states, in SI, or raise ValueError."""
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
             return value
-        bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
-        if bare or self.is_integer:
-            reason = "write a number without quotes and without a unit"
-            raise ValueError(reason if self.is_integer else f'{reason}, or "5 %" for 0.05')
+        reason = "write a number without quotes and without a unit"
+        if self.is_integer:
+            raise ValueError(reason)
+        if not self.si and isinstance(value, str) and "%" not in value and "[" not in value:
+            raise ValueError(f'{reason}, or "5 %" for 0.05')
         parse = quantity.parse_fuzzy if self.fuzzy else quantity.parse_number
         return parse(value, self.si)
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """The validation by `parse`."""
+        """Return the schema by which Pydantic calls `parse`."""
         return core_schema.no_info_plain_validator_function(self.parse)
 
 
@@ -194,11 +211,19 @@ Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 
 
 def _stiffness(rows: list[list[object]]) -> VoigtPhase:
+    """Return the phase with a stiffness of three rows of three moduli, in Voigt's notation.
+
+    Raises:
+        RefusedError: There are other rows, a unit is wrong, or the stiffness is not symmetric and
+            positive definite.
+    """
     try:
-        return VoigtPhase(tuple(tuple(quantity.parse_number(x, "Pa") for x in row) for row in rows))
-    except (TypeError, ValueError):
+        moduli = [tuple(quantity.parse_number(entry, "Pa") for entry in row) for row in rows]
+        return VoigtPhase(tuple(moduli))
+    except (TypeError, ValueError) as error:
         allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
-        raise RefusedError("", rows, allowed) from None
+        cure = str(error) if "the unit" in str(error) else ""
+        raise RefusedError("", rows, allowed, cure) from None
 
 
 Stiffness = Annotated[VoigtPhase, PlainValidator(_stiffness)]

@@ -244,8 +244,8 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
 
     source = numbers(b"Nodes")
     n_blocks, n_nodes, _, _ = source.size_list(4)
-    tags = [np.empty(0, np.int64)]
-    points = [np.empty((0, 3))]
+    tags: list[Ints] = [np.empty(0, np.int64)]
+    points: list[Array] = [np.empty((0, 3))]
     for _ in range(n_blocks):
         dimension, _, is_parametric = source.int_list(3)
         count = source.count()
