@@ -39,9 +39,22 @@ FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EnvelopeResult:
-    """An envelope in SI: extremes and errors by output at the lowest level, peaks, and cost.
+    """An envelope in SI units.
 
-    `drawn` are the outputs that are drawn, all if empty.
+    Args:
+        fuzzy: Fuzzy inputs as the case names them.
+        min: Smallest value of each output over time at the lowest level.
+        max: Largest value, likewise.
+        error: Largest error, likewise.
+        alpha: Levels, shape (A,).
+        peak: Peaks by name, such as "q1" or "max q1".
+        seconds: Time that it took.
+        method: Method that found it.
+        nature: Guarantee of the bounds.
+        motions_tested: Number of exact responses that were compared with the bounds.
+        step: Distance of the time nodes, in s.
+        units: SI units of the outputs.
+        drawn: Outputs that are drawn, all if empty.
     """
 
     fuzzy: tuple[str, ...]
@@ -61,10 +74,15 @@ class EnvelopeResult:
 
 @dataclass(frozen=True)
 class EnvelopeTask:
-    """One envelope to be computed; `fuzzy` inputs are named as in the case, such as E, m or m1.
+    """One envelope to be computed.
 
-    `figures` are the outputs that are drawn, each with its number in the paper, or empty for all;
-    `limited` those peaks that a question compares with a limit.
+    Args:
+        name: Name of the study.
+        fuzzy: Fuzzy inputs as the case names them, such as E, m or m1.
+        duration: Length of the simulation, in s.
+        section: What holds for all studies.
+        figures: Outputs that are drawn, each with its number in the paper; empty for all.
+        limited: Peaks that a question compares with a limit.
     """
 
     name: str
@@ -75,7 +93,11 @@ class EnvelopeTask:
     limited: tuple[str, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
-        """Error of the envelope that the case allows, in the unit of some output or relative."""
+        """Return the error of the envelope that the case allows.
+
+        Raises:
+            RefusedError: It is in the unit of no output.
+        """
         units = {Output(x).unit for x in structure.outputs}
         tolerance = self.section.tolerance or DEFAULT_TOLERANCE
         value = f"{tolerance.value:g} {tolerance.unit}"
@@ -84,29 +106,19 @@ class EnvelopeTask:
         return tolerance
 
     def has_motion_of(self, section: EnvelopeSection) -> bool:
-        """True if it has the inputs and the duration of [envelope]."""
+        """Return whether it has the inputs and the duration of [envelope]."""
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
     def compute(self, structure: Structure, context: StageContext) -> StageResult[EnvelopeResult]:
-        """Computes the envelope as a dataset; its extremes and the peaks of its outputs."""
-        half = 0.5 if self.limited else 1.0  # a second analysis is that of limited peaks
-        first, second = (subprogress(context.tick, *x) for x in ((0.0, half), (half, 1.0)))
-        arguments = self.arguments(structure) | {"progress": first}
+        """Compute the envelope as a dataset, and the peaks of its outputs."""
+        end = 0.5 if self.limited else 1.0  # a second analysis is that of limited peaks
+        arguments = self.arguments(structure) | {"progress": subprogress(context.tick, 0.0, end)}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
-        outputs = [*map(str, result.outputs)]  # of others `close_peaks` has the peaks
-        signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
-        peak_bounds = peaks(result, [*outputs, *signed])
-        # a second proof of many inputs is hardly tighter: the number of its parts ends it
-        has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
-        gap = np.inf if has_many_inputs else PEAK_ERROR
-        is_searched = result.searched_peaks is not None  # a second search finds no more
-        limited = [x for x in self.limited if not is_searched or x not in peak_bounds]
-        if loose := loose_peaks(peak_bounds, limited, gap):
-            tighter = replace(self, limited=loose).close_peaks(structure, second)
-            peak_bounds = tightest(peak_bounds, tighter)
+        peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
         data = result.to_dataset()
-        lowest, names = data.isel(alpha=0), [*map(str, data["output"].values)]
+        lowest = data.isel(alpha=0)
+        names = [str(name) for name in data["output"].values]
 
         def by_output(values: xarray.DataArray) -> dict[str, float]:
             return dict(zip(names, map(float, values.values), strict=True))
@@ -127,26 +139,43 @@ class EnvelopeTask:
         )
         return StageResult(numbers, data)
 
+    def _peaks(
+        self, structure: Structure, envelope: frame.Envelope, progress: Progress
+    ) -> dict[str, Peak]:
+        """Return the peaks of an envelope; those of limited outputs by a second proof if loose."""
+        outputs = [str(name) for name in envelope.outputs]  # of others `close_peaks` has the peaks
+        signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
+        found = peaks(envelope, [*outputs, *signed])
+        # a second proof of many inputs is hardly tighter: the number of its sub-boxes ends it
+        has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
+        gap = np.inf if has_many_inputs else PEAK_ERROR
+        is_searched = envelope.searched_peaks is not None  # a second search finds no more
+        limited = [x for x in self.limited if not is_searched or x not in found]
+        if loose := loose_peaks(found, limited, gap):
+            found = tightest(found, replace(self, limited=loose).close_peaks(structure, progress))
+        return found
+
     def compute_peaks(
         self, structure: Structure, context: StageContext
     ) -> StageResult[dict[str, Peak]]:
-        """Computes the peaks of the limited outputs alone."""
+        """Compute the peaks of the limited outputs alone."""
         return StageResult(self.close_peaks(structure, context.tick))
 
     def arguments(self, structure: Structure) -> Document:
-        """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
+        """Return the arguments of `frame.envelope` and `frame.require_envelope` from the case."""
         section, method = self.section, self.section.method
         arguments = {**self._motion(structure), "model": structure.model, "method": method}
         arguments["integrator"] = section.integrator
-        tolerance = self.tolerance(structure).value
         # without a tolerance in the case, method auto takes any gap that is proved
         takes_any_gap = method == "auto" and section.tolerance is None
         if not takes_any_gap and hasattr(frame.METHODS[method], "tolerance"):
-            arguments["tolerance"] = tolerance * (section.gain if method in FOLLOWERS else 1.0)
+            tolerance = self.tolerance(structure).value
+            # a follower takes it as the smallest gain for which it computes a trajectory
+            arguments["tolerance"] = tolerance * section.gain if method in FOLLOWERS else tolerance
         return arguments
 
     def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
-        """Peaks of the limited outputs by the method that bounds peaks most closely."""
+        """Return the peaks of the limited outputs, by the method that bounds them most closely."""
         structure.require_quantities("limits", outputs_of(self.limited))
         motion = self._motion(structure)
         return close_peaks(structure.model, names=self.limited, progress=progress, **motion)
@@ -161,20 +190,26 @@ class EnvelopeTask:
 
 
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
-    """Outputs of some peaks, each once."""
+    """Return the outputs of some peaks, each once."""
     return tuple(dict.fromkeys(map(output_of, peaks)))
 
 
 def tasks(
     section: EnvelopeSection, studies: Sequence[Study], limited: tuple[str, ...] = ()
 ) -> tuple[EnvelopeTask, ...]:
-    """Tasks of the envelopes of a case: one for each study, or the one of [envelope], "all".
+    """Return the tasks of the studies of a case, or the one of [envelope], named "all".
 
-    Only tasks with the motion of [envelope] have the outputs `limited` by questions.
+    Args:
+        section: What holds for all studies.
+        studies: The studies.
+        limited: Peaks that questions limit; they go to the tasks with the response of [envelope].
     """
-    tasks = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
-    tasks = tasks or [EnvelopeTask("all", section.fuzzy, section.duration, section)]
-    return tuple(replace(x, limited=limited if x.has_motion_of(section) else ()) for x in tasks)
+    found = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
+    if not found:
+        found = [EnvelopeTask("all", section.fuzzy, section.duration, section)]
+    return tuple(
+        replace(task, limited=limited) if task.has_motion_of(section) else task for task in found
+    )
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
@@ -188,25 +223,29 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
 def require_tolerance(
     result: StageResult[EnvelopeResult], task: EnvelopeTask, structure: Structure
 ) -> None:
-    """Requires the declared errors of an envelope within the tolerance, where the case names one.
+    """Require the declared errors of an envelope within the tolerance, where the case names one.
 
-    A larger error of a Graph Follower is a warning: it takes the tolerance only as the least gain
-    for which it computes a trajectory. Others fail.
+    A larger error of a Graph Follower is a warning: it takes the tolerance only as the smallest
+    gain for which it computes a trajectory. So is one of a nonlinear system.
+
+    Raises:
+        FailedError: An error of another method is larger.
     """
     if task.section.tolerance is None:
         return
     allowed, data = task.tolerance(structure), result.arrays
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
-        has_unit = allowed.unit in ("", result.numbers.units[name])
         peak = result.numbers.peak[name]
-        if peak.nature is Nature.ESTIMATED:  # of a band of motions that were made alone
+        if peak.nature is Nature.ESTIMATED:  # of a band of responses that were made alone
             error = max(error, float(peak.error.max()))
         if not allowed.unit:
             error = error / peak.upper.max()
-        if has_unit and error > allowed.value * (1 + 1e-9):
-            what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
-            cure = "method auto, or a smaller envelope.step, reaches it"
-            if structure.linear is not None and task.section.method not in FOLLOWERS:
-                raise FailedError(what, cure)
-            say(f"warning: {what}; {cure}")
+        has_unit = allowed.unit in ("", result.numbers.units[name])
+        if not has_unit or error <= allowed.value * (1 + 1e-9):
+            continue
+        what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
+        cure = "method auto, or a smaller envelope.step, reaches it"
+        if structure.linear is not None and task.section.method not in FOLLOWERS:
+            raise FailedError(what, cure)
+        say(f"warning: {what}; {cure}")

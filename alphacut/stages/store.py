@@ -29,23 +29,35 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
-SECONDS = {"modulus": 10.0, "image": 10.0, "envelope": 10.0, "record": 3.0, "incremental": 5.0}
-SECONDS |= {"probability": 5.0, "tolerances": 30.0, "figures": 6.0}
-"""Rough seconds of a stage by the first word of its name, else 1, for its part of the progress."""
-
+SECONDS = {
+    "modulus": 10.0,
+    "image": 10.0,
+    "envelope": 10.0,
+    "record": 3.0,
+    "incremental": 5.0,
+    "probability": 5.0,
+    "tolerances": 30.0,
+    "figures": 6.0,
+}
+"""Rough seconds of a stage by the first word of its name, 1 of others. They are measured on shipped
+cases, and only divide the progress bar among the stages."""
 
 T = TypeVar("T")
 
 
-def no_progress(share: float) -> None:
-    """Shows nothing."""
+def no_progress(fraction: float) -> None:
+    """Show nothing."""
 
 
 @dataclass(frozen=True)
 class StageContext:
-    """Surroundings of a computation: an empty folder for further files, or None to write none.
+    """Surroundings of a computation.
 
-    `samples` is a store of samples, `tick` takes the share done.
+    Args:
+        folder: Empty folder for further files; None to write none.
+        samples: Store of samples, if the stage has some.
+        workers: Number of processes.
+        tick: Takes the completed fraction.
     """
 
     folder: Path | None = None
@@ -56,9 +68,13 @@ class StageContext:
 
 @dataclass(frozen=True)
 class StageResult(Generic[T]):
-    """Numbers of a stage, and arrays with their axes if it has some.
+    """Result of a stage.
 
-    The store adds the names of the files and the digest of what the result was made from.
+    Args:
+        numbers: Its numbers.
+        data: Arrays with their axes, if it has some.
+        files: Names of its files, which the store adds.
+        fingerprint: Digest of what it was made from, which the store adds.
     """
 
     numbers: T
@@ -75,10 +91,16 @@ class StageResult(Generic[T]):
 
 @dataclass(frozen=True)
 class Stage(Generic[T]):
-    """A function from objects to a result of type `kind`, in files NAME.json and NAME.nc.
+    """A function whose result is kept in the files NAME.json and NAME.nc.
 
-    The result depends on the `inputs` and on the source of `packages` of this project, nothing
-    else; with `has_samples` it stores samples on the way. `work` is compared with other stages'.
+    Args:
+        name: NAME.
+        inputs: All that the result depends on, besides source and libraries.
+        packages: Packages of this project whose source it depends on.
+        kind: Type of the numbers.
+        compute: Returns the result.
+        has_samples: Whether it stores samples on the way.
+        work: Work of the stage, compared with that of stages that are computed beside it.
     """
 
     name: str
@@ -96,15 +118,18 @@ class Stage(Generic[T]):
 
     @on_one_blas_thread
     def run(self, context: StageContext) -> StageResult[T]:
-        """The result, computed."""
+        """Return the result, computed."""
         return self.compute(context)
 
 
 @dataclass
 class RunProgress:
-    """Progress of a run in one bar, of which stages take parts as their `SECONDS`.
+    """Progress of a run in one bar, of which each stage takes a part by its `SECONDS`.
 
-    `seconds_left` are those of all stages to come; `show` takes the share done.
+    Args:
+        show: Takes the completed fraction of the run.
+        seconds_left: Seconds of all stages to come.
+        done: Fraction of the bar that the stages so far have taken.
     """
 
     show: Progress = no_progress
@@ -112,11 +137,11 @@ class RunProgress:
     done: float = 0.0
 
     def foresee(self, names: Iterable[str]) -> None:
-        """Foresees the stages of a run by their names."""
+        """Foresee the stages of a run by their names."""
         self.seconds_left = self._seconds_of(names)
 
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
-        """Progress of the next stages by their names; `skipped` are up to date."""
+        """Return the progress of the next stages by their names; `skipped` are up to date."""
         self.seconds_left -= self._seconds_of(skipped)
         seconds, first = self._seconds_of(names), self.done
         if seconds:
@@ -132,8 +157,13 @@ class RunProgress:
 class StageStore:
     """The results of a run, in a folder or, without one, in memory alone.
 
-    Every result states `case_text`; with `fresh` all are computed anew, by `workers` processes
-    a stage. `up_to_date` names the stages whose files were.
+    Args:
+        folder: The folder.
+        case_text: Text of the case, which every result states.
+        fresh: Whether all results are computed anew.
+        workers: Number of processes of a stage.
+        progress: Progress of the run.
+        up_to_date: Names of the stages whose files were up to date; they are added here.
     """
 
     folder: ResultsFolder | None
@@ -144,19 +174,26 @@ class StageStore:
     up_to_date: list[str] = field(default_factory=list)
 
     def take(self, stage: Stage[T]) -> StageResult[T]:
-        """The result of a stage: from its files where these are up to date, else computed."""
+        """Return the result of a stage: from its files if these are up to date, else computed."""
         return self.take_all([stage], None)[stage.name]
 
     def take_all(
         self, stages: Sequence[Stage[T]], executor: Executor | None
     ) -> dict[str, StageResult[T]]:
-        """The results of stages by name, as of `take`; without further files, in parallel.
+        """Return the results of stages by their names, as `take` does.
 
-        The stages that take longest come first; without executor this process computes all.
+        Args:
+            stages: The stages, those that take longest first.
+            executor: Computes them side by side, in other processes, without further files; this
+                process computes them if it is None, or if there is one stage or no folder.
         """
-        results = {stage.name: x for stage in stages if (x := self._read(stage)) is not None}
+        results: dict[str, StageResult[T]] = {}
+        for stage in stages:
+            found = self._read(stage)
+            if found is not None:
+                results[stage.name] = found
         stale = [stage for stage in stages if stage.name not in results]
-        tick = self.progress.next_part((stage.name for stage in stale), [*results])
+        tick = self.progress.next_part([stage.name for stage in stale], [*results])
         total, done = sum(stage.work for stage in stale), 0.0
         if executor is None or self.folder is None or len(stale) == 1:
             for stage in stale:
@@ -174,26 +211,34 @@ class StageStore:
         return results
 
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
-        """The result in the files of a stage; None where these are missing, changed or outdated."""
-        folder, key, name = self.folder, stage.key, f"{stage.name}.json"
-        if folder is None or self.fresh or name not in (files := folder.made_from(key)):
+        """Return the result in the files of a stage.
+
+        None where these are missing, changed, or made from something else; the stage's name is
+        added to `up_to_date` otherwise.
+        """
+        folder, key = self.folder, stage.key
+        if folder is None or self.fresh:
+            return None
+        numbers_file, arrays_file = f"{stage.name}.json", f"{stage.name}.nc"
+        files = folder.made_from(key)
+        if numbers_file not in files:
             return None
         try:
             contents = {file: folder.content(file) for file in files}
-            document = json.loads(contents[name])["result"]
-            numbers = from_document(stage.kind, document)
+            numbers = from_document(stage.kind, json.loads(contents[numbers_file])["result"])
         except RefusedError as error:
             problem = f"{Path(error.key).name} is {error.value or 'missing'}"
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
-        except ValueError:  # of a front door that named numbers otherwise
+        except ValueError:  # of a version that named numbers otherwise
             return None
         self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
-        arrays = f"{stage.name}.nc"
-        return StageResult(numbers, folder.dataset(arrays) if arrays in files else None, files, key)
+        data = folder.dataset(arrays_file) if arrays_file in files else None
+        return StageResult(numbers, data, files, key)
 
     def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
+        """Return the result of a stage, computed and, if there is a folder, written."""
         LOG.info("stage %s is computed", stage.name)
         folder = self.folder
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:
@@ -206,7 +251,11 @@ class StageStore:
             return self._write(stage, stage.run(context), Path(temporary))
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
-        """Path of the store of samples; a fresh run refuses one that no manifest lists."""
+        """Return the path of the store of samples.
+
+        Raises:
+            RefusedError: The run is fresh, and no manifest lists the store that is there.
+        """
         path, is_listed = folder.path / SAMPLES, SAMPLES in folder.files
         is_new = not is_listed and not os.path.lexists(path)
         is_allowed = is_listed or is_new or not self.fresh
@@ -218,15 +267,13 @@ class StageStore:
         return path
 
     def _write(self, stage: Stage[T], computed: StageResult[T], files: Path) -> StageResult[T]:
-        """Writes a result beside the other files of its stage in `files`, into the folder."""
+        """Write a result into the folder, beside the other files of its stage in `files`."""
         assert self.folder is not None
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
             return replace(computed, fingerprint=key)
-        document = {
-            **build_provenance(self.case_text, key),
-            "result": to_document(computed.numbers),
-        }
+        provenance = build_provenance(self.case_text, key)
+        document = {**provenance, "result": to_document(computed.numbers)}
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
             with whole_file(files / f"{stage.name}.nc") as partial:
@@ -236,14 +283,18 @@ class StageStore:
         return replace(computed, files=self.folder.made_from(key), fingerprint=key)
 
     def put_text(self, name: str, text: str) -> None:
-        """Writes a text file of the run itself, such as summary.json."""
+        """Write a text file of the run itself, such as summary.json."""
         if self.folder is not None and rank() == 0:
             self.folder.put_text(name, text)
 
 
 @contextmanager
 def _naming_dead_workers(stage: str) -> Iterator[None]:
-    """Names the stage in whose block a worker process died."""
+    """Name the stage in whose block a worker process died.
+
+    Raises:
+        FailedError: A worker died.
+    """
     try:
         yield
     except BrokenExecutor as error:

@@ -40,7 +40,14 @@ SUMMARY = "summary.json"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameResult:
-    """A frame at its nominal inputs, with the height of the storey of each drift."""
+    """A frame at its nominal inputs.
+
+    Args:
+        omega_rad_per_s: Undamped angular frequencies, rising, shape (n,).
+        period_s: First period.
+        weight_N: Weight of all floors.
+        heights_m: Heights of storeys by the names of the observed drifts.
+    """
 
     omega_rad_per_s: Array
     period_s: float
@@ -52,8 +59,18 @@ class FrameResult:
 class Results:
     """Results of a run; None or empty where the case has no such stage.
 
-    The structure has its modulus and what was learned; `tasks` are the studies, `envelopes` their
-    results by name; answers stand by the keys of their questions.
+    Args:
+        content: The case, with the radius map that was computed.
+        microstructure: Radius map of the particles.
+        modulus: Stiffness of a cell.
+        image: Stiffness of an image.
+        structure: The structure, with its modulus and what was learned.
+        tasks: The studies.
+        envelopes: Their results by name.
+        learned: What measured modes teach about the inputs.
+        suite: Peaks over a suite of records.
+        answers: Answers by the keys of their questions.
+        shares: By how much each input widens the results.
     """
 
     content: Content
@@ -162,33 +179,39 @@ class Parts:
         It is that of its first limit with a unit; else g of accelerations, and of others the SI
         unit with a prefix that fits the largest peak.
         """
-        largest, found = dict[str, float](), dict[str, ShownUnit]()
-        units = dict[str, str]()
+        units: dict[str, str] = {}
+        largest: dict[str, float] = {}
         studies: list[EnvelopeResult | SuitePeaks] = [*self.envelopes.values()]
-        studies += [self.records] if self.records else []
+        if self.records is not None:
+            studies.append(self.records)
         for study in studies:
             units |= study.units
             for name, peak in study.peak.items():
                 size = max(abs(float(peak.lower[0])), abs(float(peak.upper[0])))
-                largest[output_of(name)] = max(largest.get(output_of(name), 0.0), size)
+                output = output_of(name)
+                largest[output] = max(largest.get(output, 0.0), size)
         for envelope in self.envelopes.values():
             for output in envelope.min:
                 size = max(abs(envelope.min[output]), abs(envelope.max[output]))
                 largest.setdefault(output, float(size))
+
+        found: dict[str, ShownUnit] = {}
         for output, unit in units.items():
-            label, factor = "g", 1 / STANDARD_GRAVITY
-            if unit != "m/s^2":
+            if unit == "m/s^2":
+                found[output] = ShownUnit("g", 1 / STANDARD_GRAVITY)
+            else:
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
-            found[output] = ShownUnit(label, factor)
-        limited: list[LimitResult] = []
+                found[output] = ShownUnit(label, factor)
+        # of several limits of an output the first one stays
+        limits: list[LimitResult] = []
         if self.probability is not None:
-            limited += reversed(self.probability.events.values())
+            limits += reversed(self.probability.events.values())
         for answer in (self.fragility, self.decision):
             if answer is not None:
-                limited += reversed(answer.limits.values())
-        for part in limited:
-            if part.stated_unit is not None and part.output in units:
-                found[part.output] = part.stated_unit
+                limits += reversed(answer.limits.values())
+        for limit in limits:
+            if limit.stated_unit is not None and limit.output in units:
+                found[limit.output] = limit.stated_unit
         return found
 
     @property
