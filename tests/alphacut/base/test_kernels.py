@@ -57,8 +57,7 @@ def results(cache: Path, *calls: tuple[Path, dict[str, str]]) -> list[tuple[floa
     for folder, _ in calls:
         for package in ("base", "fuzzy"):
             (folder / "alphacut" / package).mkdir(parents=True, exist_ok=True)
-        for name in ("kernels", "user_cache", "arrays"):
-            file = Path(inspect.getfile(kernels)).with_name(f"{name}.py")
+        for file in Path(inspect.getfile(kernels)).parent.glob("*.py"):
             shutil.copy(file, folder / "alphacut/base")
     told = subprocess.run(
         [sys.executable, "-Bc", CALLS],
