@@ -1,42 +1,49 @@
 """Spatial branch and bound for the modal model (Adjiman, Floudas 1998), up to the gap asked for.
 
-All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is
-fathomed for a problem by one of four tests, all but the third on its quadratic Taylor model and
-that one's `Remainder`: 1. the output is monotone along an axis, and the neighbouring box, or
-the face, covers it; 2. its bound lies below the incumbent; 3. so does that of modes whose phase is
-linear in the inputs, with a remainder that holds only what else they do; 4. a concave function
-above the quadratic model (αBB) has no higher point. Else it is bisected. Incumbents are local
-optima by Newton's method with a trust region, many at a time.
+A problem is one side (−1 or 1) of an output at a time node: side × output is to be bounded from
+above over a box. All problems share one tree of sub-boxes, and each sub-box has its own
+polynomials. A sub-box is fathomed for a problem by one of three tests on the quadratic Taylor model
+and the bounds of what that leaves out (`remainder_bounds`):
+
+1. the output is monotonic along an axis, and the neighbouring sub-box, or the face, covers it;
+2. its bound lies below the incumbent;
+3. a concave function above the quadratic model (αBB) has no higher point.
+
+Else it is bisected. Incumbents are local optima by Newton's method with a trust region, many at a
+time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import factorial
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Ints
+from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.progress_bar import Progress
 from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
-from alphacut.frame.bounds.kernel import FACES, call_examine, examine
-from alphacut.frame.bounds.model_error import Remainder
+from alphacut.frame.bounds.kernel import (
+    FACES,
+    BoxTables,
+    Examination,
+    Items,
+    RemainderBounds,
+    call_examine,
+    examine,
+)
+from alphacut.frame.bounds.model_error import remainder_bounds
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.monomials import count, monomial_values
-from alphacut.frame.modes.modal_model import ModalModel, in_planes, wave_factors
+from alphacut.frame.modes.modal_model import ModalModel, wave_factors
 from alphacut.fuzzy.sets.boxes import chebyshev_points
 
-PIECE = 30_000
-"""Items examined together."""
-HIGHER = 1e-10
-"""Least gain for which a better point is taken over."""
 LOWER, UPPER = -1, -2
-"""Places of an axis that is confined to an end of the domain."""
-BOX_WIDTH = 2.0
-"""Width of the unit box [−1, 1]^d."""
+"""Positions along an axis of a sub-box that is confined to an end of the whole box."""
+MAX_ITEMS = 30_000
+"""Items that a thread examines together, which limits the memory."""
 
 
 def enclosed(
@@ -50,273 +57,356 @@ def enclosed(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Array, int]:
-    """Upper bounds of side × output for all N problems of `optima`, by spatial branch and bound.
+    """Return upper bounds of side × output for all N problems, by spatial branch and bound.
 
-    A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
     Better points that are met replace those of `optima`, in place.
 
     Args:
         model: The modal model.
-        lower: Lower ends of the box, shape (d,).
+        lower: Lower ends of the box in unit coordinates, shape (d,).
         upper: Upper ends.
         optima: The problems with their best points.
-        gap: Wanted difference between proved and attained bound, in units of the outputs.
-        budget: Most boxes per problem on average; where it ends first, gaps are wider than `gap`.
+        gap: Wanted distance of guaranteed bound and attained value, in units of the outputs.
+        budget: Most sub-boxes per problem on average; where it ends first, gaps are wider.
         workers: Threads; the result does not depend on their number.
         progress: Called with the completed fraction.
 
     Returns:
-        Proved upper bounds (N,), and the number of examined pairs of a box and a problem.
+        Guaranteed upper bounds, shape (N,), and the number of examined items, each a sub-box with a
+        problem.
     """
-    examined, n_problems, remainder = 0, len(optima.value), Remainder(model, lower, upper)
-    frontier = Frontier.of_box(len(lower), n_problems)
-    whole_box = np.full(n_problems, np.inf)  # bounds over the undivided box: 0 of outputs at rest
-
-    def examined_piece(boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        target = optima.value + gap
-        return examine_items(model, (lower, upper), remainder, target, frontier, boxes, items)
-
+    n_problems = len(optima.value)
+    remainder = remainder_bounds(model, lower, upper)
+    frontier = Frontier.whole_box(lower, upper, n_problems)
+    examined = 0
+    # Bounds over the undivided box: outputs at rest have 0 there, below optimum + gap.
+    undivided: Array = np.full(n_problems, np.inf)
     with KernelThreads(workers, call_examine) as pool:
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
+            is_undivided = examined == 0
             examined += len(frontier)
-            results = pool.map(examined_piece, *zip(*frontier.pieces(PIECE), strict=True))
-            code, value, bound = (np.concatenate(x) for x in zip(*results, strict=True))
-            if examined == n_problems:  # all problems over the undivided box
-                whole_box = bound
-            higher = np.flatnonzero(value > optima.value[frontier.problem] + HIGHER)
-            if len(higher):  # the incumbent is the best of centres, refined
-                higher = higher[np.argsort(value[higher])]
-                problems, centre = frontier.problem[higher], frontier.geometry(lower, upper)[0]
-                optima.point[problems] = centre[frontier.box[higher]]
-                optima.value[problems] = value[higher]
-                refine(model, optima, np.unique(problems), lower, upper, gap / 100)
-            frontier = frontier.children(code)
+            examine_piece = partial(examine_items, model, remainder, optima.value + gap, frontier)
+            pieces = pool.map(examine_piece, frontier.pieces(MAX_ITEMS))
+            found = _joined(list(pieces))
+            if is_undivided:
+                undivided = found.bound
+            _take_better_points(model, optima, frontier, found.value, min_gain=gap / 100)
+            frontier = frontier.children(found.code)
             if progress:
                 progress(1 - len(np.unique(frontier.problem)) / n_problems)
-    proved = np.minimum(optima.value + gap, whole_box)
-    for boxes, items in frontier.pieces(PIECE):  # boxes that are still open keep their own bounds
-        np.maximum.at(proved, frontier.problem[items], examined_piece(boxes, items)[2])
-    return proved, examined
+    bound = np.minimum(optima.value + gap, undivided)
+    # Sub-boxes that are still open keep their own bounds.
+    for piece in frontier.pieces(MAX_ITEMS):
+        found = examine_items(model, remainder, optima.value + gap, frontier, piece)
+        np.maximum.at(bound, frontier.problem[piece.items], found.bound)
+    return bound, examined
+
+
+def _joined(pieces: list[Examination]) -> Examination:
+    """Return the examinations of pieces of a frontier as one, in order."""
+    return Examination(
+        code=np.concatenate([piece.code for piece in pieces]),
+        value=np.concatenate([piece.value for piece in pieces]),
+        bound=np.concatenate([piece.bound for piece in pieces]),
+    )
+
+
+def _take_better_points(
+    model: ModalModel, optima: Optima, frontier: Frontier, value: Array, *, min_gain: float
+) -> None:
+    """Replace optima, in place, where the midpoint of a sub-box has a higher value.
+
+    The best midpoint of each such problem is taken over, and refined by Newton's method.
+
+    Args:
+        model: The modal model.
+        optima: The problems with their best points.
+        frontier: Sub-boxes that were examined.
+        value: Side × output at the midpoint of each item of the frontier.
+        min_gain: Predicted gain at which Newton's method ends, in units of the outputs.
+    """
+    # Differences up to 1e-10 units may be rounding.
+    is_higher = value > optima.value[frontier.problem] + 1e-10
+    higher = np.flatnonzero(is_higher)
+    if not len(higher):
+        return
+    higher = higher[np.argsort(value[higher])]  # of equal problems the last one, the best, stays
+    problems = frontier.problem[higher]
+    midpoint = frontier.geometry().midpoint
+    optima.point[problems] = midpoint[frontier.box[higher]]
+    optima.value[problems] = value[higher]
+    refine(model, optima, np.unique(problems), frontier.lower, frontier.upper, min_gain)
+
+
+class Piece(NamedTuple):
+    """Consecutive sub-boxes of a frontier, and their items."""
+
+    boxes: slice
+    items: slice
 
 
 def examine_items(
-    model: ModalModel,
-    domain: tuple[Array, Array],
-    remainder: Remainder,
-    target: Array,
-    frontier: Frontier,
-    boxes: slice,
-    items: slice,
-) -> tuple[Array, Array, Array]:
-    """Codes, values at centres and upper bounds of some items of some boxes by `kernel.examine`.
+    model: ModalModel, remainder: RemainderBounds, target: Array, frontier: Frontier, piece: Piece
+) -> Examination:
+    """Examine the items of some sub-boxes by `kernel.examine`.
 
-    `domain` are the ends of all boxes together, (d,) each, `remainder` that of quadratic Taylor
-    models over it, and `target` (N,) the values below which problems are fathomed.
+    Args:
+        model: The modal model.
+        remainder: What quadratic Taylor models leave out over the whole box.
+        target: Values below which problems are fathomed, shape (N,).
+        frontier: Open items.
+        piece: Which of its sub-boxes, with their items.
     """
-    centre, radius, edges = frontier.geometry(*domain, boxes)
-    n, m, d = model.count, len(model.flow.outputs), centre.shape[1]
-    box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
-    node, column = np.divmod(problem, 2 * m)
+    geometry = frontier.geometry(piece.boxes)
+    n = model.count
+    n_outputs = len(model.flow.outputs)
+    n_boxes, d = geometry.midpoint.shape
+    box = frontier.box[piece.items] - piece.boxes.start
+    node, column = np.divmod(frontier.problem[piece.items], 2 * n_outputs)
+
+    # Items of one sub-box at one time node are a row; they share its waves.
     is_new_row = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
-    begin = np.flatnonzero(is_new_row)  # of rows, each a box at a node
-    row_box, row_node = box[begin], node[begin]
-    jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
-    rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
-    starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
-    outcome: tuple[Array, Array, Array] = examine(
-        (*starts, row_node, column),
-        (radius, edges, wave_factors(rate, share, d)),
-        model.waves(rate[0, row_box], row_node),
-        model.flow.time,
-        _linear_phases(remainder, radius, rate[1 : 1 + d], share[0, :, 0]),
-        (remainder.tensor, remainder.margin),
-        target,
-        not model.loads,
+    first_of_row = np.flatnonzero(is_new_row)
+    row_box = box[first_of_row]
+    row_node = node[first_of_row]
+    items = Items(
+        first_row=np.searchsorted(row_box, np.arange(n_boxes + 1)),
+        first_item=np.append(first_of_row, len(box)),
+        node=row_node,
+        column=column,
     )
-    return outcome
+    # Values and derivatives of λ and C of all parts at the midpoints, (q, B, n + parts n m)
+    jets = model.together.jets(geometry.midpoint).swapaxes(0, 1)
+    eigenvalues = jets[..., :n]
+    coefficients = jets[..., n:].reshape(*jets.shape[:2], -1, n, n_outputs)
+    boxes = BoxTables(
+        radius=geometry.radius,
+        is_outer=geometry.is_outer,
+        factors=wave_factors(eigenvalues, coefficients, d),
+    )
+    waves = model.waves(eigenvalues[0, row_box], row_node)
+    found: Examination = examine(items, boxes, waves, remainder, target)
+    return found
 
 
-def _linear_phases(
-    remainder: Remainder, radius: Array, slopes: Array, share: Array
-) -> tuple[Array, ...]:
-    """`modes` of `kernel.linear_phase_bound` for B boxes; `slopes` (d, B, n) are those of λ."""
-    slopes, d = slopes.swapaxes(0, 1), radius.shape[1]
-    phase, decay = (np.einsum("bd,bdn->bn", radius, np.abs(x)) for x in (slopes.imag, slopes.real))
-    # derivatives of order k times k radii, summed, are k! times a majorant's part of degree k
-    by_degree = np.split(monomial_values(radius, 3), np.cumsum([count(d, k) for k in range(3)]), 1)
-    of_rate, of_share = (
-        np.stack([factorial(k) * np.tensordot(by_degree[k], x, 1) for k, x in enumerate(parts)], 1)
-        for parts in (remainder.rate, remainder.share)
-    )
-    slope = np.ascontiguousarray(slopes.imag.swapaxes(1, 2))
-    of_rate = np.ascontiguousarray(of_rate[:, 2:])
-    return in_planes(share), slope, phase, decay, of_rate, of_share
+class Geometry(NamedTuple):
+    """Geometry of B sub-boxes."""
+
+    midpoint: Array  # (B, d)
+    radius: Array  # (B, d)
+    is_outer: Mask  # whether lower and upper faces lie on those of the whole box, (B, 2, d)
 
 
 @dataclass(frozen=True, eq=False)
 class Frontier:
-    """Open items by box, node and column.
+    """Open items: pairs of a sub-box and a problem, ordered by sub-box and then by problem.
 
-    Along each axis a box is a dyadic interval of the domain, 2^depth + index, or one of its ends,
-    `LOWER` or `UPPER`.
+    Along each axis a sub-box is a dyadic interval of the whole box, 2^depth + index, or one of its
+    ends, `LOWER` or `UPPER`.
     """
 
-    position: Array  # intervals of the boxes, (B, d)
-    box: Array  # box of each item, rising, (I,)
-    problem: Array  # number of its problem, rising for each box, (I,)
+    lower: Array  # lower ends of the whole box, (d,)
+    upper: Array  # upper ends, (d,)
+    position: Ints  # intervals of the sub-boxes, (B, d)
+    box: Ints  # sub-box of each item, rising, (I,)
+    problem: Ints  # number of its problem, rising for each sub-box, (I,)
 
     @classmethod
-    def of_box(cls, d: int, n_problems: int) -> Frontier:
-        """The domain for all problems."""
+    def whole_box(cls, lower: Array, upper: Array, n_problems: int) -> Frontier:
+        """Return the whole box for all problems."""
+        position = np.ones((1, len(lower)), np.int64)
         box = np.zeros(n_problems, np.int64)
-        return cls(np.ones((1, d), np.int64), box, np.arange(n_problems))
+        return cls(lower, upper, position, box, np.arange(n_problems))
 
     def __len__(self) -> int:
         return len(self.box)
 
-    def geometry(
-        self, lower: Array, upper: Array, boxes: slice = slice(None)
-    ) -> tuple[Array, Array, Array]:
-        """Centres (B, d), half widths (B, d) and outer faces (B, 2, d) of boxes of a domain.
-
-        Outer are those lower and upper faces along each axis that lie on the domain's.
-        """
-        positions = self.position[boxes]
-        interval = np.maximum(positions, 1)  # 2^depth + index; ends of the domain count as all
-        width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the domain: 2^−depth
+    def geometry(self, boxes: slice = slice(None)) -> Geometry:
+        """Return the geometry of some sub-boxes; all unless given."""
+        position = self.position[boxes]
+        interval = np.maximum(position, 1)  # ends of the whole box are treated as all of it first
+        width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the whole box: 2^−depth
         begin = interval * width - 1
-        at_ends = [positions == LOWER, positions == UPPER]
-        middle = np.select(at_ends, [0.0, 1.0], begin + width / 2)
-        radius = np.where(positions < 0, 0.0, (upper - lower) / 2 * width)
-        is_outer = np.stack([begin == 0, begin + width == 1], 1)
-        return lower + (upper - lower) * middle, radius, is_outer
+        is_end = [position == LOWER, position == UPPER]
+        place = np.select(is_end, [0.0, 1.0], begin + width / 2)
+        return Geometry(
+            midpoint=self.lower + (self.upper - self.lower) * place,
+            radius=np.where(position < 0, 0.0, (self.upper - self.lower) / 2 * width),
+            is_outer=np.stack([begin == 0, begin + width == 1], axis=1),
+        )
 
-    def pieces(self, max_items: int) -> Iterator[tuple[slice, slice]]:
-        """Yield slices of boxes and of their items, in order, of at most `max_items` items.
+    def pieces(self, max_items: int) -> Iterator[Piece]:
+        """Yield pieces of at most `max_items` items, in order.
 
-        A box with more items is a piece alone.
+        A sub-box with more items is a piece alone.
         """
         n_boxes = len(self.position)
         first_items = np.append(np.searchsorted(self.box, np.arange(n_boxes)), len(self))
         start = 0
         while start < n_boxes:
-            stop = int(np.searchsorted(first_items, first_items[start] + max_items, "right")) - 1
+            end_item = first_items[start] + max_items
+            stop = int(np.searchsorted(first_items, end_item, "right")) - 1
             stop = min(max(stop, start + 1), n_boxes)
-            yield slice(start, stop), slice(int(first_items[start]), int(first_items[stop]))
+            items = slice(int(first_items[start]), int(first_items[stop]))
+            yield Piece(slice(start, stop), items)
             start = stop
 
-    def children(self, code: Array) -> Frontier:
-        """Halves and faces of boxes with the items left open by their codes of `kernel.examine`.
+    def children(self, code: Ints) -> Frontier:
+        """Return the halves and faces of sub-boxes with the items that are left open.
 
-        A box is halved along the axis that most of its items ask for.
+        A sub-box is halved along the axis that most of its items ask for.
+
+        Args:
+            code: Code of each item by `kernel.examine`, shape (I,).
         """
         d = self.position.shape[1]
-        to_halve = np.flatnonzero((code > 0) & (code < FACES))
+        is_to_halve = (code > 0) & (code < FACES)
+        to_halve = np.flatnonzero(is_to_halve)
         to_confine = np.flatnonzero(code >= FACES)
-        count, box = 2 * d + 3**d, self.box[to_halve]  # count: halves and faces of a box
+        # A sub-box has 2 d halves, lower and upper along each axis, and then 3^d faces.
+        children_of_box = 2 * d + 3**d
+        box = self.box[to_halve]
         votes = np.bincount(box * d + code[to_halve] - 1, minlength=d * len(self.position))
-        halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
-        faces = self.box[to_confine] * count + 2 * d + code[to_confine] - FACES
-        keys = np.concatenate([halves, halves + 1, faces])  # of child boxes; see `_places`
+        axis = votes.reshape(-1, d).argmax(axis=1)[box]
+        lower_half = box * children_of_box + 2 * axis
+        faces = self.box[to_confine] * children_of_box + 2 * d + code[to_confine] - FACES
+        keys = np.concatenate([lower_half, lower_half + 1, faces])
         problem = self.problem[np.concatenate([to_halve, to_halve, to_confine])]
-        distinct_keys = np.unique(keys)
-        places = self._places(distinct_keys, count)
-        positions, child = np.unique(places, axis=0, return_inverse=True)  # faces may coincide
-        n_problems = int(problem.max(initial=0)) + 1
-        items = np.unique(child[np.searchsorted(distinct_keys, keys)] * n_problems + problem)
-        return Frontier(positions, *np.divmod(items, n_problems))
 
-    def _places(self, keys: Ints, count: int) -> Ints:
-        """Positions (K, d) of child boxes by key: parent × `count` + number."""
+        # Faces of different sub-boxes may coincide: they become one sub-box, and items one item.
+        distinct_keys, child = np.unique(keys, return_inverse=True)
+        positions = self._child_positions(distinct_keys, children_of_box)
+        distinct_positions, of_key = np.unique(positions, axis=0, return_inverse=True)
+        n_problems = int(problem.max(initial=0)) + 1
+        items = np.unique(of_key[child] * n_problems + problem)
+        new_box, new_problem = np.divmod(items, n_problems)
+        return Frontier(self.lower, self.upper, distinct_positions, new_box, new_problem)
+
+    def _child_positions(self, keys: Ints, children_of_box: int) -> Ints:
+        """Return the positions (K, d) of children by their keys, parent × children + number."""
         d = self.position.shape[1]
-        positions: Array = self.position[keys // count].copy()
-        number = keys % count
-        rows = np.flatnonzero(number < 2 * d)
-        axis, half = np.divmod(number[rows], 2)
-        positions[rows, axis] = 2 * positions[rows, axis] + half
-        rows = np.flatnonzero(number >= 2 * d)
-        ternary = (number[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
-        positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
+        positions: Ints = self.position[keys // children_of_box].copy()
+        number = keys % children_of_box
+        halves = np.flatnonzero(number < 2 * d)
+        axis, is_upper = np.divmod(number[halves], 2)
+        positions[halves, axis] = 2 * positions[halves, axis] + is_upper
+        # The digits of a face to base 3 say for each axis: free, lower end, upper end.
+        faces = np.flatnonzero(number >= 2 * d)
+        digits = (number[faces, np.newaxis] - 2 * d) // 3 ** np.arange(d) % 3
+        ends = [digits == 1, digits == 2]
+        positions[faces] = np.select(ends, [LOWER, UPPER], positions[faces])
         return np.asarray(positions)
 
 
 @dataclass(eq=False)
 class Optima:
-    """Best points so far of N problems: of each node, output and side (−1, +1), in this order."""
+    """Best points so far of N problems: by node, then output, then side (−1, 1)."""
 
     point: Array  # unit coordinates, (N, d)
     value: Array  # side × output there, (N,)
 
 
-def first_optima(model: ModalModel, lower: Array, upper: Array, least_gain: float) -> Optima:
-    """Local optima of all problems over a box.
+def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float) -> Optima:
+    """Return local optima of all problems over a box.
 
-    Each begins at the best of the centre and Chebyshev points, and is refined by Newton's method
-    until that predicts a gain below `least_gain`, in units of the outputs.
+    Each begins at the best of the midpoint and of Chebyshev points, and is refined by Newton's
+    method until that predicts a gain below `min_gain`, in units of the outputs.
     """
     samples = chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))
     unit = np.vstack([np.zeros((1, len(lower))), samples])
-    pool = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    values = np.concatenate([model.values(pool[k : k + 64]) for k in range(0, len(pool), 64)])
-    values = values.reshape(len(pool), -1)
-    best = np.stack([values.argmin(0), values.argmax(0)], 1).ravel()
-    optima = Optima(pool[best], np.stack([-values.min(0), values.max(0)], 1).ravel())
+    points = (lower + upper) / 2 + (upper - lower) / 2 * unit
+    chunks = [model.values(points[k : k + 64]) for k in range(0, len(points), 64)]
+    values = np.concatenate(chunks).reshape(len(points), -1)  # (points, T m)
+    best = np.stack([values.argmin(axis=0), values.argmax(axis=0)], axis=1).ravel()
+    value = np.stack([-values.min(axis=0), values.max(axis=0)], axis=1).ravel()
+    optima = Optima(points[best], value)
     if (upper > lower).any():
-        refine(model, optima, np.arange(len(best)), lower, upper, least_gain)
+        refine(model, optima, np.arange(len(best)), lower, upper, min_gain)
     return optima
 
 
 def refine(
-    model: ModalModel, optima: Optima, which: Ints, lower: Array, upper: Array, least_gain: float
+    model: ModalModel, optima: Optima, problems: Ints, lower: Array, upper: Array, min_gain: float
 ) -> None:
-    """Improve the optima in rows `which` by Newton's method in a box, in place.
+    """Improve the optima of some problems by Newton's method in a box, in place.
 
-    A problem ends when its quadratic model predicts a gain of at most `least_gain`.
+    A problem ends when its quadratic model predicts a gain of at most `min_gain`.
     """
     size = max(int(numbers.NEWTON_PIECE) * 6 // max(lower.size, 6), 1)
-    for piece in np.array_split(which, -(-len(which) // size) or 1):
-        _newton(model, optima, piece, lower, upper, least_gain)
+    for piece in np.array_split(problems, -(-len(problems) // size) or 1):
+        _newton(model, optima, piece, lower, upper, min_gain)
+
+
+class _Jets(NamedTuple):
+    """Side × output of P problems at their points."""
+
+    value: Array  # (P,)
+    gradient: Array  # (P, d)
+    hessian: Array  # (P, d, d)
 
 
 def _newton(
-    model: ModalModel, optima: Optima, which: Ints, lower: Array, upper: Array, least_gain: float
+    model: ModalModel, optima: Optima, problems: Ints, lower: Array, upper: Array, min_gain: float
 ) -> None:
-    radius: Array = np.full(len(which), numbers.NEWTON_RADIUS)
-    f, g, H = _signed(model, optima.point[which], which)
+    """Maximise side × output of some problems by trust-region steps within a box, in place.
+
+    Each step maximises the quadratic Taylor model over the intersection of the box and of a cube
+    about the point (Conn, Gould, Toint 2000). A better point is taken over, whatever the step
+    predicted. The radius of the cube grows where the gain is close to the predicted one, and
+    shrinks where it is much smaller.
+    """
+    box_width = 2.0  # of the unit box [−1, 1]^d
+    radius: Array = np.full(len(problems), numbers.NEWTON_RADIUS)
+    jets = _jets(model, optima.point[problems], problems)
+    gradient = jets.gradient
+    hessian = jets.hessian
     for number in range(int(numbers.NEWTON_STEPS)):
-        low = np.maximum(lower - optima.point[which], -radius[:, None])
-        high = np.minimum(upper - optima.point[which], radius[:, None])
-        step = (
-            local_maximum(g, H, low, high, rounds=2)
-            if number < numbers.NEWTON_LOCAL_STEPS
-            else global_maximum(g, H, low, high)
-        )
-        predicted = gain(g, H, step)
-        at_edge = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
-        # at the edge of the region, a parabola would gain as much more in the whole box
-        growth = np.where(at_edge, np.minimum((BOX_WIDTH / radius) ** 2, 1e3), 1.0)
-        open_ = predicted * growth > least_gain
-        if not open_.all():
-            which, radius, step, predicted, g, H = (
-                x[open_] for x in (which, radius, step, predicted, g, H)
-            )
-        if not len(which):
+        point = optima.point[problems]
+        low = np.maximum(lower - point, -radius[:, np.newaxis])
+        high = np.minimum(upper - point, radius[:, np.newaxis])
+        if number < numbers.NEWTON_LOCAL_STEPS:
+            step = local_maximum(gradient, hessian, low, high, rounds=2)
+        else:
+            step = global_maximum(gradient, hessian, low, high)
+        predicted = gain(gradient, hessian, step)
+
+        # At the edge of the cube the whole box may allow more: a parabola gains with the square of
+        # the distance. The limit of 1000 avoids that tiny gains in tiny cubes go on for long.
+        is_at_edge = np.abs(step).max(axis=1, initial=0.0) >= 0.999 * radius
+        growth = np.where(is_at_edge, np.minimum((box_width / radius) ** 2, 1e3), 1.0)
+        is_open = predicted * growth > min_gain
+        if not is_open.any():
             return
-        trial = np.clip(optima.point[which] + step, lower, upper)
-        f, trial_g, trial_H = _signed(model, trial, which)
-        actual_gain = f - optima.value[which]
-        better = actual_gain > 0
-        optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
-        g[better], H[better] = trial_g[better], trial_H[better]
-        ratio = actual_gain / predicted
+        problems = problems[is_open]
+        radius = radius[is_open]
+        step = step[is_open]
+        predicted = predicted[is_open]
+        gradient = gradient[is_open]
+        hessian = hessian[is_open]
+
+        trial = np.clip(optima.point[problems] + step, lower, upper)
+        jets = _jets(model, trial, problems)
+        actual = jets.value - optima.value[problems]
+        is_better = actual > 0
+        optima.point[problems[is_better]] = trial[is_better]
+        optima.value[problems[is_better]] = jets.value[is_better]
+        gradient[is_better] = jets.gradient[is_better]
+        hessian[is_better] = jets.hessian[is_better]
+
+        ratio = actual / predicted
         expansion = np.where(np.abs(ratio - 1) < numbers.NEWTON_SOUND, 5, 2)
-        wider, narrower = np.minimum(expansion * radius, BOX_WIDTH), 0.3 * np.abs(step).max(1)
-        radius = np.where(ratio > 0.75, wider, np.where(ratio < 0.25, narrower, radius))
+        wider = np.minimum(expansion * radius, box_width)
+        narrower = 0.3 * np.abs(step).max(axis=1)
+        radius = np.select([ratio > 0.75, ratio < 0.25], [wider, narrower], radius)
 
 
-def _signed(model: ModalModel, points: Array, which: Ints) -> tuple[Array, Array, Array]:
-    """Side × output (W,), its gradient and Hessian, of problems `which` at their points (W, d)."""
-    node, column = np.divmod(which, 2 * len(model.flow.outputs))
-    f, g, H = model.at(points, node, column // 2)
+def _jets(model: ModalModel, points: Array, problems: Ints) -> _Jets:
+    """Return side × output of problems (P,) at their points (P, d), with derivatives."""
+    node, column = np.divmod(problems, 2 * len(model.flow.outputs))
+    found = model.at(points, node, column // 2)
     side = 2.0 * (column % 2) - 1
-    return side * f, side[:, None] * g, side[:, None, None] * H
+    return _Jets(
+        value=side * found.value,
+        gradient=side[:, np.newaxis] * found.gradient,
+        hessian=side[:, np.newaxis, np.newaxis] * found.hessian,
+    )

@@ -1,17 +1,19 @@
-"""Proved bounds of the error of a modal model, and of what its quadratic Taylor models leave out.
+"""Guaranteed bounds of the error of a modal model, and of what its quadratic models leave out.
 
-Polynomials φ_k, w_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a motion that nearly obeys the
-equations. What it misses, λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k, are Taylor models of which
-hardly more than the remainder is left. Damping only takes energy, so the deviation from the true
-motion, in the norm √(qᵀ K q + vᵀ M v), grows no faster than this defect: no eigenvalue problem is
-solved anew, and nothing rests on a distance between eigenvalues.
+Polynomials φ_k, w_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a response that nearly obeys the
+equations of motion. What it misses there, the defects λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k,
+are Taylor models of which hardly more than the remainder is left. Damping only takes energy, so the
+deviation from the true response, in the energy norm √(qᵀ K q + vᵀ M v), grows no faster than these
+defects push it: no eigenvalue problem is solved anew, and nothing rests on a distance between
+eigenvalues.
 
 Damping by one ratio ζ, 2 ζ (M # K), is no polynomial, but a Taylor model (`geometric_mean`), whose
-remainder is a part of the defect.
+remainder is contained in the defect.
 
-A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with w = exp(λ t) or w = R = ∫ exp(λ (t −
-s)) a(s) ds; its r-th derivative by λ is bounded by t^r exp(g t), or by ∫ τ^r exp(g τ) |a(t − τ)|
-dτ, with g a bound of Re λ. From these follow what quadratic Taylor models of it leave out.
+A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with the wave w = exp(λ t) or w = R =
+∫ exp(λ (t − s)) a(s) ds. The r-th derivative of w by λ is bounded by t^r exp(g t), or by
+∫ τ^r exp(g τ) |a(t − τ)| dτ, where g is a bound of Re λ. From these follow bounds of what quadratic
+Taylor models of the part leave out.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.frame.bounds.kernel import RemainderBounds
 from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -30,102 +33,118 @@ from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
 
 ROUNDING = 1e-9
-"""Relative rounding of norms and of integrals over a load, of a million intervals at most."""
+"""Bound of the relative rounding of norms and of integrals over a load: a million terms of some
+operations each have less."""
 MAX_PARAMETERS = 6
-"""Tensors of third derivatives grow with the cube of the number of parameters."""
-SERIES_TERMS = 100
-"""Terms of the series of a wave under a load, at most, as rounding counts them."""
+"""Most parameters: tensors of third derivatives grow with the cube of their number."""
 
 
 def proved_error(model: ModalModel) -> Array:
-    """Bound of |modal model − true motion| over the box, shape (T, m), in units of the outputs.
+    """Bound |modal model − true response| over the box, shape (T, m), in units of the outputs.
 
-    Defects in the equations of motion push the motion off in the norm of energy; an output reads a
-    part of this deviation, and its own defects add to it.
+    Theorem: with the deviation e of the response, ‖e‖² = qᵀ K q + vᵀ M v and the defects d_k of q̇ =
+    v and e_k of the balance of forces of mode k,
+
+        ‖e(t)‖ ≤ ‖e(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(‖d_k‖²_K + ‖e_k‖²_M⁻¹),
+
+    since damping only takes energy. An output takes at most its norm of this deviation; the errors
+    of its coefficients C_k and of the tables of w add to it.
 
     Raises:
         UnprovedError: The box is so wide that M or K may lose its definiteness.
     """
-    structure, reach = model.structure, np.ones(len(model.boxes.names))
-    # what is proved are the polynomials that bounds are made of
-    modes = replace(model.modes, rate=model.eigenvalue)
+    structure = model.structure
+    # The polynomials whose error is bounded are those that bounds are made of.
+    modes = replace(model.modes, eigenvalue=model.eigenvalue)
     norms = EnergyNorms(structure)
-    energy_rate = _energy_rates(structure, modes, norms)
-    start, outputs = _start_errors(structure, modes, norms), modes.outputs(structure)
+    energy_rates = _energy_rates(structure, modes, norms)
+    start_errors = _start_errors(structure, modes, norms)
+    coefficients = modes.outputs(structure)
     deviation = np.zeros(len(model.flow.time))
     output_error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
-    for s, part in enumerate(motion_parts(model, largest_growth(model.eigenvalue, reach))):
+    growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
+    for s, part in enumerate(motion_parts(model, growth)):
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
-            error = (structure.feeds[:, s - len(start)] - part.share.real[0] * 2.0).magnitude()
+            feedthrough = structure.feeds[:, s - len(start_errors)]
+            error = (feedthrough - part.coefficient.real[0] * 2.0).magnitude()
             output_error += part.waves[0][:, :1] * error
             continue
-        deviation += part.push * start[s] + 2 * part.elapsed @ energy_rate[s]
-        share_error = (outputs[s] - part.share).magnitude()
-        left_out = part.left_out[:, None] * part.share.magnitude()
-        output_error += 2 * part.waves[0] @ (share_error + left_out)
-    return (1 + ROUNDING) * (deviation[:, None] * norms.outputs + output_error)
+        deviation += part.impulse * start_errors[s] + 2 * part.elapsed @ energy_rates[s]
+        coefficient_error = (coefficients[s] - part.coefficient).magnitude()
+        table_error = part.table_error[:, np.newaxis] * part.coefficient.magnitude()
+        output_error += 2 * part.waves[0] @ (coefficient_error + table_error)
+    return (1 + ROUNDING) * (deviation[:, np.newaxis] * norms.outputs + output_error)
 
 
 def direct_error_in_steps(model: ModalModel) -> Array:
-    """Bound of the error of what forces add to outputs at once, within the step to each node.
+    """Bound the error of what forces add to outputs at once, within the step to each node.
 
-    It is the error of the share times the largest |f| in the step, which may be zero at its ends:
-    shape (T, m), in units of the outputs.
+    It is the error of the coefficient times the largest |f| in the step, which may be zero at its
+    ends.
+
+    Returns:
+        Shape (T, m), in units of the outputs.
     """
-    structure, error = model.structure, np.zeros((len(model.flow.time), len(model.flow.outputs)))
-    n_sources = structure.static.shape[1]
+    structure = model.structure
+    error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
+    n_sources = structure.impulses.shape[1]
     for number, load in enumerate(model.loads):
         if isinstance(load, Direct):
             assert structure.feeds is not None
-            share = structure.feeds[:, number + 1 - n_sources] - load.share.real[0] * 2.0
-            error += np.outer(load.history.largest_in_steps(model.flow.time), share.magnitude())
+            feedthrough = structure.feeds[:, number + 1 - n_sources]
+            of_unit = (feedthrough - load.share.real[0] * 2.0).magnitude()
+            error += np.outer(load.history.largest_in_steps(model.flow.time), of_unit)
     return (1 + ROUNDING) * error
 
 
 class EnergyNorms:
-    """Bounds of energy norms over the box, by M and K in its middle, the unit matrix and diag(ω²).
+    """Bounds of energy norms over the box, by M and K at its midpoint, 1 and diag(ω²).
 
-    (1 − μ) 1 ≤ M ≤ (1 + μ) 1 and (1 − κ) ω² ≤ K ≤ (1 + κ) ω² with spectral norms μ and κ of bounds
-    of |M − 1| and |K − ω²| / (ω ωᵀ).
+    Over the box (1 − μ) 1 ≤ M ≤ (1 + μ) 1 and (1 − κ) ω² ≤ K ≤ (1 + κ) ω², with the spectral norms
+    μ and κ of bounds of |M − 1| and |K − ω²| / (ω ωᵀ).
 
     Raises:
         UnprovedError: M or K is not shown to stay positive definite.
     """
 
     def __init__(self, structure: DampedStructure) -> None:
-        mass, stiffness, self.omega = structure.mass, structure.stiffness, structure.omega
-        mass_off = (mass - np.eye(len(mass.value))).magnitude()
-        stiffness_off = (stiffness - np.diag(self.omega**2)).magnitude()
-        stiffness_off = stiffness_off / (self.omega[:, None] * self.omega)
-        self.mu, self.kappa = (float(np.linalg.norm(x, 2)) for x in (mass_off, stiffness_off))
+        self.omega = structure.omega
+        mass_change = (structure.mass - np.eye(len(self.omega))).magnitude()
+        stiffness_change = (structure.stiffness - np.diag(self.omega**2)).magnitude()
+        stiffness_change = stiffness_change / (self.omega[:, np.newaxis] * self.omega)
+        self.mu = float(np.linalg.norm(mass_change, 2))
+        self.kappa = float(np.linalg.norm(stiffness_change, 2))
         if not max(self.mu, self.kappa) < 1:
             raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
-        of_displacement, of_velocity = np.split(structure.rows.magnitude(), 2, axis=1)
-        # error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the motion, (m,)
+        of_displacement, of_velocity = np.split(structure.output_rows.magnitude(), 2, axis=1)
+        # error of outputs over a deviation √(qᵀ K q + vᵀ M v) of the response, (m,)
         self.outputs = np.hypot(self.of_spring_force(of_displacement), self.of_force(of_velocity))
 
     def of_displacement(self, x: Array) -> Array:
-        """Bound of √(x* K x) for vectors of entries up to x (…, N), shape (…,)."""
-        return np.sqrt(1 + self.kappa) * norm_of(x * self.omega)
+        """Bound √(x* K x) for vectors whose entries have magnitudes up to x (…, N), shape (…,)."""
+        return np.asarray(np.sqrt(1 + self.kappa) * norm_of(x * self.omega))
 
     def of_spring_force(self, f: Array) -> Array:
-        """Bound of √(f* K⁻¹ f)."""
-        return norm_of(f / self.omega) / np.sqrt(1 - self.kappa)
+        """Bound √(f* K⁻¹ f) for vectors whose entries have magnitudes up to f (…, N)."""
+        return np.asarray(norm_of(f / self.omega) / np.sqrt(1 - self.kappa))
 
     def of_force(self, f: Array) -> Array:
-        """Bound of √(f* M⁻¹ f)."""
-        return norm_of(f) / np.sqrt(1 - self.mu)
+        """Bound √(f* M⁻¹ f) for vectors whose entries have magnitudes up to f (…, N)."""
+        return np.asarray(norm_of(f) / np.sqrt(1 - self.mu))
 
 
 def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bounds of what the defects of modes add to the deviation over exp(λ t) and time, (S, n)."""
-    rate, momentum = modes.rate[:, None], modes.velocity @ structure.mass
-    kinematic = rate * modes.shape - modes.velocity
+    """Bound the energy norm of the defects of each mode and source over |exp(λ t)|, (S, n)."""
+    eigenvalue = modes.eigenvalue[:, None]
+    kinematic = eigenvalue * modes.shape - modes.velocity
+    momentum = modes.velocity @ structure.mass
     dynamic = (
-        rate * momentum + modes.velocity @ structure.damping + modes.shape @ structure.stiffness
+        eigenvalue * momentum
+        + modes.velocity @ structure.damping
+        + modes.shape @ structure.stiffness
     )
     return np.hypot(
         norms.of_displacement(kinematic.magnitude()), norms.of_force(dynamic.magnitude())
@@ -133,126 +152,165 @@ def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyN
 
 
 def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bounds of the sources' initial conditions' defects in the norm of energy, (S,)."""
+    """Bound the energy norm of the defects of the initial state of each source, shape (S,)."""
     twice = np.full((1, modes.shape.shape[1]), 2.0)  # the sum over modes and their conjugates
-    q, v = ((twice @ x.real)[:, 0] for x in (modes.shape, modes.velocity))
-    spring = q @ structure.stiffness - structure.static.T
-    momentum = v @ structure.mass - structure.impulse.T
-    return np.hypot(norms.of_spring_force(spring.magnitude()), norms.of_force(momentum.magnitude()))
+    displacement = (twice @ modes.shape.real)[:, 0]
+    velocity = (twice @ modes.velocity.real)[:, 0]
+    spring_force = displacement @ structure.stiffness - structure.static_forces.T
+    momentum = velocity @ structure.mass - structure.impulses.T
+    return np.hypot(
+        norms.of_spring_force(spring_force.magnitude()), norms.of_force(momentum.magnitude())
+    )
 
 
 def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
-    """Parts of degree 0 to 3 of Σ |coefficient| (reach + v)^e in v, shapes (monomials, *V).
+    """Return the parts of degree 0 to 3 in v of Σ |coefficient| (reach + v)^exponents.
 
-    At v = 0 its derivatives bound those of the polynomials, shape V, over the box |u_i| ≤ reach_i.
+    At v = 0 the derivatives of this majorant bound those of the polynomials, shape V, over the box
+    |u_i| ≤ reach_i.
+
+    Returns:
+        Coefficients by degree, shape (monomials, *V) each.
     """
-    sizes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
-    around = sizes.on_subbox(reach - 1, reach + 1)
+    magnitudes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
+    around = magnitudes.on_subbox(reach - 1, reach + 1)
     return [around.homogeneous_part(degree) for degree in range(4)]
 
 
 def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
-    """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
+    """Return upper bounds of Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
     return eigenvalue.real.on_subbox(-reach, reach).bounds()[1]
 
 
 @dataclass(frozen=True, eq=False)
 class MotionPart:
-    """The free part of a modal model, or what one load adds."""
+    """The free response of a modal model, or what one load adds, with bounds over time."""
 
-    share: TaylorModel  # coefficients C_k, polynomials, (n, m)
+    coefficient: TaylorModel  # coefficients C_k, polynomials, (n, m)
     waves: Array  # bounds of the derivatives of w by λ, orders 0 to 3, (4, T, n)
     elapsed: Array  # bounds of ∫ |w| from 0 to t, (T, n)
-    push: Array  # bound of the impulse ∫ |a| of the load up to t, (T,), in m/s; 1 of the free part
-    left_out: Array  # bound of the model's error of w, over waves[0], (n,)
-    load: LoadTables | None = None  # the load; None of the free part
+    # bound of ∫ |a| of the load up to t, (T,), in m/s; 1 for the free response
+    impulse: Array
+    table_error: Array  # bound of the model's error of w, over waves[0], (n,)
+    load: LoadTables | None = None  # the load; None for the free response
 
 
 def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
-    """The free part of a model's motion, then the part of each load, with bounds over time.
+    """Return the free response of a model, then the part of each load, with bounds over time.
 
-    `growth` (n,) are upper bounds of Re λ_k, in 1/s.
+    `growth` (n,) are upper bounds g_k of Re λ_k, in 1/s.
     """
-    time = model.flow.time[:, None]
+    time = model.flow.time[:, np.newaxis]
     divisor = np.where(growth == 0, 1.0, growth)
+    powers = time ** np.arange(4)[:, np.newaxis, np.newaxis]
     free = MotionPart(
-        share=model.coefficient,
-        waves=time ** np.arange(4)[:, None, None] * np.exp(growth * time),
+        coefficient=model.coefficient,
+        waves=powers * np.exp(growth * time),
         elapsed=np.where(growth == 0, time, np.expm1(growth * time) / divisor),
-        push=np.ones(len(time)),
-        left_out=np.zeros(model.count),
+        impulse=np.ones(len(time)),
+        table_error=np.zeros(model.count),
     )
     return [free, *(_forced_part(model, growth, load) for load in model.loads)]
 
 
 def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:
-    """Part of a model's motion that a load a(t) makes, w = R = ∫ exp(λ τ) a(t − τ) dτ."""
-    if isinstance(load, Direct):  # w of the first mode is a(t)
-        waves: Array = np.zeros((4, len(model.flow.time), model.count))
+    """Return the part of a load a(t), with bounds of w = R = ∫ exp(λ τ) a(t − τ) dτ over time."""
+    time = model.flow.time
+    if isinstance(load, Direct):  # w of the first mode is a(t), and that of all others 0
+        waves: Array = np.zeros((4, len(time), model.count))
         waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
         return MotionPart(
-            load.share, waves, 0 * waves[0], 0 * model.flow.time, load.truncation, load
+            coefficient=load.share,
+            waves=waves,
+            elapsed=np.zeros(waves[0].shape),
+            impulse=np.zeros(len(time)),
+            table_error=load.truncation,
+            load=load,
         )
 
-    def moments(decay: float) -> Array:  # of exp(−decay τ) |a(t − τ)|
-        return (1 + ROUNDING) * absolute_moments(decay, load.history, model.flow.time)
+    def moments(decay: float) -> Array:
+        """Bounds of ∫ τ^r exp(−decay τ) |a(t − τ)| dτ, (5, T)."""
+        return (1 + ROUNDING) * absolute_moments(decay, load.history, time)
 
     undamped = moments(0.0)
-    of_modes = np.stack([moments(-float(g)) for g in growth], -1)  # (5, T, n)
-    # ∫₀ᵗ |R| ≤ ∫ |a(t − τ)| ∫₀^τ exp(g s) ds dτ, the inner one at most
-    # τ and 1/|g| where g < 0, else τ exp(g τ)
-    decaying = np.minimum(undamped[1], undamped[0] / np.maximum(-growth, 1e-300)[:, None]).T
-    elapsed = np.where(growth < 0, decaying, of_modes[1])
-    return MotionPart(load.share, of_modes[:4], elapsed, undamped[0], load.truncation, load)
+    of_modes = np.stack([moments(-float(g)) for g in growth], axis=-1)  # (5, T, n)
+    # ∫₀ᵗ |R| ≤ ∫ |a(t − τ)| ∫₀^τ exp(g s) ds dτ. The inner integral is at most τ and at most 1/|g|
+    # where g < 0, and at most τ exp(g τ) else.
+    by_decay = undamped[0] / np.maximum(-growth, 1e-300)[:, np.newaxis]
+    decaying = np.minimum(undamped[1], by_decay).T
+    return MotionPart(
+        coefficient=load.share,
+        waves=of_modes[:4],
+        elapsed=np.where(growth < 0, decaying, of_modes[1]),
+        impulse=undamped[0],
+        table_error=load.truncation,
+        load=load,
+    )
 
 
-class Remainder:
-    """Bounds of what quadratic Taylor models of the outputs leave out in a box, and of rounding.
+def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> RemainderBounds:
+    """Bound what quadratic Taylor models of the outputs leave out in a box, and their rounding.
 
-    They follow for the box [lower, upper] by majorants: derivatives of C exp(λ t) over exp(λ₀ t)
-    are no larger than those of Σ_p t^p C ρ^p / p!, ρ = λ − λ₀, with majorants of C and λ.
+    The bounds follow for the box [lower, upper], in unit coordinates of shape (d,), by majorants:
+    derivatives of C exp(λ t) over exp(λ₀ t) are at most those of Σ_p t^p C ρ^p / p! with majorants
+    of C and of ρ = λ − λ₀.
     """
+    d = len(lower)
+    n = model.count
+    m = len(model.flow.outputs)
+    time = model.flow.time
+    reach = np.maximum(np.abs(lower), np.abs(upper))
+    growth = largest_growth(model.eigenvalue, reach)
+    eigenvalue = majorant_parts(model.eigenvalue, reach)  # by degree, (monomials, n)
+    rho = [part[..., np.newaxis] for part in eigenvalue]
+    cubic = np.zeros((len(time), count(d, 3), m))
+    rounding = np.zeros((len(time), 1 + d, m))  # of values, then of slopes
+    for part in motion_parts(model, growth):
+        relative_rounding = _relative_rounding(model, eigenvalue[0][0], part.load)
+        term = majorant_parts(part.coefficient, reach)  # of C ρ^p / p!, (monomials, n, m)
+        for p in range(4):
+            waves = 2 * part.waves[p]
+            cubic += np.tensordot(waves, term[3], (1, 1))
+            quadratic = TaylorModel(tuple(term[:3]), np.zeros((n, m)), d)
+            values, slopes, *_ = majorant_parts(quadratic, upper - lower)
+            largest = np.concatenate([values, slopes])
+            rounding += np.tensordot(relative_rounding * waves, largest, (1, 1))
+            term = [
+                product_part(term, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
+                for k in range(4)
+            ]
+        if part.load is None:
+            # The free response comes first. At t = 0 the sum over its modes is an initial
+            # state, of which most cancels, and is bounded as one polynomial.
+            at_start = np.full(n, 2.0) @ part.coefficient.real
+            cubic[time == 0] = majorant_parts(at_start, reach)[3]
 
-    def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
-        d, n, m, time = len(lower), model.count, len(model.flow.outputs), model.flow.time
-        reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
-        growth = largest_growth(model.eigenvalue, reach)
-        self.rate = majorant_parts(model.eigenvalue, reach)  # by degree, (monomials, n)
-        cubic, margin = np.zeros((len(time), count(d, 3), m)), np.zeros((len(time), 1 + d, m))
-        rho = [part[..., None] for part in self.rate]
-        for part in motion_parts(model, growth):
-            noise = _rounding_bound(model, self.rate[0][0], part.load)
-            # of the last part, when all are done; by degree, (monomials, n, m)
-            self.share = power = majorant_parts(part.share, reach)
-            for p in range(4):  # power: the parts of C ρ^p / p!
-                waves = 2 * part.waves[p]
-                cubic += np.tensordot(waves, power[3], (1, 1))
-                quadratic = TaylorModel(tuple(power[:3]), np.zeros((n, m)), d)
-                largest = np.concatenate(majorant_parts(quadratic, width)[:2])  # values, slopes
-                margin += np.tensordot(noise * waves, largest, (1, 1))
-                power = [
-                    product_part(power, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
-                    for k in range(4)
-                ]
-            if part.load is None:  # the first part; at the start most of its modes cancel
-                at_start = np.full(n, 2.0) @ part.share.real
-                cubic[time == 0] = majorant_parts(at_start, reach)[3]
-        of_exponents = np.array([1, 1, 2, 6])[exponents(d, 3)].prod(1)  # ∂³ u^e at 0, e!
-        third = (1 + 1e-9) * (cubic * of_exponents[:, None]).swapaxes(1, 2)
-        # bounds of |∂³ output / ∂u_i ∂u_j ∂u_k|, (T, m, d, d, d)
-        places = product_places(d, 1, 2)[:, product_places(d, 1, 1)]
-        self.tensor = np.ascontiguousarray(third[..., places])
-        # rounding of values, and of slopes, (T, m, 1 + d)
-        self.margin = np.ascontiguousarray(margin.swapaxes(1, 2))
+    # The third derivative of u^e at 0 is e!, and all other derivatives are zero there.
+    factorials = np.array([1, 1, 2, 6])
+    of_exponents = factorials[exponents(d, 3)].prod(axis=1)
+    third = (1 + 1e-9) * (cubic * of_exponents[:, np.newaxis]).swapaxes(1, 2)
+    places = product_places(d, 1, 2)[:, product_places(d, 1, 1)]  # of u_i u_j u_k, (d, d, d)
+    return RemainderBounds(
+        third=np.ascontiguousarray(third[..., places]),
+        rounding=np.ascontiguousarray(rounding.swapaxes(1, 2)),
+    )
 
 
-def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
-    """Relative rounding error of each mode's motion at each node, (T, n): ε times operations."""
-    # that of λ enters exp(λ t) times |λ| t; terms of a load's series exceed its sum by exp(REACH)
+def _relative_rounding(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
+    """Bound the relative rounding error of each mode's response at each node, shape (T, n).
+
+    It is ε times the number of operations; the rounding of λ enters exp(λ t) times |λ| t.
+
+    Args:
+        model: The modal model.
+        rate: Bounds of |λ|, shape (n,), in 1/s.
+        load: The load of the part; None for the free response.
+    """
     n_terms, d = model.eigenvalue.exponents.shape
     of_polynomial = n_terms + model.degree + 2
-    phase = rate * model.flow.time[:, None]
+    phase = rate * model.flow.time[:, np.newaxis]
     operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
     if load is not None:
-        operations = operations + (8 * len(model.flow.time) + SERIES_TERMS) * np.exp(REACH)
+        # The series of a load's table has at most 100 terms, which exceed its sum by exp(REACH).
+        operations = operations + (8 * len(model.flow.time) + 100) * np.exp(REACH)
     return np.finfo(float).eps * operations

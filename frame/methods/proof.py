@@ -31,11 +31,11 @@ from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optim
 from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
-    Remainder,
     direct_error_in_steps,
     largest_growth,
     motion_parts,
     proved_error,
+    remainder_bounds,
 )
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
@@ -248,7 +248,7 @@ def bound_levels(
     direct = direct_error_in_steps(model)
     model = model.in_units(scale)
     error = model_error / scale
-    rounding = Remainder(model, *model.boxes.unit_ends(0)).margin[..., 0]
+    rounding = remainder_bounds(model, *model.boxes.unit_ends(0)).rounding[..., 0]
     # Model error and rounding are added to the bounds on either side. The search has the rest of
     # the gap, a little less so that rounding does not make the sum larger than the gap.
     least_gap = float((2 * error + rounding).max())
@@ -347,15 +347,15 @@ def _line_deviation(model: ModalModel) -> Array:
         load = None
         if part.load is not None:
             load = part.load.history
-        deviations = [part.share.real.deviation(), part.share.imag.deviation()]
+        deviations = [part.coefficient.real.deviation(), part.coefficient.imag.deviation()]
         radii = 2 * np.stack(deviations, axis=1)
         # What a force adds at once is proportional to the force, with the first coefficient.
         if isinstance(part.load, Direct):
-            coefficient = np.multiply.outer(2 * part.share.value[0], np.ones((1, 1)))
+            coefficient = np.multiply.outer(2 * part.coefficient.value[0], np.ones((1, 1)))
             responses.append(Response(None, load, 0, coefficient, radii[0]))
             continue
         for k, sigma in enumerate(grids):
-            coefficient = np.multiply.outer(2 * part.share.value[k], np.ones(sigma.shape))
+            coefficient = np.multiply.outer(2 * part.coefficient.value[k], np.ones(sigma.shape))
             responses.append(Response(sigma, load, 0, coefficient, radii[k]))
     time = model.flow.time
     by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)

@@ -1,14 +1,15 @@
 """Modes with dashpots as Taylor models over a box: q(t; p) = 2 Re Σ_k φ_k(p) exp(λ_k(p) t).
 
-(λ² M + λ D + K) φ = 0 is solved degree by degree about the middle of the box (perturbation series;
-Stewart, Sun 1990). The polynomials need no proof of their own: `bounds.model_error` bounds what
-they miss in the equations of motion, whatever the distances of the eigenvalues.
+(λ² M + λ D + K) φ = 0 is solved degree by degree about the midpoint of the box (perturbation
+series; Stewart, Sun 1990). The polynomials need no proof of their own: `bounds.model_error` bounds
+what they miss in the equations of motion, whatever the distances of the eigenvalues.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
@@ -24,76 +25,96 @@ from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
 
 EQUAL = 1e-6
-"""Relative distance of two eigenvalues below which they count as equal."""
+"""Relative distance of two eigenvalues below which they count as equal: series of modes that are
+closer than this would have coefficients without accuracy. Tuned."""
 
 
 @dataclass(frozen=True, eq=False)
 class DampedStructure:
     """M q̈ + D q̇ + K q = f of N unknowns and m outputs over the unit box of the inputs.
 
-    Coordinates are those in which the middle of the box has M = 1 and K = diag(ω²). What moves it
-    are S sources: the start, then a unit impulse of the ground and of each history of forces. Each
-    starts the motion by K q(0) = static and M q̇(0) = impulse.
+    Coordinates are those in which the midpoint of the box has M = 1 and K = diag(ω²). It is moved
+    by S sources: the initial state, then a unit impulse of the ground and of each history of
+    forces. Each starts the response by K q(0) = static force and M q̇(0) = impulse.
     """
 
     mass: TaylorModel  # M, (N, N)
     damping: TaylorModel  # D, (N, N)
     stiffness: TaylorModel  # K, (N, N)
     omega: Array  # ω, rising, (N,), in rad/s
-    static: TaylorModel  # forces of the sources, (N, S)
-    impulse: TaylorModel  # impulses of the sources, (N, S)
-    rows: TaylorModel  # what outputs take of [q, q̇], (m, 2N)
+    static_forces: TaylorModel  # of the sources, (N, S)
+    impulses: TaylorModel  # of the sources, (N, S)
+    output_rows: TaylorModel  # rows of the outputs on [q, q̇], (m, 2N)
     # what a unit of each history of forces adds to outputs at once, (m, H); None if nothing
     feeds: TaylorModel | None
 
     @classmethod
     def over_box(cls, system: LinearSystem, boxes: Boxes, order: int) -> DampedStructure:
-        """The structure over the widest of some boxes, as Taylor models of an order.
+        """Return the structure over the widest of some boxes, as Taylor models of an order.
 
         Raises:
-            UnprovedError: The mass in the middle, or a quantity that must be positive, is not so,
+            UnprovedError: The mass at the midpoint, or a quantity that must be positive, is not so,
                 or the structure can drift.
         """
-        d, inputs = len(boxes.names), TaylorModel.variables(boxes.centre, boxes.radius, order)
+        d = len(boxes.names)
+        inputs = TaylorModel.variables(boxes.centre, boxes.radius, order)
         parameters = {x: TaylorModel.constant(v, d, order) for x, v in system.parameters.items()}
-        parameters |= {name: inputs[i] for i, name in enumerate(boxes.names)}
+        for i, name in enumerate(boxes.names):
+            parameters[name] = inputs[i]
         full = system.assembly(parameters)
+        a, b = full.rayleigh
         damping = full.dashpots
-        for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
-            damping = damping + factor * matrix if factor.magnitude() > 0 else damping
+        if a.magnitude() > 0:
+            damping = damping + a * full.mass
+        if b.magnitude() > 0:
+            damping = damping + b * full.springs
+
+        # Coordinates of the undamped modes at the midpoint.
         try:
-            squared, basis = eigh(full.stiffness.value, full.mass.value)
+            eigenvalues, basis = eigh(full.stiffness.value, full.mass.value)
         except np.linalg.LinAlgError:
             raise UnprovedError("the mean mass matrix is not positive definite") from None
-        if not squared[0] > np.finfo(float).eps * squared[-1]:
+        if not eigenvalues[0] > np.finfo(float).eps * eigenvalues[-1]:
             raise UnprovedError("a mode does not oscillate", "hold the structure by springs")
-        M, D, K = (basis.T @ matrix @ basis for matrix in (full.mass, damping, full.stiffness))
-        omega = np.sqrt(squared)
+        omega = np.sqrt(eigenvalues)
+        M = basis.T @ full.mass @ basis
+        D = basis.T @ damping @ basis
+        K = basis.T @ full.stiffness @ basis
         if full.ratios and full.ratios[0].magnitude() > 0:  # one ζ of all modes
             D = D + full.ratios[0] * 2.0 * geometric_mean(M, K, omega)
-        static, impulse = full.stiffness @ full.q0[:, None], full.mass @ full.v0[:, None]
-        impulses = [impulse if full.impulse is None else impulse + full.impulse]
+
+        # The first source is the initial state.
+        static = full.stiffness @ full.q0[:, None]
+        if full.static is not None:
+            static = static + full.static
+        impulse = full.mass @ full.v0[:, None]
+        if full.impulse is not None:
+            impulse = impulse + full.impulse
+        impulses = [impulse]
         if system.ground is not None:
             impulses.append(full.mass @ -full.pattern[:, None])
         if full.forces is not None:
             impulses.append(full.forces)
-        statics = [static if full.static is None else static + full.static]
+        statics = [static]
         statics += [impulse * 0.0 for impulse in impulses[1:]]
+
         factors = full.row_factors[:, None]
         rows = factors * (full.rows @ np.kron(np.eye(2), basis))
         feeds = None
         if full.accelerated.any():  # q̈ + ι a = M⁻¹ (b f − D q̇ − K q)
-            reading = factors * solve(M, M.like((full.accelerated @ basis).T)).T
-            rows = rows - concatenate([reading @ K, reading @ D], -1)
-            feeds = None if full.forces is None else reading @ (basis.T @ full.forces)
+            right_sides = M.like((full.accelerated @ basis).T)
+            over_mass = factors * solve(M, right_sides).T
+            rows = rows - concatenate([over_mass @ K, over_mass @ D], -1)
+            if full.forces is not None:
+                feeds = over_mass @ (basis.T @ full.forces)
         return cls(
             mass=M,
             damping=D,
             stiffness=K,
             omega=omega,
-            static=basis.T @ concatenate(statics, -1),
-            impulse=basis.T @ concatenate(impulses, -1),
-            rows=rows,
+            static_forces=basis.T @ concatenate(statics, -1),
+            impulses=basis.T @ concatenate(impulses, -1),
+            output_rows=rows,
             feeds=feeds,
         )
 
@@ -102,164 +123,251 @@ class DampedStructure:
 class DampedModes:
     """Polynomials of n modes of a structure with S sources, N unknowns, m outputs."""
 
-    rate: TaylorModel  # λ_k, Im λ_k > 0, (n,), in 1/s
-    shape: TaylorModel  # φ_k of each source, (S, n, N)
+    eigenvalue: TaylorModel  # λ_k, Im λ_k > 0, (n,), in 1/s
+    shape: TaylorModel  # φ_k for each source, (S, n, N)
     velocity: TaylorModel  # w_k ≈ λ_k φ_k, (S, n, N)
 
     @classmethod
     def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:
-        """Series of the modes in places `chosen` (n,) by rising |λ|, about the middle of the box.
+        """Return series of some modes about the midpoint of the box.
+
+        Args:
+            structure: The structure.
+            chosen: Numbers of the modes by rising |λ|, shape (n,).
 
         Raises:
-            UnprovedError: One does not oscillate, or has the frequency of another one.
+            UnprovedError: One of them does not oscillate, or has the frequency of another one.
         """
-        rate, shape = _eigen_series(structure, chosen)
-        force = shape @ structure.impulse
-        if structure.static.magnitude().any():
-            force = force - (shape @ structure.static) * _reciprocal(rate[:, None])
-        # near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k))
-        weighted = (rate * 2.0)[:, None] * (shape @ structure.mass)
+        eigenvalue, shape = _eigen_series(structure, chosen)
+        force = shape @ structure.impulses
+        if structure.static_forces.magnitude().any():
+            static = (shape @ structure.static_forces) * _reciprocal(eigenvalue[:, None])
+            force = force - static
+        # Near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k)).
+        weighted = (eigenvalue * 2.0)[:, None] * (shape @ structure.mass)
         weighted = weighted + shape @ structure.damping
         norm = (weighted * shape) @ np.ones((len(structure.omega), 1))
-        shape = ((force * _reciprocal(norm)).T[..., None] * shape).polynomial
-        return cls(rate, shape, (rate[:, None] * shape).polynomial)
+        of_sources = (force * _reciprocal(norm)).T[..., None]
+        shape = (of_sources * shape).polynomial
+        return cls(eigenvalue, shape, (eigenvalue[:, None] * shape).polynomial)
 
     def outputs(self, structure: DampedStructure) -> TaylorModel:
-        """Outputs of the states [φ_k, w_k], shape (S, n, m)."""
+        """Return the outputs of the states [φ_k, w_k], shape (S, n, m)."""
         n = len(structure.omega)
-        return self.shape @ structure.rows[:, :n].T + self.velocity @ structure.rows[:, n:].T
+        on_displacements = structure.output_rows[:, :n]
+        on_velocities = structure.output_rows[:, n:]
+        return self.shape @ on_displacements.T + self.velocity @ on_velocities.T
 
 
 def needed_modes(
-    structure: DampedStructure, loads: Sequence[History], time: Array, allowed: Array | float
+    structure: DampedStructure, loads: Sequence[History], time: Array, tolerance: Array | float
 ) -> Ints:
-    """Places (n,) by rising |λ| of the modes without which outputs miss at most `allowed` (m,).
+    """Return the modes without which outputs would miss more than a tolerance.
 
-    An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + q̇ᵀ M q̇). All is that of
-    the middle of the box: what is left out counts as an error of the start in the proof. `loads`
-    are the histories of all sources but the start.
+    An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + q̇ᵀ M q̇). All is estimated at
+    the midpoint of the box; what is left out counts as an error of the initial state in the proof.
+
+    Args:
+        structure: The structure.
+        loads: Histories of all sources but the initial state.
+        time: Time nodes, shape (T,), in s.
+        tolerance: Allowed error of each output by all omitted modes together, shape (m,).
+
+    Returns:
+        Their numbers by rising |λ|, shape (n,); one at least.
     """
-    rate, shape, norm = _middle_modes(structure)
-    omega, (r, s) = structure.omega, np.split(structure.rows.value, 2, axis=1)
-    force = shape @ structure.impulse.value - shape @ structure.static.value / rate[:, None]
-    amplitude = np.abs(force / norm[:, None])  # (2N, S)
-    for k, history in enumerate(loads, start=1):  # |∫ exp(λ τ) a| ≤ min(∫ |a|, max |a| / −Re λ)
+    modes = _midpoint_modes(structure)
+    rate = modes.eigenvalue
+    shape = modes.shape
+    static = shape @ structure.static_forces.value / rate[:, np.newaxis]
+    force = shape @ structure.impulses.value - static
+    amplitude = np.abs(force / modes.norm[:, np.newaxis])  # (2N, S)
+    for k, history in enumerate(loads, start=1):
+        # |∫ exp(λ τ) a| ≤ min(∫ |a|, max |a| / −Re λ)
         steady = history.extremes[0] / np.maximum(-rate.real, 1e-300)
         amplitude[:, k] *= np.minimum(absolute_moments(0.0, history, time)[0, -1], steady)
-    energy = np.hypot(norm_of(shape * omega), np.abs(rate) * norm_of(shape))
-    reads = np.hypot(norm_of(r / omega), norm_of(s)) / np.maximum(allowed, 1e-300)
-    size = 2 * energy * amplitude.sum(1) * reads.max()
+    energy = np.hypot(norm_of(shape * structure.omega), np.abs(rate) * norm_of(shape))
+    r, s = np.split(structure.output_rows.value, 2, axis=1)
+    output_norms = np.hypot(norm_of(r / structure.omega), norm_of(s))
+    output_norms = output_norms / np.maximum(tolerance, 1e-300)
+    size = 2 * energy * amplitude.sum(axis=1) * output_norms.max()
+
+    # The smallest ones are omitted as long as their sum stays below the tolerance.
     upper = np.flatnonzero(rate.imag >= 0)  # one of each conjugate pair
-    order = upper[np.argsort(size[upper])]
-    return np.setdiff1d(upper, order[:-1][np.cumsum(size[order[:-1]]) <= 1])
+    by_size = upper[np.argsort(size[upper])]
+    candidates = by_size[:-1]
+    omitted = candidates[np.cumsum(size[candidates]) <= 1]
+    return np.setdiff1d(upper, omitted)
 
 
-def _middle_modes(structure: DampedStructure) -> tuple[Array, Array, Array]:
-    """λ (2N,), unit shapes φ as rows and φᵀ (2 λ M + D) φ in the middle; Im λ > 0 first, by |λ|."""
-    omega, n = structure.omega, len(structure.omega)
+class _MidpointModes(NamedTuple):
+    """All 2N modes of a structure at the midpoint of the box, those with Im λ > 0 first, by |λ|."""
+
+    eigenvalue: Array  # λ, (2N,)
+    shape: Array  # φ of unit length as rows, (2N, N)
+    norm: Array  # φᵀ (2 λ M + D) φ, (2N,)
+
+
+def _midpoint_modes(structure: DampedStructure) -> _MidpointModes:
+    """Return the modes at the midpoint, where M = 1 and K = diag(ω²)."""
+    omega = structure.omega
+    n = len(omega)
     D = structure.damping.value
-    lower = np.hstack([-np.diag(omega**2), -D])
-    rate, X = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]))
-    group = np.where(_oscillates(rate), 0, np.where(_oscillates(rate.conj()), 2, 1))
+    lower_rows = np.hstack([-np.diag(omega**2), -D])
+    rate, vectors = np.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower_rows]))
+    # Upper eigenvalues of conjugate pairs come first, lower ones last, real ones between them.
+    is_upper = _oscillates(rate)
+    is_lower = _oscillates(rate.conj())
+    group = np.select([is_upper, is_lower], [0, 2], 1)
     order = np.lexsort((np.abs(rate), group))
-    rate, shape = rate[order], X[:n, order].T
-    shape = shape / norm_of(shape)[:, None]
+    rate = rate[order]
+    shape = vectors[:n, order].T
+    shape = shape / norm_of(shape)[:, np.newaxis]
     for k in np.flatnonzero(_oscillates(rate)):
-        alike = _equal_modes(rate, k)
-        if len(alike) > 1 and k == alike[0]:
-            shape[alike] = _orthogonal_shapes(shape[alike], rate[k], D)
-    return rate, shape, ((2 * rate[:, None] * shape + shape @ D) * shape).sum(1)
+        equal = _equal_modes(rate, k)
+        if len(equal) > 1 and k == equal[0]:
+            shape[equal] = _orthogonal_shapes(shape[equal], rate[k], D)
+    norm = ((2 * rate[:, np.newaxis] * shape + shape @ D) * shape).sum(axis=1)
+    return _MidpointModes(rate, shape, norm)
 
 
 def norm_of(vectors: Array) -> Array:
-    """Euclidean norms along the last axis."""
+    """Return Euclidean norms along the last axis."""
     return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
 def _eigen_series(structure: DampedStructure, chosen: Ints) -> tuple[TaylorModel, TaylorModel]:
-    """λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0 to the order of M, about the middle."""
-    # in degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known, and φ₀* φ_m = 0
-    M, D, K = structure.mass, structure.damping, structure.stiffness
-    rates, shapes, _ = _middle_modes(structure)
-    lam, phi = rates[chosen], shapes[chosen]
-    if not _oscillates(lam).all():
+    """Return series of λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0, about the midpoint.
+
+    In degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known from lower degrees, and
+    φ₀* φ_m = 0 is chosen.
+
+    Raises:
+        UnprovedError: One of the modes does not oscillate, or modes of equal eigenvalues are
+            separated by the inputs.
+    """
+    M = structure.mass
+    D = structure.damping
+    K = structure.stiffness
+    d = M.inputs
+    at_midpoint = _midpoint_modes(structure)
+    rate = at_midpoint.eigenvalue[chosen]
+    shape = at_midpoint.shape[chosen]
+    if not _oscillates(rate).all():
         raise UnprovedError("a mode does not oscillate", "take less damping, or graph-follower")
-    N, d = phi.shape[1], M.inputs
-    # of modes of equal λ all φ border the matrix, which is singular else; the others' parts of the
-    # solution, `couplings`, are zero where one shape goes on through the whole box
-    inverse, couplings = np.empty((len(lam), N + 1, N), complex), dict[int, Array]()
-    for k, x in enumerate(lam):
-        alike = _equal_modes(rates, chosen[k])
-        border, zeros = shapes[alike], np.zeros((len(alike), len(alike)))
-        pencil = x**2 * M.value + x * D.value + K.value
-        columns = (2 * x * M.value + D.value) @ border.T
-        solved = np.linalg.inv(np.block([[pencil, columns], [border.conj(), zeros]]))[:, :N]
-        is_own = alike == chosen[k]
-        inverse[k] = np.vstack([solved[:N], solved[N:][is_own]])
-        couplings[k] = solved[N:][~is_own]
-    # by degree: λ (n, 1), φ, w = λ φ and w M
-    L, P, W = [lam[None, :, None]], [phi[None]], [lam[:, None] * phi[None]]
-    U = [W[0] @ M.value]
+    bordered = [_bordered_inverse(structure, at_midpoint, k) for k in chosen]
+    inverses = np.stack([x.inverse for x in bordered])
+
+    # By degree: λ (n, 1), φ, w = λ φ and w M (n, N).
+    N = shape.shape[1]
+    eigenvalues = [rate[np.newaxis, :, np.newaxis]]
+    shapes = [shape[np.newaxis]]
+    velocities = [rate[:, np.newaxis] * shape[np.newaxis]]
+    momenta = [velocities[0] @ M.value]
     for m in range(1, M.order + 1):
-        W.append(product_part(L, P, m, d, np.multiply, lowest=(1, 1)))  # of lower degrees alone
-        U.append(product_part(W, M.parts, m, d, matmul))
-        known = lam[:, None] * U[m] + product_part(L, U, m, d, np.multiply, lowest=(1, 1))
-        known += product_part(W, D.parts, m, d, matmul) + product_part(P, K.parts, m, d, matmul)
-        for k, rows in couplings.items():
-            _require_uncoupled(known[:, k] @ rows.T, lam[k])
-        found = np.einsum("kij,mkj->mki", inverse, -known)
-        P.append(found[..., :N])
-        L.append(found[..., N:])
-        added = lam[:, None] * P[m] + L[m] * phi
-        W[m] += added
-        U[m] += added @ M.value
-    rate = TaylorModel(tuple(L), np.zeros((len(lam), 1)), d, M.order)
-    return rate[:, 0], TaylorModel(tuple(P), np.zeros(phi.shape), d, M.order)
+        # Products of lower degrees alone; the terms with λ_m and φ_m are added below.
+        velocities.append(product_part(eigenvalues, shapes, m, d, np.multiply, lowest=(1, 1)))
+        momenta.append(product_part(velocities, M.parts, m, d, matmul))
+        known = rate[:, np.newaxis] * momenta[m]
+        known += product_part(eigenvalues, momenta, m, d, np.multiply, lowest=(1, 1))
+        of_damping = product_part(velocities, D.parts, m, d, matmul)
+        known += of_damping + product_part(shapes, K.parts, m, d, matmul)
+        for k, x in enumerate(bordered):
+            _require_uncoupled(known[:, k] @ x.couplings.T, rate[k])
+        found = np.einsum("kij,mkj->mki", inverses, -known)
+        shapes.append(found[..., :N])
+        eigenvalues.append(found[..., N:])
+        added = rate[:, np.newaxis] * shapes[m] + eigenvalues[m] * shape
+        velocities[m] += added
+        momenta[m] += added @ M.value
+    eigenvalue = TaylorModel(tuple(eigenvalues), np.zeros((len(rate), 1)), d, M.order)
+    return eigenvalue[:, 0], TaylorModel(tuple(shapes), np.zeros(shape.shape), d, M.order)
+
+
+class _BorderedInverse(NamedTuple):
+    """Rows of the inverse of λ² M + λ D + K at an eigenvalue, bordered by its modes."""
+
+    inverse: Array  # rows for φ_m and λ_m of the mode, (N + 1, N)
+    # rows for the parts of the right side along the other modes of the same eigenvalue, (g − 1, N);
+    # they must give 0, so that one shape goes on through the whole box
+    couplings: Array
+
+
+def _bordered_inverse(
+    structure: DampedStructure, modes: _MidpointModes, k: int
+) -> _BorderedInverse:
+    """Return the bordered inverse at the eigenvalue of mode number k, at the midpoint.
+
+    The matrix λ² M + λ D + K is singular at an eigenvalue. Bordered by the shapes of all g modes of
+    this eigenvalue it is regular.
+    """
+    x = modes.eigenvalue[k]
+    M = structure.mass.value
+    D = structure.damping.value
+    K = structure.stiffness.value
+    N = len(M)
+    equal = _equal_modes(modes.eigenvalue, k)
+    border = modes.shape[equal]
+    columns = (2 * x * M + D) @ border.T
+    zeros = np.zeros((len(equal), len(equal)))
+    pencil = x**2 * M + x * D + K
+    inverse = np.linalg.inv(np.block([[pencil, columns], [border.conj(), zeros]]))[:, :N]
+    is_own = equal == k
+    of_border = inverse[N:]
+    return _BorderedInverse(np.vstack([inverse[:N], of_border[is_own]]), of_border[~is_own])
 
 
 def _oscillates(rate: Array) -> Mask:
-    """Whether eigenvalues are the upper ones of a conjugate pair."""
+    """Return whether eigenvalues are the upper ones of a conjugate pair."""
     return np.asarray(rate.imag > 1e-9 * np.abs(rate))
 
 
 def _equal_modes(rates: Array, k: int) -> Ints:
-    """Places of all eigenvalues that equal number k, itself among them."""
+    """Return the numbers of all eigenvalues that equal number k, itself among them."""
     return np.flatnonzero(np.abs(rates - rates[k]) <= EQUAL * np.abs(rates[k]))
 
 
 def _orthogonal_shapes(shape: Array, rate: complex, D: Array) -> Array:
-    """Shapes φ (g, N) of the span of those of one λ, with φ_iᵀ (2 λ + D) φ_j = 0 for i ≠ j."""
+    """Return shapes φ of modes of one eigenvalue λ with φ_iᵀ (2 λ + D) φ_j = 0 for i ≠ j.
+
+    They span the same space as the rows of `shape` (g, N), and follow from Takagi's form V S Vᵀ of
+    the complex symmetric matrix of this bilinear form (Horn, Johnson 2013, section 4.4).
+    """
+    g = len(shape)
     basis = np.linalg.qr(shape.T)[0]
-    form, g = basis.T @ (2 * rate * basis + D @ basis), len(shape)
-    # Takagi's form V S Vᵀ of a complex symmetric matrix (Horn, Johnson 2013, section 4.4)
-    A, B = form.real, form.imag
-    vectors = np.linalg.eigh(np.block([[A, B], [B, -A]]))[1][:, g:]
+    form = basis.T @ (2 * rate * basis + D @ basis)
+    real = form.real
+    imag = form.imag
+    vectors = np.linalg.eigh(np.block([[real, imag], [imag, -real]]))[1][:, g:]
     V = vectors[:g] + 1j * vectors[g:]
     return np.asarray((basis @ V.conj()).T)
 
 
 def _require_uncoupled(coupling: Array, rate: complex) -> None:
-    """Refuse modes of one eigenvalue between which a change of the inputs chooses the shapes."""
+    """Raise UnprovedError where a change of the inputs separates modes of one eigenvalue."""
     if (np.abs(coupling) > EQUAL * np.abs(rate)).any():
         what = f"modes have the same frequency, {np.abs(rate):.4g} rad/s, and the inputs part them"
         raise UnprovedError(what, "take the method auto or improved-graph-follower")
 
 
 def _reciprocal(x: TaylorModel) -> TaylorModel:
-    """Series of 1/x about the middle, entry by entry, without a remainder."""
+    """Return series of 1/x about the midpoint, entry by entry, without a remainder."""
     matrices = x[..., None, None]
-    return solution_series(matrices, x.like(np.ones_like(matrices.value)))[..., 0, 0]
+    ones = x.like(np.ones_like(matrices.value))
+    return solution_series(matrices, ones)[..., 0, 0]
 
 
 def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:
-    """Refuse structures that are not known to lose energy everywhere in the box.
+    """Check that a structure is known to lose energy everywhere in the widest of some boxes.
 
     Raises:
         UnprovedError: A parameter leaves its range, or see `LinearSystem.require_dissipation`.
     """
-    lowest = {**system.parameters, **dict(zip(boxes.names, boxes.lower[0].tolist(), strict=True))}
+    lowest = dict(system.parameters)
     for name, low, high in zip(boxes.names, boxes.lower[0], boxes.upper[0], strict=True):
-        if not (parameter := system.parameter(name)).admits(low, high):
+        lowest[name] = float(low)
+        parameter = system.parameter(name)
+        if not parameter.admits(low, high):
             what = f"{name} reaches from {low:g} to {high:g}"
             raise UnprovedError(f"{what}, and is known to be {parameter.range or 'finite'}")
     system.require_dissipation(lowest)

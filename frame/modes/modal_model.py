@@ -1,14 +1,16 @@
-"""Motion over a box from polynomials λ_k(p), C_k(p), the intervening variables of section 7.
+"""Response over a box from polynomials λ_k(p), C_k(p), the intervening variables of section 7.
 
 Displacements oscillate in the inputs, the more the later; λ_k and C_k do not. Every value and
-derivative follows from q(t; p) = 2 Re Σ_k C_k(p) w(t; λ_k(p)), w = exp(λ t) of the free motion, and
-the response R(t; λ) = ∫ exp(λ (t − s)) a(s) ds to a load.
+derivative follows from q(t; p) = 2 Re Σ_k C_k(p) w(t; λ_k(p)), with the wave w = exp(λ t) for the
+free response, and w = R(t; λ) = ∫ exp(λ (t − s)) a(s) ds for that to a load. The free response and
+the response to each load are the parts of the model.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,46 +29,53 @@ from alphacut.frame.structures.linear import histories
 from alphacut.frame.structures.loads import distinct_histories
 
 
+class OutputJets(NamedTuple):
+    """An output at N points, with derivatives by d unit coordinates."""
+
+    value: Array  # (N,)
+    gradient: Array  # (N, d)
+    hessian: Array  # (N, d, d)
+
+
 @dataclass(frozen=True, eq=False)
 class ModalModel:
-    """Trajectories over the unit box from polynomials in the parameters."""
+    """Outputs over the unit box from polynomials of n modes in the d inputs; m outputs."""
 
-    flow: LinearFlow  # the motion that it stands for
+    flow: LinearFlow  # the structure's exact response, which it approximates
     boxes: Boxes  # the inputs' boxes
     structure: DampedStructure  # the structure over the widest of them
     modes: DampedModes  # its modes
     eigenvalue: TaylorModel  # λ_k, polynomials without remainders, (n,), in 1/s
-    coefficient: TaylorModel  # C_k of the free motion, the same, (n, m)
+    coefficient: TaylorModel  # C_k of the free response, the same, (n, m)
     loads: tuple[LoadTables, ...]  # responses to the loads, and what these add to outputs at once
 
     @classmethod
     def from_modes(
         cls, flow: LinearFlow, boxes: Boxes, structure: DampedStructure, modes: DampedModes
     ) -> ModalModel:
-        """The motion that modes of a structure have."""
-        shares = modes.outputs(structure).polynomial
-        free, *forced = (shares[s] for s in range(shares.shape[0]))
-        courses = histories(flow.system).values()
+        """Return the model with the response that modes of a structure have."""
+        coefficients = modes.outputs(structure).polynomial  # (sources, n, m)
         loads = [
-            LoadTables(history, flow.time, modes.rate, share)
-            for history, share in zip(courses, forced, strict=True)
+            LoadTables(history, flow.time, modes.eigenvalue, coefficients[k])
+            for k, history in enumerate(histories(flow.system).values(), start=1)
         ]
-        if structure.feeds is not None:  # 2 Re C_1 a(t) with half of it as C_1
-            first = np.zeros((shares.shape[1], 1))
-            first[0] = 0.5
+        if structure.feeds is not None:
+            # The wave of the first mode is the load a(t) then, so that 2 Re C_1 a(t) is the
+            # feedthrough with half of it as C_1.
+            half_of_first = np.zeros((coefficients.shape[1], 1))
+            half_of_first[0] = 0.5
             for h, history in enumerate(distinct_histories(flow.system.loads)):
-                share = (structure.feeds[:, h] * first).polynomial
-                loads.append(Direct(history, flow.time, modes.rate, share))
-        return cls(flow, boxes, structure, modes, modes.rate, free, tuple(loads))
+                feedthrough = (structure.feeds[:, h] * half_of_first).polynomial
+                loads.append(Direct(history, flow.time, modes.eigenvalue, feedthrough))
+        return cls(flow, boxes, structure, modes, modes.eigenvalue, coefficients[0], tuple(loads))
 
     @classmethod
     def of_degree(
-        cls, flow: LinearFlow, boxes: Boxes, degree: int, allowed: Array | float = 0.0
+        cls, flow: LinearFlow, boxes: Boxes, degree: int, tolerance: Array | float = 0.0
     ) -> ModalModel:
-        """The motion by polynomials of a degree.
+        """Return the model by polynomials of a degree over the widest of the boxes, one a level.
 
-        They are for the widest of the boxes, one a level. Modes are left out that are worth no more
-        than `allowed` in each output, shape (m,).
+        Modes are left out that are worth no more than `tolerance` in each output, shape (m,).
 
         Raises:
             UnprovedError: The integrator is not the exact one, the structure is not known to have a
@@ -75,8 +84,8 @@ class ModalModel:
         """
         require_dissipation(exact_flow(flow).system, boxes)
         structure = DampedStructure.over_box(flow.system, boxes, degree)
-        courses = [*histories(flow.system).values()]
-        chosen = needed_modes(structure, courses, flow.time, allowed)
+        loads = list(histories(flow.system).values())
+        chosen = needed_modes(structure, loads, flow.time, tolerance)
         return cls.from_modes(flow, boxes, structure, DampedModes.of_structure(structure, chosen))
 
     @property
@@ -90,102 +99,135 @@ class ModalModel:
         return len(self.eigenvalue.parts) - 1
 
     def in_units(self, scale: Array) -> ModalModel:
-        """Model with every output divided by its scale (m,)."""
+        """Return the model with every output divided by its scale (m,)."""
         loads = tuple(replace(load, share=load.share * (1 / scale)) for load in self.loads)
         return replace(self, coefficient=self.coefficient * (1 / scale), loads=loads)
 
     @cached_property
-    def started(self) -> bool:
-        """Whether the model has a free motion: an initial state, or no load at all."""
+    def has_free_response(self) -> bool:
+        """Whether there is a free response: an initial state, or no load at all."""
         return not self.loads or bool(self.coefficient.coefficients.any())
 
     @property
-    def shares(self) -> list[TaylorModel]:
-        """C_k of the free motion (if any) and of each load, shape (n, m) each."""
-        return [self.coefficient] * self.started + [load.share for load in self.loads]
+    def coefficients(self) -> list[TaylorModel]:
+        """C_k of each part, shape (n, m): of the free response, if there is one, then of loads."""
+        of_loads = [load.share for load in self.loads]
+        return [self.coefficient, *of_loads] if self.has_free_response else of_loads
 
     @cached_property
     def together(self) -> TaylorModel:
-        """Polynomials λ_k, n, then C_k of each part, n m."""
-        return concatenate([self.eigenvalue, *(share.reshaped(-1) for share in self.shares)], -1)
+        """Polynomials λ_k, n of them, then C_k of each part, n m."""
+        flat = [coefficient.reshaped(-1) for coefficient in self.coefficients]
+        return concatenate([self.eigenvalue, *flat], -1)
 
     @cached_property
-    def of_output(self) -> list[TaylorModel]:
-        """For each output λ_k, n, then C_k of each part, n."""
-        outputs = range(len(self.flow.outputs))
-        return [
-            concatenate([self.eigenvalue, *(x[:, o] for x in self.shares)], -1) for o in outputs
-        ]
+    def by_output(self) -> list[TaylorModel]:
+        """For each output the polynomials λ_k, n of them, then C_k of each part, n."""
+        models = []
+        for o in range(len(self.flow.outputs)):
+            of_output = [coefficient[:, o] for coefficient in self.coefficients]
+            models.append(concatenate([self.eigenvalue, *of_output], -1))
+        return models
 
     def values(self, unit: Array) -> Array:
-        """Outputs at all nodes for unit coordinates (S, d), shape (S, T, m).
+        """Return outputs at all nodes for unit coordinates (S, d), shape (S, T, m).
 
-        They are 2 Re Σ_k C_k w(t; λ_k) over the free motion and each load.
+        They are 2 Re Σ_k C_k w(t; λ_k) over all parts.
         """
-        n, time = self.count, self.flow.time
-        variables = self.together.at(unit)
-        rate = variables[:, :n]
-        waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
-        waves += [load.at_nodes(rate) for load in self.loads]
-        C = variables[:, n:].reshape(len(unit), len(waves) * n, -1)
-        w = np.concatenate(waves, -1)
+        n = self.count
+        polynomials = self.together.at(unit)
+        eigenvalues = polynomials[:, :n]
+        waves = []  # of each part, (S, T, n)
+        if self.has_free_response:
+            waves.append(np.exp(eigenvalues[:, np.newaxis] * self.flow.time[:, np.newaxis]))
+        waves += [load.at_nodes(eigenvalues) for load in self.loads]
+        C = polynomials[:, n:].reshape(len(unit), len(waves) * n, -1)
+        w = np.concatenate(waves, axis=-1)
         return np.asarray(2 * (w.real @ C.real - w.imag @ C.imag))
 
-    def at(self, unit: Array, node: Ints, output: Ints) -> tuple[Array, Array, Array]:
-        """One output at one node for each of N points, with derivatives by unit coordinates.
+    def at(self, unit: Array, node: Ints, output: Ints) -> OutputJets:
+        """Return one output at one node for each of N points.
 
-        Points have unit coordinates (N, d); the index of each one's node and output is given.
-        Returns values (N,), gradients (N, d) and Hessians (N, d, d), in the output's unit.
+        Args:
+            unit: Unit coordinates of the points, shape (N, d).
+            node: Number of the node of each point, shape (N,).
+            output: Number of the output of each point, shape (N,).
         """
-        n, d = self.count, unit.shape[1]
+        n = self.count
+        d = unit.shape[1]
         row, column = np.triu_indices(d)
-        derivatives = np.zeros((len(unit), 1 + d + len(row)))  # value, gradient, upper triangle
+        jets = np.zeros((len(unit), 1 + d + len(row)))  # value, gradient, packed Hessian
         for o in np.unique(output):
-            rows = np.flatnonzero(output == o)
-            jets = self.of_output[o].jets(unit[rows]).swapaxes(0, 1)
-            rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, 1)
-            waves = self.waves(rate[0], node[rows])
-            derivatives[rows] = (waves[:, None] @ wave_factors(rate, share, d)[:, 0])[:, 0]
-        H = np.empty((len(unit), d, d))
-        H[:, row, column] = H[:, column, row] = derivatives[:, 1 + d :]
-        return derivatives[:, 0], derivatives[:, 1 : 1 + d], H
+            points = np.flatnonzero(output == o)
+            polynomials = self.by_output[o].jets(unit[points]).swapaxes(0, 1)
+            eigenvalues = polynomials[..., :n]
+            coefficients = polynomials[..., n:].reshape(*polynomials.shape[:2], -1, n, 1)
+            factors = wave_factors(eigenvalues, coefficients, d)[:, 0]
+            waves = self.waves(eigenvalues[0], node[points])
+            jets[points] = (waves[:, np.newaxis] @ factors)[:, 0]
+        hessian = np.empty((len(unit), d, d))
+        hessian[:, row, column] = jets[:, 1 + d :]
+        hessian[:, column, row] = jets[:, 1 + d :]
+        return OutputJets(jets[:, 0], jets[:, 1 : 1 + d], hessian)
 
-    def waves(self, rate: Array, node: Ints) -> Array:
-        """Time functions w(t; λ_k) of the free motion (if any), then of each load, (N, 6 P n).
+    def waves(self, eigenvalues: Array, node: Ints) -> Array:
+        """Return the waves w(t; λ_k) of all parts with two derivatives by λ, at N points.
 
-        They are w, dw/dλ and d²w/dλ² of P parts and n modes, real and imaginary parts, in the order
-        of `wave_factors`, at eigenvalues λ_k (N, n) and nodes (N,).
+        Args:
+            eigenvalues: λ_k, shape (N, n).
+            node: Number of the node of each point, shape (N,).
+
+        Returns:
+            Shape (N, 6 parts n), in the order of `wave_factors`.
         """
         parts = list[Array]()
-        if self.started:
-            t = self.flow.time[node][:, None]
-            wave = np.exp(rate * t)
+        if self.has_free_response:
+            t = self.flow.time[node][:, np.newaxis]
+            wave = np.exp(eigenvalues * t)
             parts.append(np.stack([wave, t * wave, t * t * wave]))
-        parts += [load.response(rate, node) for load in self.loads]
-        waves = np.moveaxis(np.stack(parts), 2, 0)
-        return in_planes(waves).reshape(len(rate), -1)
+        parts += [load.response(eigenvalues, node) for load in self.loads]
+        waves = np.moveaxis(np.stack(parts), 2, 0)  # (N, parts, 3, n)
+        return _real_and_imaginary(waves).reshape(len(eigenvalues), -1)
 
 
-def wave_factors(rate: Array, C: Array, d: int) -> Array:
-    """Factors of the waves w, w′, w″ in outputs, their gradients and Hessians at B points.
+def wave_factors(eigenvalues: Array, C: Array, d: int) -> Array:
+    """Return the factors of the waves in 2 Re Σ_k C_k w(λ_k) and its first two derivatives.
 
-    Of 2 Re Σ_k C_k w(λ_k), λ (q, B, n) and C (q, B, P, n, m) with derivatives: (B, m, 6 P n, q),
-    the third axis over parts, orders of w's derivative, modes, and real and imaginary parts.
+    By the chain rule, with w′ = dw/dλ and derivatives by the inputs u_i as indices,
+
+        (C w)_i = C_i w + C λ_i w′,
+        (C w)_ij = C_ij w + (C_i λ_j + C_j λ_i + C λ_ij) w′ + C λ_i λ_j w″.
+
+    Args:
+        eigenvalues: λ_k with first and second derivatives by d inputs at B points, shape (q, B, n)
+            with q = 1 + d + d (d + 1)/2: value, gradient, packed Hessian.
+        C: C_k of all parts, the same, shape (q, B, parts, n, m).
+        d: Number of inputs.
+
+    Returns:
+        Shape (B, m, 6 parts n, q). The third axis runs over parts, orders of the derivative of w,
+        modes, and real and imaginary parts.
     """
-    rate = rate[..., None, :, None]
-    out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
-    out[:, :, 0] = np.moveaxis(C, 0, -1)
-    for k in range(1, 1 + d):
-        out[:, :, 1, ..., k] = C[0] * rate[k]
-    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
-        x, y = rate[1 + i], rate[1 + j]
-        out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
-        out[:, :, 2, ..., a] = C[0] * x * y
-    doubled = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
-    flat = doubled.reshape(len(out), -1, *out.shape[-2:])
+    rate = eigenvalues[..., np.newaxis, :, np.newaxis]
+    _, points, parts, n, m = C.shape
+    factors = np.zeros((points, parts, 3, n, m, len(C)), complex)
+    of_wave = factors[:, :, 0]
+    of_first_derivative = factors[:, :, 1]
+    of_second_derivative = factors[:, :, 2]
+    of_wave[:] = np.moveaxis(C, 0, -1)
+    for a in range(1, 1 + d):
+        of_first_derivative[..., a] = C[0] * rate[a]
+    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), start=1 + d):
+        rate_i = rate[1 + i]
+        rate_j = rate[1 + j]
+        of_first_derivative[..., a] = C[1 + i] * rate_j + C[1 + j] * rate_i + C[0] * rate[a]
+        of_second_derivative[..., a] = C[0] * rate_i * rate_j
+    # 2 Re (z w) = 2 Re z Re w − 2 Im z Im w
+    doubled = 2 * np.stack([factors.real, -factors.imag], axis=4)
+    flat = doubled.reshape(points, -1, m, len(C))
     return np.ascontiguousarray(flat.swapaxes(1, 2))
 
 
-def in_planes(x: Array) -> Array:
-    """Real and imaginary parts of complex numbers along a new last axis, shape (…, 2)."""
+def _real_and_imaginary(x: Array) -> Array:
+    """Return the real and imaginary parts of complex numbers along a new last axis, (…, 2)."""
     return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

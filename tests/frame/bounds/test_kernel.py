@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.bounds.kernel import examine
+from alphacut.frame.bounds.kernel import BoxTables, Items, RemainderBounds, examine
 
 
 def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
@@ -12,21 +12,18 @@ def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
     About its centre the output is slope · x + bend · x²/2, with a third derivative of at most
     `third` in size, and a slope that is wrong by `slope_error` at most.
     """
-    one_mode = [np.zeros(shape) for shape in ((1, 1, 1, 2), (1, 1, 1), (1, 1), (1, 1))]
-    derivatives = [np.zeros((1, 2, 1)), np.zeros((1, 4, 1, 1))]
     table = np.array([0.0, slope, bend]).reshape(1, 1, 1, 3)
-    margin = np.array([0.0, slope_error]).reshape(1, 1, 2)
-    code, _, _ = examine(
-        (np.array([0, 1]), np.array([0, 1]), np.array([0]), np.array([1])),
-        (np.full((1, 1), radius), np.full((1, 2, 1), is_at_ends), table),
+    found = examine(
+        Items(np.array([0, 1]), np.array([0, 1]), node=np.array([0]), column=np.array([1])),
+        BoxTables(np.full((1, 1), radius), np.full((1, 2, 1), is_at_ends), table),
         np.ones((1, 1)),
-        np.zeros(1),
-        (*one_mode, *derivatives),
-        (np.full((1, 1, 1, 1, 1), third), margin),
+        RemainderBounds(
+            third=np.full((1, 1, 1, 1, 1), third),
+            rounding=np.array([0.0, slope_error]).reshape(1, 1, 2),
+        ),
         np.array([np.inf, target]),
-        False,
     )
-    return code[0]
+    return found.code[0]
 
 
 @pytest.mark.parametrize("part", ["bend", "third", "slope_error"])

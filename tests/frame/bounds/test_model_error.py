@@ -147,7 +147,6 @@ def test_what_is_not_known_is_not_proved() -> None:
         ),
         (CHAIN, {"d": (-0.1, 0.1)}, "feed energy"),
         (replace(CHAIN, ratios=("d",)), {"d": (-0.1, 0.1)}, "known to be 0 or greater and below 1"),
-        (object(), {"m": (1.9, 2.1)}, "nothing is known"),
     ],
 )
 def test_structures_that_may_gain_energy_are_refused(system, box, message) -> None:
