@@ -161,9 +161,10 @@ def checked_number(
     if most < inf:
         allowed += f", up to {most:g}"
     is_allowed = isfinite(number) and least <= number <= most and (number > 0 or not positive)
-    shown = repr(value)
     if isinstance(value, Integral):
         shown = printable(value)  # `repr` fails for thousands of digits
+    else:
+        shown = repr(value)
     require(is_allowed, key, value=shown, allowed=allowed)
     return number
 
