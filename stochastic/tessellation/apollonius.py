@@ -1,4 +1,4 @@
-"""Apollonius diagram of discs with exact cell areas (section 4.1, Fig. 10), direct neighbours.
+"""Apollonius diagram of discs with exact areas of the cells (section 4.1, Fig. 10).
 
 The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
 star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,12 +27,6 @@ from alphacut.stochastic.tessellation.circle_envelope import (
     sector_area,
     upper_envelopes,
 )
-
-LAYER = 8.0  # mean spacings; no circumcircle of a packing is wider
-NEAR = 3.0  # mean spacings from a disc's edge within which discs bound its cell at first
-EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
-"""Directions of the left, right, lower and upper edge."""
-ANGLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +54,19 @@ class Apollonius:
 
     @property
     def reduced_radii(self) -> Array:
-        """r_n = r/a with a = √A/2 (section 4.1), shape (n,)."""
+        """Reduced radii r_n = r/a with a = √A/2 of a cell with the area A (section 4.1), (n,)."""
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     def walls(self, count: int) -> tuple[Array, Array]:
-        """Angle and distance (in m) of `count` points along the wall of each arc, (count, m) each.
+        """Return points along the wall of each arc, in polar coordinates around its cell's centre.
 
-        They are polar coordinates around the centre of the arc's cell, the arc's ends among them.
+        The ends of the arc are among them.
+
+        Args:
+            count: Number of points of each arc.
+
+        Returns:
+            Angles and distances (in m), shape (count, m) each.
         """
         angle = np.asarray(np.linspace(self.start, self.end, count), float)
         near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.offset)
@@ -73,72 +75,130 @@ class Apollonius:
 
 
 def apollonius(discs: Particles) -> Apollonius:
-    """Return the Apollonius diagram of discs, of which none lies inside another one."""
-    # Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of
-    # i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell:
-    # all such discs are then taken into account.
+    """Return the Apollonius diagram of discs, of which none lies inside another one.
+
+    Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of i
+    if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell: all
+    such discs are then taken into account.
+    """
+    # The first cells are bounded by the discs within three mean spacings. With fewer discs first
+    # cells are large, and with more they take longer than they save.
     largest_disc = float(discs.radii.max())
     rho_max = np.zeros(len(discs))
-    for walls in _walls(discs, np.full(len(discs), largest_disc + NEAR * discs.spacing)):
+    for walls in _walls(discs, np.full(len(discs), largest_disc + 3.0 * discs.spacing)):
         rho_max += walls.largest_radius()
-    areas, parts = np.zeros(len(discs)), []
+    areas = np.zeros(len(discs))
+    all_arcs = []
+    all_pairs = []
     for walls in _walls(discs, 2 * rho_max - discs.radii + largest_disc):
         areas += walls.areas()
-        arcs, pairs = walls.arcs, walls.pairs
-        neighbour, offset = pairs.second[arcs.function], pairs.offset[arcs.function]
-        parts.append((arcs.owner, neighbour, offset, arcs.start, arcs.end))
-    cell, neighbour, offset, start, end = map(np.concatenate, zip(*parts, strict=True))
-    return Apollonius(discs, areas, cell, neighbour, offset, start, end)
+        all_arcs.append(walls.arcs)
+        all_pairs.append(walls.pairs.select(walls.arcs.function))
+    arcs = Arcs.joined(all_arcs)
+    return Apollonius(
+        discs=discs,
+        areas=areas,
+        cell=arcs.owner,
+        neighbour=np.concatenate([pairs.second for pairs in all_pairs]),
+        offset=np.concatenate([pairs.offset for pairs in all_pairs]),
+        start=arcs.start,
+        end=arcs.end,
+    )
 
 
 def _near_far(radii: Array, first: Ints, second: Ints, offset: Array) -> tuple[Array, Array]:
-    """D + Δ and d − Δ of pairs: d distance of the centres, Δ = r_first − r_second, 0 at an edge."""
+    """Return d + Δ and d − Δ of pairs of discs, the parameters near and far of their walls.
+
+    d is the distance of the centres, and Δ = r_first − r_second, which is 0 at an edge.
+
+    Args:
+        radii: Radii of all discs, in m, shape (n,).
+        first: Index of the first disc of each pair, shape (m,).
+        second: Index of the second disc; −1 for an edge.
+        offset: Vector between the centres, in m, shape (m, 2).
+    """
     distance = np.hypot(offset[:, 0], offset[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
     return distance + difference, distance - difference
 
 
+class _ArcEnds(NamedTuple):
+    """Hyperbolic anomalies at the ends of arcs, and the parameters of their walls, (m,) each."""
+
+    start: Array
+    end: Array
+    near: Array
+    far: Array
+
+
 @dataclass(frozen=True, eq=False)
 class _Walls:
-    """Walls of discs towards their neighbours, `pairs`, and the arcs of them that bound cells."""
+    """Walls of discs towards their neighbours.
+
+    Args:
+        discs: All discs.
+        pairs: The walls, each from a disc to a neighbour.
+        arcs: Arcs of walls that bound cells; their functions are indices of `pairs`.
+    """
 
     discs: Particles
     pairs: Pairs
     arcs: Arcs
 
-    def _anomalies(self) -> tuple[Array, Array, Array, Array]:
-        """Hyperbolic anomalies at start and end of each arc, and its d + Δ and d − Δ, (m,) each."""
-        arcs, pairs = self.arcs, self.pairs.select(self.arcs.function)
+    def _arc_ends(self) -> _ArcEnds:
+        """Return the anomalies at the ends of all arcs."""
+        pairs = self.pairs.select(self.arcs.function)
         near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = np.arctan2(pairs.offset[:, 1], pairs.offset[:, 0])
-        start, end = (anomaly(angle - direction, near, far) for angle in (arcs.start, arcs.end))
-        return start, end, near, far
+        return _ArcEnds(
+            start=anomaly(self.arcs.start - direction, near, far),
+            end=anomaly(self.arcs.end - direction, near, far),
+            near=near,
+            far=far,
+        )
 
     def areas(self) -> Array:
-        """Cell areas, shape (n,)."""
-        sectors = sector_area(*self._anomalies())
+        """Return the areas of the cells, in m², shape (n,); 0 for discs without walls here."""
+        ends = self._arc_ends()
+        sectors = sector_area(ends.start, ends.end, ends.near, ends.far)
         return np.asarray(np.bincount(self.arcs.owner, sectors, len(self.discs)), float)
 
     def largest_radius(self) -> Array:
-        """Upper bound of the distance from each centre to its cell's boundary, shape (n,), in m."""
-        # farthest at a corner; of its two walls that with the smaller anomaly s there gives the
-        # distance (d cosh s + Δ)/2; a per mille is added for round-off
-        start, end, near, far = self._anomalies()
+        """Return an upper bound of the distance from each centre to its cell's boundary.
+
+        The boundary is farthest at a corner. The distance there is (d cosh s + Δ)/2, s the anomaly
+        on either of the two walls that meet; the wall with the smaller |s| gives it with the
+        smaller rounding. A per mille is added for rounding.
+
+        Returns:
+            Distances in m, shape (n,); 0 for discs without walls here.
+        """
+        # Of each arc, the next one of the same cell; after the last one comes the first.
+        ends = self._arc_ends()
         owner = self.arcs.owner
         following = np.append(np.arange(1, len(owner)), 0)
-        last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))  # arc of each cell
-        following[last] = np.concatenate([[0], last[:-1] + 1])[: len(last)]
-        use_following = np.abs(start[following]) < np.abs(end)
+        last = np.flatnonzero(np.append(owner[1:] != owner[:-1], True))
+        first = np.append(0, last[:-1] + 1)
+        following[last] = first[: len(last)]
+
+        use_following = np.abs(ends.start[following]) < np.abs(ends.end)
         wall = np.where(use_following, following, np.arange(len(owner)))
-        s = np.where(use_following, start[following], end)
-        radius = (near[wall] + far[wall]) / 4 * np.cosh(s) + (near[wall] - far[wall]) / 4
+        s = np.where(use_following, ends.start[following], ends.end)
+        near = ends.near[wall]
+        far = ends.far[wall]
+        radius = (near + far) / 4 * np.cosh(s) + (near - far) / 4
         largest = np.zeros(len(self.discs))
         np.maximum.at(largest, owner, 1.001 * radius)
         return largest
 
 
 def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
-    """Yield the walls of portions of the discs towards all neighbours within `reach` (n,), in m."""
+    """Yield the walls of portions of the discs towards all neighbours within reach.
+
+    Args:
+        discs: The discs.
+        reach: Largest distance of a neighbour's centre for each disc, in m, shape (n,).
+    """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
         walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
@@ -151,22 +211,30 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
 
 
 def _bounding_pairs(discs: Particles, portion: Ints) -> Pairs:
-    """Pairs that bound every cell: own images, or in a window mirror images (`second` is −1)."""
+    """Return pairs that bound the cells of some discs, whatever their neighbours.
+
+    These are pairs with their own eight images next to them, or in a window with their mirror
+    images beyond the four edges, of which `second` is −1.
+    """
     if discs.periodic:
-        shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
-        owner = np.repeat(portion, 8)
-        return Pairs(owner, owner, np.tile(shifts, (len(portion), 1)))
-    # off the edge, so that there is a mirror image
+        tiles = [tile for tile in product((-1, 0, 1), repeat=2) if any(tile)]
+        owner = np.repeat(portion, len(tiles))
+        offset = np.tile(np.array(tiles) * discs.size, (len(portion), 1))
+        return Pairs(owner, owner, offset)
+    # A centre on an edge is moved off it, so that there is a mirror image.
     centres = np.clip(discs.centres[portion], 1e-15 * discs.size, (1 - 1e-15) * discs.size)
-    (x, y), (width, height) = centres.T, discs.size
-    offset = np.zeros((len(portion), 4, 2))  # to the left, right, lower and upper mirror image
-    offset[:, 0, 0], offset[:, 1, 0] = -2 * x, 2 * (width - x)
-    offset[:, 2, 1], offset[:, 3, 1] = -2 * y, 2 * (height - y)
-    return Pairs(np.repeat(portion, 4), np.full(4 * len(portion), -1), offset.reshape(-1, 2))
+    to_far_edges = discs.size - centres
+    offset = np.zeros((len(portion), 4, 2))
+    offset[:, 0, 0] = -2 * centres[:, 0]  # to the left
+    offset[:, 1, 0] = 2 * to_far_edges[:, 0]  # right
+    offset[:, 2, 1] = -2 * centres[:, 1]  # lower
+    offset[:, 3, 1] = 2 * to_far_edges[:, 1]  # upper mirror image
+    no_disc = np.full(4 * len(portion), -1)
+    return Pairs(np.repeat(portion, 4), no_disc, offset.reshape(-1, 2))
 
 
 def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
-    """Cells that no disc outside the window can change, and the number that each stands for.
+    """Return the cells that no disc outside the window can change, and how many each stands for.
 
     Large cells are changed more often than small ones; each counted cell therefore stands for 1/p
     cells, p the fraction of positions in the window where an equal cell would count (Miles 1974,
@@ -179,35 +247,48 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     Raises:
         RefusedError: There is no such cell.
     """
+    discs = diagram.discs
+    if discs.periodic:
+        return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
+
     # A disc beyond the window's edge, no larger than the largest one seen, cannot reach deeper into
     # the window than that one's radius. If all beyond the edge were one such disc, the wall towards
     # it would be a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge
     # less the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all
-    # four edges
-    discs = diagram.discs
-    if discs.periodic:
-        return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
+    # four edges.
     reach = _reach(diagram)
-    inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
-    edge_distance = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)  # D of the four edges
+    largest_radius = discs.radii.max()
+    inner = discs.size - 2 * largest_radius
+    place = discs.centres - largest_radius
+    to_upper = inner - place
+    columns = [place[:, 0], to_upper[:, 0], place[:, 1], to_upper[:, 1]]
+    edge_distance = np.stack(columns, axis=1)  # D of the four edges
     is_cut = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
     disc = np.flatnonzero((reach <= edge_distance).all(axis=1) & ~is_cut)
-    value, allowed = discs.size.tolist(), "windows in which the edge leaves a cell whole"
-    require(len(disc) > 0, "size", value=value, allowed=allowed, cure="take a larger section")
-    extent = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # of each cell, across and along
+    value = discs.size.tolist()
+    allowed = "windows in which the edge leaves a cell whole"
+    require(len(disc) > 0, "size", value, allowed=allowed, cure="take a larger section")
+
+    # An equal cell counts where its reach to both sides, across and along, stays inside.
+    extent = reach[disc].reshape(-1, 2, 2).sum(axis=2)
     return disc, discs.measure / (inner - extent).prod(axis=1)
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """How far empty circles on each cell's boundary extend towards each edge, (n, 4), in m."""
-    # from the disc's centre; ∞ for a cell that is not closed, of which some ρ is negative. The
-    # circle about a boundary point at the distance ρ touches the disc of radius r and a neighbour:
-    # its radius is ρ − r, and it extends by ρ cos ψ + ρ − r, ψ the angle from the edge's direction.
-    # The maximum over `ANGLES` points of each arc has an error of second order
-    angle, rho = diagram.walls(ANGLES)
+    """Return how far empty circles on each cell's boundary extend towards each edge.
+
+    The circle about a boundary point at the distance ρ touches the disc of radius r and a
+    neighbour: its radius is ρ − r, and it extends by ρ cos ψ + ρ − r, ψ the angle from the edge's
+    direction. The maximum over 33 points of each arc has an error of second order.
+
+    Returns:
+        Extents from the disc's centre towards the left, right, lower and upper edge, in m, shape
+        (n, 4); ∞ for a cell that is not closed, of which some ρ is negative.
+    """
+    angle, rho = diagram.walls(33)
     is_bounded = rho.min(axis=0) > 0
     reach = np.full((len(diagram.discs), 4), -np.inf)
-    for edge, direction in enumerate(EDGES):
+    for edge, direction in enumerate((np.pi, 0.0, -np.pi / 2, np.pi / 2)):
         arc_reach = (rho * (1 + np.cos(angle - direction))).max(axis=0)
         np.maximum.at(reach[:, edge], diagram.cell, np.where(is_bounded, arc_reach, np.inf))
     return reach - diagram.discs.radii[:, None]
@@ -234,32 +315,44 @@ class Neighbours:
 
 
 def neighbours(discs: Particles) -> Neighbours:
-    """Delaunay neighbours of the disc centres; in a window, those on the hull are not counted."""
-    # a periodic section is triangulated with a layer of images: its triangles are those of the
-    # plane if no circumcircle is wider, as in any packing
+    """Return the Delaunay neighbours of the disc centres.
+
+    In a window the centres on the convex hull are not counted. A periodic section is triangulated
+    with a layer of images, eight mean spacings wide: its triangles are those of the plane if no
+    circumcircle is wider, as in any packing. Fewer than three centres, or centres in one line, have
+    no neighbours.
+    """
     from scipy.spatial import Delaunay, QhullError
 
     tiles = (0, 1, -1) if discs.periodic else (0,)
-    layer = LAYER * discs.spacing
-    points = np.concatenate([discs.centres + discs.size * (i, j) for i in tiles for j in tiles])
+    layer = 8.0 * discs.spacing
+    images = [discs.centres + discs.size * tile for tile in product(tiles, repeat=2)]
+    points = np.concatenate(images)
     is_near = np.asarray(((points > -layer) & (points < discs.size + layer)).all(axis=1))
     is_near[: len(discs)] = True
     points = points[is_near]
     try:
         triangulation = Delaunay(points)
-    except QhullError:  # fewer than three, or all in one line
+    except QhullError:
         return Neighbours(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)))
     is_counted = np.arange(len(points)) < len(discs)  # no images
     is_counted[triangulation.convex_hull] = False
     start, second = triangulation.vertex_neighbor_vertices
     first = np.repeat(np.arange(len(points)), np.diff(start))
-    first, second = first[is_counted[first]], second[is_counted[first]]
+    is_from_counted = is_counted[first]
+    first = first[is_from_counted]
+    second = second[is_from_counted]
     number = np.bincount(first, minlength=len(points))[is_counted]
     return Neighbours(number, first, points[second] - points[first])
 
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
-    """Return pairs of `values` of cells that share a wall, in both orders, shape (2, m)."""
+    """Return pairs of values of cells that share a wall, in both orders, shape (2, m).
+
+    Args:
+        diagram: The cells.
+        values: A value of each cell, shape (n,).
+    """
     once = diagram.neighbour > diagram.cell
     pair = np.unique(np.stack([diagram.cell[once], diagram.neighbour[once]]), axis=1)
     return np.concatenate([values[pair], values[pair[::-1]]], axis=1)
