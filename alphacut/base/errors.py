@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 from os import PathLike
@@ -61,6 +61,20 @@ def fit_message(
     excess = max(len(compose(value, allowed)) - room, 0)
     allowed = printable(allowed, max(min_shown, len(allowed) - excess))
     return printable(compose(value, allowed), room) + end
+
+
+def cure_of(text: str, cures: Mapping[str, str], default: str = "") -> str:
+    """Return the cure of the first regular expression that is found in a text.
+
+    Args:
+        text: The text that is refused.
+        cures: Cures by their regular expressions, in the order in which they are tried.
+        default: Cure of a text in which none is found.
+    """
+    for pattern, cure in cures.items():
+        if re.search(pattern, text):
+            return cure
+    return default
 
 
 class RefusedError(ValueError):

@@ -14,9 +14,10 @@ from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
 
+from alphacut.base.errors import cure_of
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity_cures import CONFUSED_PREFIXES, number_cure, unit_cure
+from alphacut.io.quantity_cures import CONFUSED_PREFIXES, NUMBER_CURES, unit_cure
 
 if TYPE_CHECKING:
     import pint
@@ -91,7 +92,8 @@ UNITS_HERE = {
 """Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
 REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
 """Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds."""
-MIN_MAGNITUDE, MAX_MAGNITUDE = 1e-36, 1e18
+MIN_MAGNITUDE = 1e-36
+MAX_MAGNITUDE = 1e18
 """Magnitudes in SI beyond which a quantity other than 0 is a mistake."""
 NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
@@ -195,11 +197,12 @@ def _parse_decimal(text: str, si: str) -> Decimal:
     """
     text = text.strip()
     match = re.fullmatch(rf"({NUMBER})\s*(.*)", text)
-    cure = number_cure(text)
+    cure = cure_of(text, NUMBER_CURES)
     if match is None or match[2].startswith((",", "_")):
         what = f'"{text}" does not begin with a number such as 1.5'
         raise ValueError(f"{what}; {cure}" if cure else what)
-    digits, unit = match[1], match[2].strip()
+    digits = match[1]
+    unit = match[2].strip()
     if cure and re.match(r"[^A-Za-z°%‰µμ(/[]", unit):
         raise ValueError(f'"{text}" is no number with a unit; {cure}')
 

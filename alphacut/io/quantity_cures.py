@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
 
+from alphacut.base.errors import cure_of
+
 NUMBER_CURES = {
     r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
     r"^[-+\d.]+\s*,\s+[-+\d.]": "several values stand in brackets, as [19, 20, 21] t",
@@ -24,11 +26,11 @@ NUMBER_CURES = {
 }
 """Cure by a pattern in the text of a quantity; the first that fits holds."""
 UNIT_CURES = {
-    r"(?i)\b(?:us |short |long |metric )?tons?\b|to": "write t (1000 kg), short_ton or long_ton",
-    r"(?i)per ?cent|pct\.?|perc\.?|prozent": "write %",
-    r"(?i)‰|per ?mille": "write 0.1 % in place of 1 ‰",
-    r"[\"”″]": "write in for inches",
-    r"['’′]": "write ft for feet",
+    r"(?i)^(?:(?:us |short |long |metric )?tons?|to)$": "write t (1000 kg), short_ton or long_ton",
+    r"(?i)^(?:per ?cent|pct\.?|perc\.?|prozent)$": "write %",
+    r"(?i)^(?:‰|per ?mille)$": "write 0.1 % in place of 1 ‰",
+    r"^[\"”″]$": "write in for inches",
+    r"^['’′]$": "write ft for feet",
 }
 """Cure by a pattern in a unit that is not understood."""
 CONFUSED_PREFIXES = {
@@ -83,14 +85,6 @@ UNIT_NAMES = {
 }  # fmt: skip
 
 
-def number_cure(text: str) -> str:
-    """Return what to write in place of a quantity without a plain number; empty if unknown."""
-    for pattern, cure in NUMBER_CURES.items():
-        if re.search(pattern, text):
-            return cure
-    return ""
-
-
 def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
     """Return what to write in place of a unit that is none of a dimension; empty if unknown.
 
@@ -100,9 +94,8 @@ def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterabl
         fits: Function that tells whether a spelling is a unit of the dimension.
         known: Common units of the dimension.
     """
-    for pattern, cure in UNIT_CURES.items():
-        if re.fullmatch(pattern, unit.strip()):
-            return cure
+    if cure := cure_of(unit.strip(), UNIT_CURES):
+        return cure
     for spelling in _spellings(unit):
         if spelling != unit and fits(spelling):
             return f"did you mean {spelling}?"

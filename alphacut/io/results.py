@@ -93,7 +93,8 @@ class ResultsFolder:
         if not isinstance(document, dict):
             return cls(path, is_damaged=True)
         version = document.get("format_version")
-        value, allowed = f"of format {version}", f"files of format {FORMAT}"
+        value = f"of format {version}"
+        allowed = f"files of format {FORMAT}"
         cure = "name another folder" if version is None else RUN_AGAIN
         require(version == FORMAT, str(file), value, allowed, cure=cure)
         files = document.get("files")
@@ -112,7 +113,8 @@ class ResultsFolder:
             option: Option that names the folder, for the message.
         """
         is_own = os.path.lexists(self.path / MANIFEST) or not any(self.path.glob("[!.]*"))
-        allowed, cure = "an empty folder, or one of results", "name another folder"
+        allowed = "an empty folder, or one of results"
+        cure = "name another folder"
         require(is_own, option, f"{self.path}, with other files", allowed, cure)
 
     def made_from(self, source: str) -> tuple[str, ...]:

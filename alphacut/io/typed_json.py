@@ -92,7 +92,8 @@ def _read(kind: Any, document: Any, path: str) -> Any:
 
 def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
     """Return the value of a kind with arguments, such as ``dict[str, float]`` or a union."""
-    origin, arguments = get_origin(kind), get_args(kind)
+    origin = get_origin(kind)
+    arguments = get_args(kind)
     if origin is Annotated:
         value = _read(arguments[0], document, path)
         for check in arguments[1:]:

@@ -110,7 +110,9 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     """
     match = DATA.fullmatch(file.lines[channel.line])
     assert match is not None
-    count, duration, width = int(match[1]), float(match[2]), int(match[5])
+    count = int(match[1])
+    duration = float(match[2])
+    width = int(match[5])
     unit = match[3].rstrip(".")
     header = _real_header(file, channel.reals)
     first = channel.line + 1
@@ -120,7 +122,8 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
         first, count=count, per_line=per_line, width=width, head=channel.line
     )
     stated = []
-    peak, to_si = float(header[63]), acceleration_factor(unit)
+    peak = float(header[63])
+    to_si = acceleration_factor(unit)
     if peak != -999 and to_si is not None:  # -999 stands for an entry that is not known
         stated.append(StatedPeak(to_si * abs(peak)))
     step = _cosmos_step(file, channel.reals, header, count=count, duration=duration)
@@ -146,7 +149,8 @@ def _real_header(file: TextFile, line: int) -> Array:
     """
     match = REALS.fullmatch(file.lines[line]) if line >= 0 else None
     if match is None:
-        allowed, cure = HEADER_WORDS, "load the file anew"
+        allowed = HEADER_WORDS
+        cure = "load the file anew"
         raise file.refusal(max(line, 0), "without a real header", allowed, cure)
     values = file.numbers(line + 1, line + 1 + int(match[2]), width=int(match[4]))
     return np.append(values, np.zeros(64))
@@ -158,7 +162,8 @@ def _cosmos_step(file: TextFile, line: int, header: Array, *, count: int, durati
     Raises:
         RefusedError: None does.
     """
-    processed, raw = float(header[61]), float(header[33])
+    processed = float(header[61])
+    raw = float(header[33])
     for step in (processed / 1000, raw, raw / 1000):
         # The stated duration is rounded or cut to seconds.
         if step > 0 and abs(count * step - duration) <= 1.5 + 0.01 * duration:
@@ -249,7 +254,8 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
         step = duration / (count - 1)
     else:
         pairs = file.fixed_columns(line, count=2 * count, per_line=10, width=7, head=line - 1)
-        samples, steps = pairs[1::2], np.diff(pairs[::2])
+        samples = pairs[1::2]
+        steps = np.diff(pairs[::2])
         step = float(steps.mean())
         if np.ptp(steps) > 0.1 * step or not step > 0:
             raise file.refusal(line, "uneven times", "even steps", "resample to even steps")

@@ -20,7 +20,8 @@ from alphacut.frame.records.text_file import TextFile, choose_channel, recording
 MARK = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*\bGNS\b", re.IGNORECASE)
 """First line of a component."""
 TEXT_LINES = 16
-PER_LINE, WIDTH = 10, 8
+PER_LINE = 10
+WIDTH = 8
 """Numbers in a line, and characters of each."""
 
 
@@ -60,10 +61,11 @@ class _Component:
         if len(counts) < 3 or counts[0] < 2 or min(counts) < 0:
             allowed = "40 integers, of which 34 to 36 count samples"
             raise file.refusal(first, f"counts of {counts}", allowed, "load the file anew")
-        words = re.search(r"Component\s+(\S+)", " ".join(file.lines[start:first]))
+        text = " ".join(file.lines[start:first])
+        names = [*re.findall(r"Component\s+(\S+)", text), ""]
         samples = first + 10  # behind 4 lines of integers and 6 of reals
         end = samples + sum(ceil(count / PER_LINE) for count in counts)
-        return cls(start, samples, end, counts[0], words[1].lower() if words else "")
+        return cls(start, samples, end, counts[0], names[0].lower())
 
 
 def read_geonet(file: TextFile, channel: str = "") -> Recording:
@@ -80,7 +82,7 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
     components = [*_components(file)]
     names = []
     for number, component in enumerate(components, 1):
-        names.append((str(number), component.name) if component.name else (str(number),))
+        names.append(tuple(filter(None, (str(number), component.name))))
     chosen = choose_channel(file.location(0), channel, names)
     component = components[chosen]
     reals = _reals(file, component.samples - 6)

@@ -77,7 +77,8 @@ def read_peer(file: TextFile, unit: str) -> Recording:
     head = _PeerHead.of(file)
     cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
     require_step(file.location(head.line), head.step, cure)
-    line, own_unit = head.line, unit
+    line = head.line
+    own_unit = unit
     for pattern in (
         r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)",
         r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b",
@@ -95,16 +96,17 @@ def read_peer(file: TextFile, unit: str) -> Recording:
     samples = file.numbers(head.line + 1, len(file.lines), count=head.count)
     if head.count:
         file.require_count(samples, head.count, head.line)
-    component = None
-    if head.line > 1:
-        component = re.fullmatch(r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*", file.lines[1])
+    component = ""
+    pattern = r".*,\s*([\w-]+)\s*(?:\(.*\))?\s*"
+    if head.line > 1 and (title := re.fullmatch(pattern, file.lines[1])):
+        component = title[1]
     return recording_in_si(
         file.location(line),
         "PEER AT2",
         own_unit,
         head.step,
         samples,
-        component[1] if component else "",
+        component,
         stated=peaks_in_text(file.lines[: head.line + 1], own_unit),
     )
 
@@ -223,21 +225,25 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     if file.lines[0].split()[0] not in ("1", "2"):
         allowed = "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM"
         raise file.refusal(0, file.lines[0].strip(), allowed, "take the file of the acceleration")
-    integers_line, reals_line, comments_line = 11, 17, 27
+    integers_line = 11
+    reals_line = 17
+    comments_line = 27
     integers = file.numbers(integers_line, reals_line, width=10)
     reals = file.numbers(reals_line, comments_line, width=15)
     if len(integers) != 48 or len(reals) != 50:
         value = f"{len(integers)} integers and {len(reals)} reals"
         raise file.refusal(integers_line, value, "48 and 50, as in SMC", "load the file anew")
     # The places below are counted from 0, those of the format's description from 1.
-    vertical_angle, n_comments, count = integers[[12, 15, 16]]
+    is_vertical = integers[12] in (0, 180)
+    n_comments = int(integers[15])
+    count = int(integers[16])
     rate = float(reals[1])
     if not (count > 1 and rate > 0):
-        value = f"{count:g} samples, {rate:g} in a second"
+        value = f"{count} samples, {rate:g} in a second"
         raise file.refusal(reals_line, value, "two or more, at a rate above 0")
     samples = file.fixed_columns(
-        comments_line + max(int(n_comments), 0),
-        count=int(count),
+        comments_line + max(n_comments, 0),
+        count=count,
         per_line=8,
         width=10,
         head=integers_line,
@@ -248,7 +254,7 @@ def read_smc(file: TextFile, unit: str) -> Recording:
         "cm/s^2",
         1 / rate,
         samples,
-        "vertical" if vertical_angle in (0, 180) else "",
+        "vertical" if is_vertical else "",
         stated=[*peaks_in_text(file.lines[:integers_line], "cm/s^2"), _smc_peak(reals)],
     )
 

@@ -46,7 +46,8 @@ def read_recording(
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
         raise RefusedError(path.name, str(error), "numbers of a recording") from None
-    samples, allowed = recording.samples, "two finite samples or more"
+    samples = recording.samples
+    allowed = "two finite samples or more"
     fits = len(samples) > 1 and bool(np.isfinite(samples).all())
     require(fits, path.name, f"a record of {len(samples)} samples", allowed)
     return recording
@@ -80,10 +81,13 @@ def _waveform_format(content: bytes) -> str:
     if len(content) > head_bytes:
         for order in ("<i4", ">i4"):
             words = np.frombuffer(content[:head_bytes], order)
-            version, count = int(words[76]), int(words[79])
+            version = int(words[76])
+            count = int(words[79])
             if version in (6, 7) and 0 < 4 * count <= len(content) - head_bytes:
                 return "SAC"
-    return "MSEED" if re.match(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03", content) else ""
+    if re.match(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03", content):
+        return "MSEED"
+    return ""
 
 
 def _read_waveform(

@@ -46,7 +46,7 @@ class Recording:
     @property
     def mean_to_peak_ratio(self) -> float:
         """Mean acceleration over the peak; 0 of a recording of zeros."""
-        return float(self.samples.mean()) / self.peak if self.peak > 0 else 0.0
+        return float(self.samples.mean()) / max(self.peak, np.finfo(float).tiny)
 
     def doubts(self) -> Iterator[str]:
         """Yield clauses on what a user should look at: unusual values, a vertical channel."""
@@ -89,7 +89,8 @@ def arias_fractions(samples: Array, step: float) -> Array:
         samples: Accelerations at even times, shape (n,). Of zeros the fractions are zeros.
         step: Time between samples.
     """
-    left, right = samples[:-1], samples[1:]
+    left = samples[:-1]
+    right = samples[1:]
     squares = left**2 + left * right + right**2
     intensity = np.append(0.0, np.cumsum(squares)) * step / 3
     return np.asarray(intensity / intensity[-1] if intensity[-1] > 0 else intensity)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import RefusedError, cure_of, require
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
@@ -215,9 +215,8 @@ def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
         r"\d,\d": "write decimal points if these are decimal commas",
     }
     text = file.lines[line].strip()
-    fitting = [cure for pattern, cure in cures.items() if re.search(pattern, text)]
     allowed = f"rows of {width} numbers such as 1.25 or 1e-3"
-    return file.refusal(line, text, allowed, fitting[0] if fitting else "")
+    return file.refusal(line, text, allowed, cure_of(text, cures))
 
 
 def _have_decimal_commas(rows: Sequence[str]) -> bool:
@@ -285,7 +284,9 @@ def read_table(
     if table.head:  # without one, the last row of a series of numbers may be a short one
         table.numbers()
     columns = table.columns
-    index, heads, name = 1, table.column_heads, ""
+    index = 1
+    heads = table.column_heads
+    name = ""
     if channel or table.width > 2:
         index = _choose_column(table, channel, has_times=has_times)
         heads = [f"{columns[index].name} [{columns[index].unit}]"]
@@ -348,7 +349,7 @@ def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
     first = 1 if has_times else 0
     names = []
     for number, column in enumerate(table.columns[first:], first + 1):
-        names.append((str(number), column.name) if column.name else (str(number),))
+        names.append(tuple(filter(None, (str(number), column.name))))
     place = f"{table.file.location(table.start)}: {table.file.name}#COLUMN"
     return first + choose_channel(place, channel, names)
 
@@ -466,7 +467,9 @@ def _even_steps(
     if table.columns[0].is_time:
         to_s = seconds_of(table.columns[0].unit or "s")
     time = to_s * np.array([float(cells[0]) for cells in table.rows.values()])
-    first, last, n_steps = float(time[0]), float(time[-1]), len(time) - 1
+    first = float(time[0])
+    duration = float(time[-1]) - first
+    n_steps = len(time) - 1
     if (time == first).all():
         if stated_step is not None:
             remark = "its times are all equal: the stated step is taken"
@@ -474,14 +477,13 @@ def _even_steps(
         cure = f"write times of even steps{or_step.format(0.005)}"
         raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
 
-    even: Array = np.asarray(np.linspace(first, last, len(time)), float)
+    even: Array = np.asarray(np.linspace(first, time[-1], len(time)), float)
     step = float(even[1] - even[0])
     if step > 0 and np.abs(time - even).max() <= MAX_UNEVENNESS * step:
         return _EvenSteps(step, first)
     last_digit = to_s * table.resolution()
     if not _are_rounded(time, even, last_digit):
         raise _uneven(file, lines, time)
-    duration = last - first
     difference = abs((stated_step or 0.0) * n_steps - duration)
     if stated_step is None or difference > last_digit * (1 + 1e-6):  # 1e-6 is binary round-off
         likely = _likely_step(n_steps, duration, last_digit)

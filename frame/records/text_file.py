@@ -22,7 +22,8 @@ from alphacut.frame.records.units import acceleration_factor, other_quantity
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
 """A number as C, Python or FORTRAN writes it; D stands for E."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
-MIN_STEP, MAX_STEP = 4e-5, 0.5
+MIN_STEP = 4e-5
+MAX_STEP = 0.5
 """Smallest step of a record, and the one that all are below, in s. Instruments take 10 to 20,000
 samples in a second; another step is a mistake in its unit, or a count of samples."""
 
@@ -81,12 +82,14 @@ class TextFile:
             for word in words:
                 if not word:  # an empty column
                     continue
-                value = float(re.sub("[dD]", "e", word)) if NUMBER.fullmatch(word) else np.nan
-                if not isfinite(value):
+                is_number = NUMBER.fullmatch(word) is not None
+                if not is_number or not isfinite(float(re.sub("[dD]", "e", word))):
                     allowed = "finite numbers such as -.1394908E-02"
-                    cure = "write decimal points" if re.search(r"\d,\d", word) else ""
+                    cure = ""
+                    if re.search(r"\d,\d", word):
+                        cure = "write decimal points"
                     raise self.refusal(row, repr(word), allowed, cure)
-                values.append(value)
+                values.append(float(re.sub("[dD]", "e", word)))
         return np.array(values)
 
     def fixed_columns(
@@ -184,8 +187,8 @@ def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]
     unique_names = []  # of each channel, none of which another one has
     for aliases in names:
         seen.update(aliases)
-        unique = [name if counts[name] == 1 else f"{name}#{seen[name]}" for name in aliases]
-        unique_names.append(unique)
+        numbers = {name: f"#{seen[name]}" for name in aliases if counts[name] > 1}
+        unique_names.append([name + numbers.get(name, "") for name in aliases])
     wanted = channel.lower()
     chosen = [k for k, unique in enumerate(unique_names) if not wanted or wanted in unique]
     allowed = "; ".join(dict.fromkeys(" or ".join(unique) for unique in unique_names))

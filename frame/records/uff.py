@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import takewhile
@@ -57,37 +57,76 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     """
     allowed = "a universal file with time histories, data sets 58"
     try:
-        histories = [_parse_history(data_set) for data_set in data_sets(content, 58)]
+        found = list(data_sets(content, 58))
+        responses = [_response(data_set) for data_set in found]
+        require(bool(found), name, "without a data set 58", allowed, "export time histories, 58")
+        chosen = _choose_data_set(name, channel, found, responses)
+        history = _parse_history(found[chosen])
+    except RefusedError:
+        raise
     except (ValueError, IndexError) as error:
         cure = "write or copy the file anew"
         raise RefusedError(name, str(error)[:80], allowed, cure) from None
-    require(bool(histories), name, "without a data set 58", allowed, "export time histories, 58")
-    counts = Counter(history.name for history in histories)
-    names = []
-    for history in histories:
-        is_repeated = counts[history.name] > 1
-        names.append((history.name, history.title) if is_repeated else (history.name,))
-    history = histories[choose_channel(name, channel, names)]
-
-    key = f"{name}, response {history.name}"
-    # A function of the general type 0 over times (17) is a time history (1) as well.
-    is_history = history.function == 1 or (history.function == 0 and history.axis == 17)
-    what = f"of function type {history.function}"
-    cure = "export the time history: spectra and transfer functions have no samples over time"
-    require(is_history, key, what, "a time history (1) of an acceleration", cure)
-    quantities = {8: "a displacement", 9: "a force", 11: "a velocity", 13: "a force"}
-    if history.quantity in quantities:
-        what = f"of type {history.quantity}, {quantities[history.quantity]}"
-        cure = "choose the channel of an accelerometer, type 12"
-        raise RefusedError(key, what, "the response of an accelerometer", cure)
+    key = f"{name}, response {responses[chosen]}"
+    _require_acceleration(key, found[chosen])
     n_samples = len(history.samples)
     is_full = n_samples == history.count > 1 and bool(np.isfinite(history.samples).all())
     what = f"{history.count} points, and {n_samples} are there"
     allowed = "two or more finite samples, as many as stated"
     require(is_full, key, what, allowed, "write or copy the file anew")
-    step = history.step if history.times is None else _even_step(key, history.times)
-    own_unit = history.unit or unit
-    return recording_in_si(key, "UFF 58", own_unit, step, history.samples, history.name)
+    step = history.step
+    if history.times is not None:
+        step = _even_step(key, history.times)
+    own_unit = found[chosen].head[8][47:67].strip()
+    if own_unit.upper() in ("", "NONE"):
+        own_unit = unit
+    return recording_in_si(key, "UFF 58", own_unit, step, history.samples, responses[chosen])
+
+
+def _response(data_set: DataSet) -> str:
+    """Return NODE.DIRECTION of the response of a data set 58, as "7.x"."""
+    columns = data_set.head[5]
+    direction = abs(int(columns[51:55]))
+    names = dict(enumerate(DIRECTIONS, start=1))
+    return f"{int(columns[41:51])}.{names.get(direction, direction)}"
+
+
+def _choose_data_set(
+    name: str, channel: str, found: Sequence[DataSet], responses: Sequence[str]
+) -> int:
+    """Return the index of the data set of a channel; errors and arguments as of `choose_channel`.
+
+    Data sets of one response are told apart by the first lines of their heads as well.
+    """
+    counts = Counter(responses)
+    names: list[tuple[str, ...]] = []
+    for data_set, response in zip(found, responses, strict=True):
+        aliases = [response]
+        if counts[response] > 1:
+            aliases.append(" ".join(data_set.head[0].split()).lower())
+        names.append(tuple(aliases))
+    return choose_channel(name, channel, names)
+
+
+def _require_acceleration(key: str, data_set: DataSet) -> None:
+    """Refuse a data set 58 that is no time history, or whose type of data is no acceleration.
+
+    Args:
+        key: What the data set is of, for messages.
+        data_set: The data set.
+    """
+    function = int(data_set.head[5][:5])
+    axis = int(data_set.head[7][:10])
+    # A function of the general type 0 over times (17) is a time history (1) as well.
+    is_history = function == 1 or (function == 0 and axis == 17)
+    cure = "export the time history: spectra and transfer functions have no samples over time"
+    allowed = "a time history (1) of an acceleration"
+    require(is_history, key, f"of function type {function}", allowed, cure)
+    quantity = int(data_set.head[8][:10].strip() or 0)
+    others = {8: "a displacement", 9: "a force", 11: "a velocity", 13: "a force"}
+    what = f"of type {quantity}, {others.get(quantity)}"
+    cure = "choose the channel of an accelerometer, type 12"
+    require(quantity not in others, key, what, "the response of an accelerometer", cure)
 
 
 @dataclass(frozen=True)
@@ -130,7 +169,8 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
                     break
             file.seek(start + max(size, 0))
             values = content[start : file.tell()]
-            yield DataSet(head, [], values, byte_order=">" if byte_order == 2 else "<")
+            orders = {1: "<", 2: ">"}
+            yield DataSet(head, [], values, byte_order=orders.get(byte_order, "<"))
         inside = takewhile(lambda text: text.strip() != b"-1", iter(file.readline, b""))
         lines = [decoded(text).rstrip("\r\n") for text in inside]
         if first.strip() == str(number).encode():
@@ -144,89 +184,50 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
 
 @dataclass(frozen=True, eq=False)
 class _History:
-    """The function in a data set 58.
+    """The samples in a data set 58.
 
     Args:
-        name: NODE.DIRECTION of the response.
-        title: First line of the head, in small letters.
-        quantity: Type of data of the ordinate.
-        function: Type of the function.
-        axis: Type of data of the abscissa.
-        unit: Unit of the ordinate; empty where the file states none.
-        count: Number of samples that the head states.
-        step: Step of even abscissae.
-        times: Abscissae that are listed with the samples, shape (n,); None where they are even.
+        count: Number of samples that the head states; there may be fewer.
+        step: Step of even times, in s.
         samples: Real parts of the values, shape (n,).
+        times: Times that stand beside the samples, shape (n,); None where they are even.
     """
 
-    name: str
-    title: str
-    quantity: int
-    function: int
-    axis: int
-    unit: str
     count: int
     step: float
-    times: Array | None
     samples: Array
+    times: Array | None = None
 
 
 def _parse_history(data_set: DataSet) -> _History:
-    """Return the function in a data set 58.
+    """Return the samples in a data set 58.
 
     Raises:
         ValueError, IndexError: A line of the head is no such line.
     """
-    head = data_set.head
-    direction = abs(int(head[5][51:55]))
-    axis_name = DIRECTIONS[direction - 1] if 1 <= direction <= 6 else str(direction)
-    value_type = int(head[6][:10])
-    count = int(head[6][10:20])
-    has_times = int(head[6][20:30]) == 0
-    [step] = floats(head[6][43:56])
-    times, samples = _samples(data_set, value_type, count, has_times=has_times)
-    unit = head[8][47:67].strip()
-    return _History(
-        name=f"{int(head[5][41:51])}.{axis_name}",
-        title=" ".join(head[0].split()).lower(),
-        quantity=int(head[8][:10].strip() or 0),
-        function=int(head[5][:5]),
-        axis=int(head[7][:10]),
-        unit="" if unit.upper() == "NONE" else unit,
-        count=count,
-        step=step,
-        times=times,
-        samples=samples,
-    )
-
-
-def _samples(
-    data_set: DataSet, value_type: int, count: int, *, has_times: bool
-) -> tuple[Array | None, Array]:
-    """Return the times, None without such, and the real parts of the values of a data set 58.
-
-    Args:
-        data_set: The data set.
-        value_type: Code of the values: 2 and 4 are single and double reals, 5 and 6 complex.
-        count: Number of values that the head states; there may be fewer, and then padding.
-        has_times: Whether a time stands before each value.
-    """
+    columns = data_set.head[6]
+    value_type = int(columns[:10])
+    count = int(columns[10:20])
+    has_times = int(columns[20:30]) == 0  # before each value
+    [step] = floats(columns[43:56])
     numbers_of_value = 2 if value_type in COMPLEX else 1
-    if data_set.content is not None:
-        real = f"{data_set.byte_order}f{8 if value_type in (4, 6) else 4}"
-        fields: list[tuple[str, str, tuple[int, ...]]] = [("value", real, (numbers_of_value,))]
-        if has_times:  # a time is single, beside doubles as well
-            fields.insert(0, ("time", f"{data_set.byte_order}f4", ()))
-        row = np.dtype(fields)
-        n_rows = min(count, len(data_set.content) // row.itemsize)
-        table = np.frombuffer(data_set.content, row, n_rows)
-        times = table["time"].astype(float) if has_times else None
-        return times, table["value"][:, 0].astype(float)
-    numbers = np.array([number for line in data_set.lines for number in floats(line)])
-    width = numbers_of_value + 1 if has_times else numbers_of_value
-    n_rows = min(count, len(numbers) // width)
-    rows = numbers[: n_rows * width].reshape(-1, width)
-    return rows[:, 0] if has_times else None, rows[:, width - numbers_of_value]
+    if data_set.content is None:
+        numbers = np.array([number for line in data_set.lines for number in floats(line)])
+        width = numbers_of_value + int(has_times)
+        n_rows = min(count, len(numbers) // width)  # what follows is padding
+        rows = numbers[: n_rows * width].reshape(-1, width)
+        values = rows[:, width - numbers_of_value]
+        return _History(count, step, values, rows[:, 0] if has_times else None)
+    order = data_set.byte_order
+    value = "f8" if value_type in (4, 6) else "f4"
+    fields: list[tuple[str, str, tuple[int, ...]]] = [("value", order + value, (numbers_of_value,))]
+    if has_times:  # a time is single, beside doubles as well
+        fields.insert(0, ("time", f"{order}f4", ()))
+    row = np.dtype(fields)
+    n_rows = min(count, len(data_set.content) // row.itemsize)
+    table = np.frombuffer(data_set.content, row, n_rows)
+    times = table["time"].astype(float) if has_times else None
+    return _History(count, step, table["value"][:, 0].astype(float), times)
 
 
 def _even_step(key: str, times: Array) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, path_of, printable, require
+from alphacut.base.errors import RefusedError, cure_of, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
@@ -175,10 +175,7 @@ def _cure_of_row(row: str) -> str:
         r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
         r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",
     }
-    for pattern, cure in cures.items():
-        if re.search(pattern, row):
-            return cure
-    return "a matrix has no head and no names of rows"
+    return cure_of(row, cures, default="a matrix has no head and no names of rows")
 
 
 def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers:
