@@ -197,80 +197,87 @@ def _coefficients(element: Element, position: Array, degrees: tuple[int, ...]) -
     return np.array([np.prod(factors, axis=0) for factors in product(*along_axes)])
 
 
+def _node_matrix(
+    polynomials: Array, coefficients: Array, first_column: Ints, n_columns: int
+) -> csr_array:
+    """Return the matrix from factors of polynomials to the unknowns at nodes.
+
+    Args:
+        polynomials: Polynomials of the potentials, shape (N, potentials, monomials).
+        coefficients: Coefficients of the monomials, shape (monomials, unknowns of a node × K).
+        first_column: Column of the first polynomial for each of these unknowns.
+        n_columns: Number of columns.
+
+    Returns:
+        Matrix with a row for each potential, unknown of a node, and node, in this order.
+    """
+    number, potential, monomial = np.nonzero(polynomials)
+    size = coefficients.shape[1]
+    factors = polynomials[number, potential, monomial]
+    values = factors[:, None] * coefficients[monomial]
+    rows = potential[:, None] * size + np.arange(size)
+    columns = number[:, None] + first_column
+    shape = polynomials.shape[1] * size, n_columns
+    return csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape)
+
+
 @dataclass(frozen=True, eq=False)
 class PorePotentials:
     """Fields of potentials whose total stress vanishes in pores: an affine space.
 
-    At the nodes of the pores, K of them in P pores, coefficients are those of polynomials with
-    parameters y for each load and pore: `values` times (`particular` + `gauge` y).
+    Under the mean stress σ̄ the unknowns at the nodes of the pores are `particular` σ̄ + `gauge` y,
+    with J parameters y for each of P pores. The rows of both matrices are the unknowns of a node
+    times the K nodes.
 
     Args:
-        places: Indices of the nodes along each axis of the grid.
-        values: Coefficients of monomials, shape (unknowns of a node × K, P × monomials). Each
-            column is in units of the pore's extent, a power of two, to the monomial's degree.
-        scale: Square of each pore's extent, shape (P,).
-        particular: Polynomials by Voigt component, shape (components, potentials × monomials).
-        gauge: Polynomials without stress, shape (potentials × monomials, J).
-        inverse: Pseudo-inverses of their Gram matrices, shape (P, J, J).
-        potentials: Number of potentials.
+        places: Indices of the nodes along each axis of the grid, shape (K,) each.
+        particular: Matrix from mean stresses, shape (unknowns × K, components).
+        gauge: Matrix from the parameters of all pores, shape (unknowns × K, P × J).
+        inverse: Pseudo-inverses of the Gram matrices of `gauge` in each pore, shape (P, J, J).
     """
 
     places: tuple[Ints, ...]
-    values: csr_array
-    scale: Array
-    particular: Array
-    gauge: Array
+    particular: csr_array
+    gauge: csr_array
     inverse: Array
-    potentials: int
 
     @classmethod
     def of_nodes(cls, element: Element, nodes: PoreNodes) -> Self:
         """Return the potentials of an element of stresses, for the nodes of closed pores."""
         polynomials = _polynomials(element)
-        gauge = polynomials.gauge
-        n_nodes = len(nodes.pore)
+        n_gauge = len(polynomials.gauge)
         n_pores = int(nodes.pore.max()) + 1
-        n_monomials = len(polynomials.monomials)
+        # Parameters are factors of monomials in units of the pore's extent, a power of two.
         largest = np.ones(n_pores)
         np.maximum.at(largest, nodes.pore, abs(nodes.position).max(axis=1))
-        extent = 2.0 ** np.ceil(np.log2(largest))
-
-        columns = []
+        extent = 2.0 ** np.ceil(np.log2(largest))[nodes.pore]
+        of_monomials = []
         for degrees in polynomials.monomials:
             coefficients = _coefficients(element, nodes.position, degrees)
-            columns.append(coefficients / extent[nodes.pore] ** sum(degrees))
-        dense = np.stack(columns, axis=-1)  # (unknowns of a node, K, monomials)
-        row = np.broadcast_to(np.arange(dense[..., 0].size).reshape(-1, n_nodes, 1), dense.shape)
-        column = n_monomials * nodes.pore[:, None] + np.arange(n_monomials)
-        column = np.broadcast_to(column, dense.shape)
-        shape = (dense[..., 0].size, n_pores * n_monomials)
-        values = csr_array((dense.ravel(), (row.ravel(), column.ravel())), shape)
+            of_monomials.append((coefficients / extent ** sum(degrees)).ravel())
+        coefficients = np.array(of_monomials)
+        n_numbers = coefficients.shape[1] // len(nodes.pore)
+        first_column = n_gauge * np.tile(nodes.pore, n_numbers)
+        gauge = _node_matrix(polynomials.gauge, coefficients, first_column, n_pores * n_gauge)
 
-        # Inner products of monomials in each pore, then of the polynomials without stress. Those
-        # whose eigenvalue is below 1e-11 of the largest count as dependent in a small pore; a
-        # larger limit would take freedom from the stress, a smaller one would keep rounding.
-        products = np.zeros((n_pores, n_monomials, n_monomials))
-        np.add.at(products, nodes.pore, np.einsum("bka,bkc->kac", dense, dense))
-        gram = np.einsum("ipa,Nac,jpc->Nij", gauge, products, gauge, optimize=True)
-        inverse = np.linalg.pinv(gram, rcond=1e-11, hermitian=True)
-        return cls(
-            places=tuple(nodes.node.T),
-            values=values,
-            scale=extent**2,
-            particular=polynomials.particular.reshape(len(polynomials.particular), -1),
-            gauge=gauge.reshape(len(gauge), -1).T,
-            inverse=inverse,
-            potentials=gauge.shape[1],
+        # The monomials of the particular polynomials are of degree 2.
+        coefficients = coefficients * np.tile(extent**2, n_numbers)
+        n_components = len(polynomials.particular)
+        particular = _node_matrix(
+            polynomials.particular, coefficients, np.zeros_like(first_column), n_components
         )
+        # Polynomials whose eigenvalue is below 1e-11 of the largest count as dependent in a small
+        # pore. A larger limit would take freedom from the stress, a smaller one keep rounding.
+        gram = (gauge.T @ gauge).tobsr(blocksize=(n_gauge, n_gauge)).data
+        inverse = np.linalg.pinv(gram, rcond=1e-11, hermitian=True)
+        return cls(tuple(nodes.node.T), particular, gauge, inverse)
 
     def project(self, fields: Fields) -> Fields:
         """Project fields orthogonally on differences of fields of the space, in place.
 
         Returns the changed array, which has the shape (fields, unknowns, *grid).
         """
-        at_nodes = self._at_nodes(fields)
-        polynomials = self._parameters(at_nodes) @ self.gauge.T
-        return self._put(fields, self._evaluated(self.values, polynomials))
+        return self._put(fields, self.gauge @ self._parameters(self._at_nodes(fields)))
 
     def particular_fields(self, loads: Array, like: Fields) -> Fields:
         """Return fields of the space that vanish outside the pores' nodes.
@@ -279,8 +286,7 @@ class PorePotentials:
             loads: Mean stresses in Voigt order, shape (loads, components).
             like: Array of the shape and the library of the result.
         """
-        fields = namespace(like).zeros_like(like)
-        return self._put(fields, self._evaluated(self.values, self._stress_polynomials(loads)))
+        return self._put(namespace(like).zeros_like(like), self.particular @ loads.T)
 
     def impose(self, fields: Fields) -> Fields:
         """Put fields for unit loads into the space, in place, and bound what rounding leaves.
@@ -295,50 +301,34 @@ class PorePotentials:
             Bounds of the distances of the numbers there from the exact polynomials, of the shape of
             `fields`; 0 elsewhere.
         """
+        particular = self.particular.toarray()
+        parameters = self._parameters(self._at_nodes(fields) - particular)
+        self._put(fields, particular + self.gauge @ parameters)
+        # A value is a sum of n products with parameters, which are taken as exact, and entries,
+        # which are rounded by 6 units at most. The error is at most n + 8 units of the sum of the
+        # magnitudes (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
         unit = 2.0**-53
-        stress = self._stress_polynomials(np.eye(len(self.particular)))
-        difference = self._at_nodes(fields) - self._evaluated(self.values, stress)
-        parameters = self._parameters(difference)
-        polynomials = stress + parameters @ self.gauge.T
-        self._put(fields, self._evaluated(self.values, polynomials))
-        # A coefficient is a sum over monomials of a sum over parameters, of products of numbers
-        # that are rounded thrice at most. With n terms the error is at most n units of the sum of
-        # the magnitudes (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
-        terms = self.gauge.shape[1] + self.values.shape[1] // len(self.scale) + 8
-        size = abs(stress) + abs(parameters) @ abs(self.gauge.T)
-        error = terms * unit * self._evaluated(abs(self.values), size)
-        return self._put(namespace(fields).zeros_like(fields), error)
-
-    def _stress_polynomials(self, loads: Array) -> Array:
-        """Return the coefficients of stress −`loads`, shape (loads, P, potentials × monomials)."""
-        return (loads @ self.particular)[:, None] * self.scale[:, None]
+        terms = self.inverse.shape[1] + particular.shape[1] + 8
+        size = abs(particular) + abs(self.gauge) @ abs(parameters)
+        return self._put(namespace(fields).zeros_like(fields), terms * unit * size)
 
     def _at_nodes(self, fields: Fields) -> Array:
-        """Return values at the pores' nodes, shape (fields, potentials, unknowns of a node × K)."""
+        """Return the unknowns at the pores' nodes, shape (unknowns × K, fields)."""
         found = on_host(fields[(slice(None), slice(None), *self.places)])
-        return found.reshape(len(found), self.potentials, -1)
+        return np.asarray(found.reshape(len(found), -1).T)
 
     def _put(self, fields: Fields, at_nodes: Array) -> Fields:
-        """Set the values at the pores' nodes, in place, and return the fields."""
-        values = at_nodes.reshape(*fields.shape[:2], -1)
+        """Set the unknowns at the pores' nodes in place, as `_at_nodes` returns them.
+
+        Returns the changed array.
+        """
+        values = at_nodes.T.reshape(len(fields), fields.shape[1], -1)
         fields[(slice(None), slice(None), *self.places)] = namespace(fields).asarray(values)
         return fields
 
     def _parameters(self, at_nodes: Array) -> Array:
-        """Return the parameters y of the nearest polynomials without stress, shape (fields, P, J).
-
-        `at_nodes` are values as those of `_at_nodes`.
-        """
-        count = len(at_nodes)
-        n_pores = len(self.scale)
-        moments = self.values.T @ at_nodes.reshape(-1, at_nodes.shape[-1]).T
-        moments = moments.reshape(n_pores, -1, count, self.potentials).transpose(2, 0, 3, 1)
-        of_gauge = moments.reshape(count, n_pores, -1) @ self.gauge
-        return np.asarray(np.einsum("pij,lpj->lpi", self.inverse, of_gauge))
-
-    def _evaluated(self, values: csr_array, polynomials: Array) -> Array:
-        """Return polynomials, (fields, P, potentials × monomials), at the nodes, as `_at_nodes`."""
-        count, n_pores = polynomials.shape[:2]
-        by_potential = polynomials.reshape(count, n_pores, self.potentials, -1)
-        columns = by_potential.transpose(1, 3, 0, 2).reshape(values.shape[1], -1)
-        return np.asarray((values @ columns).T.reshape(count, self.potentials, -1))
+        """Return the parameters of the nearest polynomials without stress, (P × J, fields)."""
+        moments = self.gauge.T @ at_nodes
+        n_pores, n_gauge, _ = self.inverse.shape
+        parameters = self.inverse @ moments.reshape(n_pores, n_gauge, -1)
+        return np.asarray(parameters.reshape(moments.shape))
