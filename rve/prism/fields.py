@@ -16,8 +16,6 @@ from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import SolverOptions, solve
 
-NODES = 15  # of a prism
-
 
 def solved_fields(
     problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
@@ -30,15 +28,15 @@ def solved_fields(
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         options: The linear solver.
     """
-    problem.assemble(stiffness)
-    vectors = solve(problem.solver(options, problem.matrix), problem.loads(loads)).vectors
-    fluctuation = fem.Function(problem.space)
+    matrix = problem.assemble(stiffness)
+    solutions = solve(problem.solver(options, matrix), problem.loads(loads))
+    u = fem.Function(problem.space)
     fluctuations, prism_strains = [], []
-    for vector, load in zip(vectors, loads, strict=True):
+    for vector, load in zip(solutions.vectors, loads, strict=True):
         values = problem.elimination.displacements(vector)
-        fluctuation.x.array[:] = values.ravel()
+        u.x.array[:] = values.ravel()
         fluctuations.append(values)
-        prism_strains.append(_at_nodes_of_prisms(problem, strain(fluctuation)) + load)
+        prism_strains.append(_at_nodes_of_prisms(problem, strain(u)) + load)
     phase = phase_at_nodes(problem)
     stress = np.stack(stiffness)[phase] @ np.stack(prism_strains, axis=-1)
     return nodal_fields(problem, np.stack(fluctuations, axis=-1), loads, stress, phase)
@@ -66,13 +64,13 @@ def fields_of_solution(
     phase = phase_at_nodes(problem)
     of_phases = np.stack([_at_nodes_of_prisms(problem, stress[name]) for name in names])
     prism, node = np.indices(phase.shape)
-    values = of_phases[phase, prism, node][..., None]
+    values = of_phases[phase, prism, node][..., np.newaxis]
     fluctuation = u.x.array.reshape(-1, 2, 1)
     return nodal_fields(problem, fluctuation, np.array([load], float), values, phase)
 
 
 def phase_at_nodes(problem: PrismProblem) -> Ints:
-    """Return the index of the phase at each node of this rank's prisms, shape (m, 15).
+    """Return the index of the phase at each node of this rank's prisms, shape (prisms, 15).
 
     It is that of the prism, or follows from the sign of the function of a level set there (eq. 14).
     """
@@ -80,14 +78,15 @@ def phase_at_nodes(problem: PrismProblem) -> Ints:
     if isinstance(problem.map, LevelSet):
         positions = grid.positions(problem.map)[grid.cells[problem.wedge]]
         return np.asarray(problem.map.values(positions) < 0, int)
-    return np.broadcast_to(grid.phase[problem.wedge, None], (len(problem.wedge), NODES))
+    shape = len(problem.wedge), grid.cells.shape[1]
+    return np.broadcast_to(grid.phase[problem.wedge, np.newaxis], shape)
 
 
 def _at_nodes_of_prisms(problem: PrismProblem, expression: ufl.core.expr.Expr) -> Array:
-    """Return an expression of three components at the nodes of each prism, shape (m, 15, 3)."""
+    """Return an expression of three components at the nodes of prisms, shape (prisms, 15, 3)."""
     cells = np.arange(len(problem.wedge), dtype=np.int32)
     values = at_points(expression, vertices_and_midpoints()).eval(problem.mesh, cells)
-    return np.asarray(values).reshape(len(cells), NODES, 3)
+    return np.asarray(values).reshape(len(cells), -1, 3)
 
 
 def nodal_fields(
@@ -100,8 +99,8 @@ def nodal_fields(
         fluctuation: Displacements at DOLFINx's nodes without the macroscopic strain's, in halves of
             the cell's side, shape (nodes, 2, loads).
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
-        stress: At the nodes of each prism, shape (m, 15, 3, loads), in Pa.
-        phase: Index of the phase there, shape (m, 15).
+        stress: Stress at the nodes of each prism, shape (prisms, 15, 3, loads), in Pa.
+        phase: Index of the phase at the nodes of each prism, shape (prisms, 15).
     """
     grid = problem.grid
     positions = grid.positions(problem.map)
@@ -110,14 +109,15 @@ def nodal_fields(
     uniform = np.einsum("nj,ijl->nil", positions[problem.node, :2], tensors)
     displacement = np.empty((grid.nodes, *uniform.shape[1:]))
     displacement[problem.node] = fluctuation + uniform
-    # one point for each node and phase, since stresses jump at the interface
+
+    # Each node has one point for each phase that meets there, since stresses jump between phases.
     point_keys = grid.cells[problem.wedge] + phase * grid.nodes
     points, cells = np.unique(point_keys, return_inverse=True)
     cells = cells.reshape(point_keys.shape)
+    node = points % grid.nodes
     mean_stress = np.zeros((len(points), *stress.shape[2:]))
     np.add.at(mean_stress, cells, stress)
-    mean_stress /= np.bincount(cells.ravel())[:, None, None]
-    node = points % grid.nodes
+    mean_stress /= np.bincount(cells.ravel())[:, np.newaxis, np.newaxis]
     return CellFields(
         points=positions[node],
         cells=cells,

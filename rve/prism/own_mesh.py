@@ -37,14 +37,9 @@ from alphacut.rve.solver.krylov import SolverOptions, require_petsc
 from alphacut.stochastic import ThetaDistribution
 from alphacut.stochastic.theta.distribution import require_distribution
 
-ROUGH_MESH = 0.1
-"""Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
-REFINEMENT_SAFETY = 2.5
-"""Error of the finer mesh over its distance from the coarser one: 1/(2^q − 1) where energies
-converge with order q. That is 1/15 for smooth fields, 1 for those that are singular as at the tip
-of a crack, and 2.4 for q = 1/2; q is less where phases of high contrast meet crosswise."""
 SAME_LEVEL = 1e-6
-"""Distance of an end of the law from the mesh's that is none, over the support."""
+"""Distance of an end of the support of θ from that of a mesh that counts as none, over the support:
+far above the noise of Gmsh's coordinates."""
 
 
 class _NamedModel(NamedPhasesModel):
@@ -54,9 +49,13 @@ class _NamedModel(NamedPhasesModel):
     name: ClassVar[str] = "prism"
     convention: ClassVar[str] = AVERAGES[AXES]
 
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
-        """Problem moved to the law, and the materials in the mesh's order, both checked."""
+    def moved_problem(self, distribution: object) -> PrismProblem:
+        """Return the problem on the mesh, moved to the distribution of θ, which is checked."""
         raise NotImplementedError
+
+    def named_phases(self, problem: PrismProblem, phases: object) -> dict[str, AnyPhase]:
+        """Return the materials in the order of the problem's phases, checked."""
+        return in_order_of(problem.grid.names, phases)
 
     @property
     def options(self) -> SolverOptions:
@@ -71,39 +70,45 @@ class _NamedModel(NamedPhasesModel):
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """Homogenised stiffness, one result in a list; energies in the order of `phases`.
+        """Return the homogenised stiffness, one result in a list.
 
         Args:
-            law: Law of θ.
+            law: Distribution of θ.
             phases: Materials by the name of their physical group, or of a level set "matrix" and
-                "inclusion".
+                "inclusion". Energies of the result are in their order.
 
         Raises:
             MeshError: The mesh is no cell of prisms.
-            RefusedError: Law or phases are not those of the mesh.
+            RefusedError: Distribution or phases are not those of the mesh.
         """
         started = perf_counter()
-        problem, named = self.problem_of(law, phases)
-        stiffness = [phase.stiffness for phase in named.values()]
+        problem = self.moved_problem(law)
+        named = self.named_phases(problem, phases)
+        materials = list(named.values())
+        stiffness = [phase.stiffness for phase in materials]
         solved = solve_over_prisms(problem, stiffness, THREE_LOADS, options=self.options)
-        result = prism_result(solved, list(named.values()), THREE_LOADS, self.options)
+        result = prism_result(solved, materials, THREE_LOADS, self.options)
         energies = cast("PhaseEnergies", result.energies)
         order = [list(named).index(name) for name in phases]
+        # Nobody knows the error of a user's mesh. Bounds that it violates by more than a tenth show
+        # a mistake.
+        checks = checks_within_limits(result.checks, discretisation=0.1)
         return [
             replace(
                 result,
                 seconds=perf_counter() - started,
-                checks=checks_within_limits(result.checks, discretisation=ROUGH_MESH),
+                checks=checks,
                 energies=PhaseEnergies(energies.values[order], energies.errors[order]),
             )
         ]
 
     def fields(self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]) -> CellFields:
-        """Displacements and stresses at the nodes under three unit strains, solved for them.
+        """Return displacements and stresses at the nodes under three unit strains.
 
-        Arguments and errors are those of `solve`.
+        The cell is solved for them. Arguments and errors are those of `solve`.
         """
-        problem, named = self.problem_of(law, phases)
+        problem = self.moved_problem(law)
+        named = self.named_phases(problem, phases)
         stiffness = [phase.stiffness for phase in named.values()]
         return solved_fields(problem, stiffness, THREE_LOADS, self.options)
 
@@ -113,8 +118,8 @@ class MeshModel(_NamedModel):
     """The user's mesh of 15-node prisms, solved as it is.
 
     With `refine` it is solved twice: as it is, and with each prism split into eight of its own
-    curved shape, whose result is returned. The declared error is `REFINEMENT_SAFETY` times the
-    distance of both; it is that of the geometry that the file has.
+    curved shape, whose result is returned. The declared error is 2.5 times the distance of both; it
+    is that of the geometry that the file has.
 
     Args:
         file: File of Gmsh.
@@ -128,27 +133,31 @@ class MeshModel(_NamedModel):
     parallel: bool = False
     refine: bool = False
 
+    def __post_init__(self) -> None:
+        require_petsc(self.petsc)
+
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """As `_NamedModel.solve`, with declared errors if refined."""
+        """Return the stiffness as `_NamedModel.solve`, with declared errors if refined."""
         results = super().solve(law, phases)
         if not self.refine:
             return results
         [coarse] = replace(self, refine=False).solve(law, phases)
-        return [with_distance(result, coarse, safety=REFINEMENT_SAFETY) for result in results]
+        # The error of the finer mesh over its distance from the coarser one is 1/(2^q − 1) where
+        # energies converge with order q: 1/15 for smooth fields, 1 for fields that are singular as
+        # at the tip of a crack, and 2.4 for q = 1/2. q is less where phases of high contrast meet
+        # crosswise.
+        return [with_distance(result, coarse, safety=2.5) for result in results]
 
-    def __post_init__(self) -> None:
-        require_petsc(self.petsc)
-
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
-        """Problem on the mesh, moved to the law, with law and materials checked."""
+    def moved_problem(self, distribution: object) -> PrismProblem:
+        """Return the problem on the mesh; see `_NamedModel`."""
         problem = self.cached_problem()
-        problem.move(mesh_law(problem.grid, law))
-        return problem, in_order_of(problem.grid.names, phases)
+        problem.move(mesh_law(problem.grid, distribution))
+        return problem
 
     def cached_problem(self) -> PrismProblem:
-        """Problem on the mesh, cached as long as the file does not change."""
+        """Return the problem on the mesh, cached as long as the file does not change."""
         if not isinstance(self.file, str | Path) or not Path(self.file).is_file():
             raise RefusedError("mesh.file", self.file, "path of a file of Gmsh")
         path = Path(self.file)
@@ -157,6 +166,7 @@ class MeshModel(_NamedModel):
 
 @lru_cache(maxsize=2)
 def _mesh_problem(path: str, _changed: int, parallel: bool, refine: bool) -> PrismProblem:
+    """Return the problem on the mesh of a file that was changed at a time, in ns."""
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     read = partial(read_grid, path)
     grid = from_first_rank(read) if parallel else read()
@@ -188,19 +198,27 @@ class LevelSetModel(_NamedModel):
         require_prisms(self.mesh_size, self.layers)
         require_petsc(self.petsc)
 
-    def problem_of(self, law: object, phases: object) -> tuple[PrismProblem, dict[str, AnyPhase]]:
-        """Problem on a cached mesh."""
-        require_distribution(law)
-        named = in_order_of(NAMES, phases)
-        size, layers, parallel = self.mesh_size, self.layers, self.parallel
-        grid = cached_grid(size=size, radius=0.0, layers=layers, parallel=parallel)
+    def moved_problem(self, distribution: object) -> PrismProblem:
+        """Return the problem on a cached mesh; see `_NamedModel`."""
+        require_distribution(distribution)
+        grid = cached_grid(
+            size=self.mesh_size, radius=0.0, layers=self.layers, parallel=self.parallel
+        )
         problem = cached_problem(grid, parallel=self.parallel)
-        problem.move(LevelSet(cast("ThetaDistribution", law), self.z))
-        return problem, named
+        problem.move(LevelSet(cast("ThetaDistribution", distribution), self.z))
+        return problem
+
+    def named_phases(self, problem: PrismProblem, phases: object) -> dict[str, AnyPhase]:
+        """Return matrix and inclusion, which no part of the mesh is named by."""
+        return in_order_of(NAMES, phases)
 
 
 def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
-    """Materials in the order of `names`, those of the mesh: one for each, or a refusal."""
+    """Return the materials in the order of `names`, those of the mesh.
+
+    Raises:
+        RefusedError: There is not one material for each name, or Poisson's ratio is too large.
+    """
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
         value = type(phases).__name__
@@ -216,16 +234,21 @@ def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
 
 
 def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
-    """The law of θ for a mesh from a file, whose levels span its support, or a refusal."""
+    """Return the distribution of θ for a mesh from a file, whose levels span its support.
+
+    Raises:
+        RefusedError: It is no distribution of θ, or one on another support.
+    """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
-    low, high = theta.min(), theta.max()
+    low = theta.min()
+    high = theta.max()
     require_distribution(law)
-    lower, upper = cast("ThetaDistribution", law).lower, cast("ThetaDistribution", law).upper
+    distribution = cast("ThetaDistribution", law)
     tolerance = SAME_LEVEL * (high - low)
-    is_same = abs(lower - low) <= tolerance and abs(upper - high) <= tolerance
-    if not is_same:
-        value = f"on {lower:g} … {upper:g}"
+    distances = abs(distribution.lower - low), abs(distribution.upper - high)
+    if max(distances) > tolerance:
+        value = f"on {distribution.lower:g} … {distribution.upper:g}"
         allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
-    return FixedCell(cast("ThetaDistribution", law))
+    return FixedCell(distribution)

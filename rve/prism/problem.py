@@ -56,10 +56,14 @@ class SliceStrains:
     @classmethod
     def zeros(cls, rule: ThetaRule, *, phases: int, fields: int) -> SliceStrains:
         """Return integrals over no part of the cell, to which `add` adds."""
-        slices, shape = len(rule.nodes), (phases, 3, fields)
-        strain = np.zeros((phases, slices, 3, fields))
-        products = np.zeros((*shape, 3, fields))
-        return cls(rule.nodes, rule.weights, strain, np.zeros((phases, slices)), products)
+        slices = len(rule.nodes)
+        return cls(
+            rule.nodes,
+            rule.weights,
+            strain=np.zeros((phases, slices, 3, fields)),
+            fractions=np.zeros((phases, slices)),
+            products=np.zeros((phases, 3, fields, 3, fields)),
+        )
 
     def add(self, strain: Array, areas: Array, slices: Ints) -> None:
         """Add the integrals over some triangles of the slices.
@@ -84,14 +88,16 @@ class SliceStrains:
             self.products[phase] += strain_products(all_points, theta_weights.reshape(1, -1))[0]
 
     def combined(self, coefficients: Array) -> SliceStrains:
-        """Those of sums of the fields, coefficients (fields, loads)."""
+        """Return the strains of sums of the fields, with coefficients of shape (fields, loads)."""
         products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
         return replace(self, strain=self.strain @ coefficients, products=products)
 
     def stress(self, stiffness: Sequence[Array]) -> Array:
-        """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
-        stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
-        return np.asarray(sum(stresses))
+        """Return the homogenised (σ11, σ22, σ12) of each slice, shape (n, 3, fields), in Pa.
+
+        `stiffness` is that of each phase, (3, 3), in Pa.
+        """
+        return np.asarray(np.einsum("pij,pnjf->nif", np.array(stiffness), self.strain))
 
 
 class Solved(NamedTuple):
@@ -112,9 +118,13 @@ class Solved(NamedTuple):
     curve_error: float = 0.0
 
 
-def positive_density(law: ThetaDistribution, theta: Array) -> Array:
-    """Density of θ at quadrature points (n,), or a refusal where it is not positive."""
-    density = np.asarray(law.pdf(theta))
+def positive_density(distribution: ThetaDistribution, theta: Array) -> Array:
+    """Return the density of θ at quadrature points, shape (n,).
+
+    Raises:
+        RefusedError: It is not positive at a point, so that the stiffness would be singular.
+    """
+    density = np.asarray(distribution.pdf(theta))
     if not (density > 0).all():
         key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
         cure = "shorten the support, or take the series"
@@ -127,35 +137,43 @@ def require_valid_elements(
 ) -> None:
     """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
 
-    `areas` are the weights of the points of prisms in their slices, (prisms, 3, points), of the
-    ranks of `comm` together.
+    Args:
+        grid: The prisms.
+        areas: Weights of the quadrature points of prisms in their slices, shape (prisms, 3,
+            points).
+        comm: Ranks that have some of the prisms each; None for this process alone.
+
+    Raises:
+        FoldedMeshError: An element of any rank is inverted.
     """
     determinants = areas / slice_weights()
     means = determinants.mean(axis=(1, 2), keepdims=True)
     least_ratio = 0.0 if is_round(grid.plane.outline) else MIN_JACOBIAN_RATIO
     is_folded = bool(((means <= 0) | (determinants <= least_ratio * means)).any())
-    if comm.allreduce(int(is_folded)) if comm else is_folded:
+    if comm is not None:
+        is_folded = bool(comm.allreduce(int(is_folded)))
+    if is_folded:
         where = f"where it follows the radius through {grid.layers} layers in θ"
         cure = "take more layers or a smaller mesh size"
         raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
 
 class PrismProblem:
-    """The product-space problem of one grid; map and phases are set anew for each sample.
+    """The product-space problem over the prisms of one grid; map and phases are set anew.
 
     Args:
         grid: Topology; the ranks divide its prisms and its levels among them.
         comm: Communicator.
 
     Attributes:
-        mesh: DOLFINx's.
+        mesh: DOLFINx's mesh.
         space: Displacements, two at each node of a prism.
         node: Number in the grid of each of this rank's nodes, shape (n,).
         wedge: Number in the grid of each of this rank's prisms, shape (m,).
         layer: Layer of each of these prisms, shape (m,).
         dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
-        density: f_Θ at the points.
-        areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
+        density: f_Θ at the quadrature points.
+        areas: Weights of the points in their slice, shape (m, 3, points); a slice's sum is 4.
         numbering: Reduced unknowns.
         map: The radius map.
         matrix: The reduced stiffness.
@@ -163,43 +181,54 @@ class PrismProblem:
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
-        self.grid, self.comm = grid, comm
+        self.grid = grid
+        self.comm = comm
         self.mesh = mesh_of(comm, grid.cells, grid.nodes, wedge(3))
         self.space = fem.functionspace(self.mesh, wedge(2))
         self.wedge: Ints = np.asarray(self.mesh.topology.original_cell_index)
         self.layer = self.wedge // len(grid.plane.triangles)
-        sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
+        sizes = self.space.dofmap.index_map
+        geometry = self.mesh.geometry
         self.node: Ints = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
         self.node[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
         self._compile_forms()
+
+        # The rows of this rank need the prisms of all layers that touch them.
         self.numbering = LevelNumbering(grid, comm)
-        pairs, rows = self.numbering.pairs, self.numbering.rows
-        layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
-        cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
+        pairs = self.numbering.pairs
+        by_layer = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
+        cells = by_layer[self.numbering.layers].reshape(-1, by_layer.shape[-1])
         self.elimination = Elimination(
-            pairs[self.node], pairs[cells], rows, self.numbering.size, comm
+            pairs[self.node],
+            cells=pairs[cells],
+            rows=self.numbering.rows,
+            size=self.numbering.size,
+            comm=comm,
         )
         self.matrix = self.elimination.matrix
 
     def _compile_forms(self) -> None:
+        """Make measures, density, form and strains at the quadrature points."""
         points, weights = prism_rule()
         metadata = {
             "quadrature_rule": "custom",
             "quadrature_points": points,
             "quadrature_weights": weights,
         }
-        phase, num_phases = self.grid.phase[self.wedge], len(self.grid.names)
-        cells = [(k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(num_phases)]
+        phase = self.grid.phase[self.wedge]
+        numbers = range(len(self.grid.names))
+        cells = [(number, np.flatnonzero(phase == number).astype(np.int32)) for number in numbers]
         dx = ufl.Measure("dx", self.mesh, metadata=metadata, subdomain_data=cells)
-        self.dx = {name: dx(k) for k, name in enumerate(self.grid.names)}
+        self.dx = {name: dx(number) for number, name in enumerate(self.grid.names)}
 
         def at_points(*shape: int) -> fem.FunctionSpace:
-            rule = {"points": points, "weights": weights}
-            element = basix.ufl.quadrature_element("prism", value_shape=shape, **rule)
+            element = basix.ufl.quadrature_element(
+                "prism", value_shape=shape, points=points, weights=weights
+            )
             return fem.functionspace(self.mesh, element)
 
         self.density = fem.Function(at_points())
-        self._phases = np.equal.outer(np.arange(num_phases), phase)[..., None, None]
+        self._phases = np.equal.outer(numbers, phase)[..., np.newaxis, np.newaxis]
         if self.grid.conforming:
             stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
         else:
@@ -217,35 +246,51 @@ class PrismProblem:
             RefusedError: The density of θ is not positive at a quadrature point.
         """
         self.map = radius_map
-        positions, geometry = self.grid.positions(radius_map), self.mesh.geometry
+        positions = self.grid.positions(radius_map)
+        geometry = self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
-        law = radius_map.distribution
-        levels = self.grid.level_thetas(law)
-        self._rule = level_rule(law, levels, points=SLICES_PER_LAYER)
-        density = positive_density(law, self._rule.nodes).reshape(-1, SLICES_PER_LAYER)
-        volume = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
-        self.areas: Array = volume / np.diff(levels)[self.layer, None, None] * slice_weights()
-        require_valid_elements(self.grid, self.areas, self.comm)
+        distribution = radius_map.distribution
+        levels = self.grid.level_thetas(distribution)
+        self._rule = level_rule(distribution, levels, points=SLICES_PER_LAYER)
+        density = positive_density(distribution, self._rule.nodes).reshape(-1, SLICES_PER_LAYER)
         self.density.x.array[:] = np.repeat(density[self.layer], POINTS_PER_SLICE)
+
+        # det J of a prism is that of its slice times the height of its layer.
+        determinants = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
+        heights = np.diff(levels)[self.layer, np.newaxis, np.newaxis]
+        self.areas: Array = determinants / heights * slice_weights()
+        require_valid_elements(self.grid, self.areas, self.comm)
         if isinstance(radius_map, LevelSet):
-            shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
-            corners = positions[self.grid.cells[self.wedge]]
-            values = radius_map.values(np.einsum("qn,cnd->cqd", shapes, corners))
-            lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
-            highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
-            radius_map.require_both_signs(lowest, highest)
-            inside = values < 0  # eq. 14
+            inside = self._sign_of(radius_map, positions) < 0  # eq. 14
             self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
 
+    def _sign_of(self, level_set: LevelSet, positions: Array) -> Array:
+        """Return a level set's function at the points of this rank's prisms, (prisms, points).
+
+        Raises:
+            RefusedError: It has one sign at all points of all ranks.
+        """
+        points, _ = prism_rule()
+        shapes: Array = wedge(1).tabulate(0, points)[0].reshape(-1, 15)
+        corners = positions[self.grid.cells[self.wedge]]
+        values = level_set.values(np.einsum("qn,cnd->cqd", shapes, corners))
+        lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
+        highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
+        level_set.require_both_signs(lowest, highest)
+        return values
+
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
-        """Assemble the reduced stiffness of eq. 7 and return it."""
+        """Assemble the reduced stiffness of eq. 7 for the stiffness of the phases, and return it.
+
+        Each call returns the same matrix. The phases stay set in the form, for `loads`.
+        """
         at_points = np.tensordot(self._phases, np.array(stiffness), axes=(0, 0))  # eq. 13
         self._elastic.stiffness.x.array[:] = at_points.ravel()
         self._elastic.assemble(self.matrix)
         return self.matrix
 
     def loads(self, strains: Array) -> list[PETSc.Vec]:
-        """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
+        """Return the reduced forces of macroscopic strains, (loads, 3), for the phases as set."""
         return [self.elimination.forces(self._elastic.load(strain)) for strain in strains]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat) -> PETSc.KSP:
@@ -253,15 +298,16 @@ class PrismProblem:
         return krylov_solver(matrix, options, lambda: self.preconditioner(matrix))
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
-        """Preconditioner along θ of a reduced operator, assembled."""
-        law, blocks = self.map.distribution, level_blocks(matrix, self.numbering)
-        return ThetaPreconditioner(self.numbering, self.comm).set_up(law, blocks)
+        """Return the preconditioner along θ of an assembled reduced operator."""
+        preconditioner = ThetaPreconditioner(self.numbering, self.comm)
+        return preconditioner.set_up(self.map.distribution, level_blocks(matrix, self.numbering))
 
     def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
-        """Reduced matrix Pᵀ A P of a bilinear form of the user on `space`."""
+        """Return the reduced matrix Pᵀ A P of a bilinear form of the user on `space`."""
         matrix = self.matrix.duplicate()
-        for option in (PETSc.Mat.Option.SPD, PETSc.Mat.Option.SYMMETRIC):  # not known of this form
-            matrix.setOption(option, False)
+        # The pattern is that of the stiffness, but these properties are not known of this form.
+        matrix.setOption(PETSc.Mat.Option.SPD, False)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, False)
         petsc.assemble_matrix(matrix, form)
         matrix.assemble()
         return matrix
@@ -269,17 +315,22 @@ class PrismProblem:
     def slice_strains(self, strains: Array, fluctuations: Sequence[PETSc.Vec]) -> SliceStrains:
         """Return integrals over the slices of fields ε̄ + ε(u), summed over the ranks.
 
-        The fields are n of ε̄, shape (n, 3), and n of u in reduced unknowns.
+        Args:
+            strains: Macroscopic strain ε̄ of each field, shape (fields, 3).
+            fluctuations: Reduced unknowns of u of each field.
         """
-        prisms, count, rule = len(self.wedge), len(strains), self._rule
-        values = np.empty((prisms * SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
-        for k, (strain, vector) in enumerate(zip(strains, fluctuations, strict=True)):
+        num_prisms = len(self.wedge)
+        shape = num_prisms * SLICES_PER_LAYER, POINTS_PER_SLICE, 3, len(strains)
+        values = np.empty(shape)
+        for field, vector in enumerate(fluctuations):
             u = self.elimination.displacements(vector)
-            values[..., k] = self._strains(u).reshape(values.shape[:-1]) + strain
-        areas = self._phases * self.areas / AREA  # (phases, prisms, slices, points)
-        slices = self.layer[:, None] * SLICES_PER_LAYER + np.arange(SLICES_PER_LAYER)
-        integrals = SliceStrains.zeros(rule, phases=len(areas), fields=count)
-        integrals.add(values, areas.reshape(len(areas), -1, POINTS_PER_SLICE), slices.ravel())
+            values[..., field] = self._strains(u).reshape(shape[:-1]) + strains[field]
+        # Shape (phases, prisms, slices, points).
+        areas: Array = np.asarray(self._phases * self.areas / AREA, float)
+        slices = self.layer[:, np.newaxis] * SLICES_PER_LAYER + np.arange(SLICES_PER_LAYER)
+        integrals = SliceStrains.zeros(self._rule, phases=len(areas), fields=len(strains))
+        of_slices: Array = areas.reshape(len(areas), -1, POINTS_PER_SLICE)
+        integrals.add(values, of_slices, slices.ravel())
         for part in (integrals.strain, integrals.fractions, integrals.products):
             self.comm.Allreduce(MPI.IN_PLACE, part)
         return integrals

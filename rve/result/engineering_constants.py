@@ -18,7 +18,7 @@ where the phases' k are too close to show it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -28,47 +28,69 @@ from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import gauss_rule
 
 NAMES = ("E_x", "E_y", "nu_xy", "G_xy")
-PLANE_STRAIN, FREE = "plane strain", "no stress along the fibres"
-MARGIN = 1.1  # of errors to first order in those of the stiffness
+PLANE_STRAIN = "plane strain"
+FREE = "no stress along the fibres"
 
 
 @dataclass(frozen=True, eq=False)
 class EngineeringConstants:
-    """E_x, E_y, ν_xy, G_xy, moduli in Pa, (4,), and declared absolute errors, nan if unknown."""
+    """Engineering constants of a plane stiffness.
+
+    Args:
+        values: E_x, E_y, ν_xy and G_xy, shape (4,), moduli in Pa.
+        errors: Their declared absolute errors, shape (4,), nan if unknown.
+    """
 
     values: Array
     errors: Array
 
     @classmethod
     def of_stiffness(cls, stiffness: Array, errors: Array) -> EngineeringConstants:
-        """E_x, E_y, ν_xy and G_xy of C, (3, 3), from the declared errors of its entries, in Pa."""
-        S = np.linalg.inv(stiffness)
-        S_error = MARGIN * abs(S) @ errors @ abs(S)  # δS = −S δC S
-        moduli, poisson = 1 / np.diag(S), -S[0, 1] / S[0, 0]
-        moduli_error = np.diag(S_error) * moduli * moduli
-        poisson_error = (S_error[0, 1] + abs(poisson) * S_error[0, 0]) / S[0, 0]
-        values = np.array([*moduli[:2], poisson, moduli[2]])
-        return cls(values, np.array([*moduli_error[:2], poisson_error, moduli_error[2]]))
+        """Return the constants of a stiffness C.
+
+        Args:
+            stiffness: C, shape (3, 3), in Pa.
+            errors: Declared absolute errors of its entries, shape (3, 3), in Pa.
+        """
+        # To first order the compliance S = C⁻¹ changes by δS = −S δC S. The margin stands for what
+        # is of second order.
+        compliance = np.linalg.inv(stiffness)
+        compliance_errors = 1.1 * abs(compliance) @ errors @ abs(compliance)
+        moduli = 1 / np.diag(compliance)
+        modulus_errors = np.diag(compliance_errors) * moduli * moduli
+        poisson = -compliance[0, 1] / compliance[0, 0]
+        numerator_error = compliance_errors[0, 1] + abs(poisson) * compliance_errors[0, 0]
+        poisson_error = numerator_error / compliance[0, 0]
+        return cls(
+            values=np.array([moduli[0], moduli[1], poisson, moduli[2]]),
+            errors=np.array(
+                [modulus_errors[0], modulus_errors[1], poisson_error, modulus_errors[2]]
+            ),
+        )
 
 
 def engineering_constants(result: HomogenisedStiffness) -> dict[str, EngineeringConstants]:
-    """E_x, E_y, ν_xy and G_xy by `PLANE_STRAIN` and, of two isotropic phases, `FREE`.
+    """Return E_x, E_y, ν_xy and G_xy by `PLANE_STRAIN` and, of two isotropic phases, `FREE`.
 
-    Empty for a result without its plane stiffness.
+    It is empty for a result without its plane stiffness.
     """
-    stiffness, errors = result.stiffness, result.stiffness_errors
+    stiffness = result.stiffness
+    errors = result.stiffness_errors
     if stiffness is None or errors is None or stiffness.shape != (3, 3):
         return {}
     constants = {PLANE_STRAIN: EngineeringConstants.of_stiffness(stiffness, errors)}
     axial = AxialStiffness.of_result(result)
     if axial is not None:
-        condensed = axial.condense_axial_stress(stiffness, errors)
-        constants[FREE] = EngineeringConstants.of_stiffness(*condensed)
+        constants[FREE] = axial.free_constants(stiffness, errors)
     return constants
 
 
-POINTS = 32  # nodes in θ
-EQUIBIAXIAL = np.array([1.0, 1.0, 0.0])  # plane strain in Voigt order
+class Interval(NamedTuple):
+    """A number with bounds."""
+
+    value: float
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -78,7 +100,7 @@ class Mixture:
     Args:
         moduli: k, l and n of matrix and inclusion, shape (3, 2), in Pa.
         fractions: Their mean area fractions, shape (2,).
-        bounds: Of z̄ by Hashin and Shtrikman, in 1/Pa.
+        bounds: Bounds of z̄ by Hashin and Shtrikman, in 1/Pa.
     """
 
     moduli: Array
@@ -87,43 +109,54 @@ class Mixture:
 
     @classmethod
     def of_cell(cls, cell: Cell) -> Self:
-        """Moduli, mean area fractions and Hashin–Shtrikman bounds of z̄ of a cell of two phases."""
-        rule = gauss_rule(cell.radius_map.distribution, points=POINTS)
-        inclusion, stiffness = cell.fraction(rule.nodes), np.array(cell.stiffness)
-        axial, lateral, shear = stiffness[:, 0, 0], stiffness[:, 0, 1], stiffness[:, 2, 2]
-        bulk, matrix = (axial + lateral) / 2, 1 - inclusion
-        # z = f₁ f₂ / (f₂ k₁ + f₁ k₂ + G), bounded with G of either phase
+        """Return moduli, mean area fractions and bounds of z̄ of a cell of two isotropic phases."""
+        rule = gauss_rule(cell.radius_map.distribution, points=32)
+        inclusion = cell.fraction(rule.nodes)
+        stiffness = np.array(cell.stiffness)
+        axial = stiffness[:, 0, 0]
+        lateral = stiffness[:, 0, 1]
+        bulk = (axial + lateral) / 2
+        # z = f₁ f₂ / (f₂ k₁ + f₁ k₂ + G) with the area fractions f is bounded by taking the shear
+        # modulus G of either phase.
+        matrix = 1 - inclusion
         swapped = inclusion * bulk[0] + matrix * bulk[1]
-        bounds = [float(rule.weights @ (matrix * inclusion / (swapped + G))) for G in shear]
+        products = matrix * inclusion
+        bounds = [
+            float(rule.weights @ (products / (swapped + shear))) for shear in stiffness[:, 2, 2]
+        ]
         mean = float(rule.weights @ inclusion)
-        moduli = np.array([bulk, lateral, axial])
-        return cls(moduli, np.array([1 - mean, mean]), (min(bounds), max(bounds)))
+        return cls(
+            moduli=np.array([bulk, lateral, axial]),
+            fractions=np.array([1 - mean, mean]),
+            bounds=(min(bounds), max(bounds)),
+        )
 
     @property
     def differences(self) -> Array:
         """Δk, Δl and Δn, shape (3,), in Pa."""
         return np.asarray(np.diff(self.moduli, axis=1)[:, 0])
 
-    def z_from_bulk(self, bulk: float, relative_error: float) -> tuple[float, float, float]:
-        """z̄ in bulk = ⟨k⟩ − z̄ (k₂ − k₁)², and its lower and upper bound, in 1/Pa.
+    def z_from_bulk(self, bulk: float, relative_error: float) -> Interval:
+        """Return z̄ in bulk = ⟨k⟩ − z̄ (k₂ − k₁)² with its bounds, in 1/Pa.
 
-        Where the error of the bulk modulus (in Pa) hides z̄, the Hashin–Shtrikman bounds alone.
+        Where the error of the bulk modulus (in Pa) hides z̄, they are those of Hashin and Shtrikman
+        alone, with their midpoint.
         """
         low, high = self.bounds
-        contrast_squared, tolerance = float(self.differences[0] ** 2), relative_error * bulk
+        contrast_squared = float(self.differences[0] ** 2)
+        tolerance = relative_error * bulk
         if 2 * tolerance >= contrast_squared * (high - low) or contrast_squared == 0:
-            return (low + high) / 2, low, high
+            return Interval((low + high) / 2, low, high)
         drop = self.fractions @ self.moduli[0] - bulk
         candidates = (drop + np.array([0, -tolerance, tolerance])) / contrast_squared
-        z, lower, upper = np.clip(candidates, low, high)
-        return float(z), float(lower), float(upper)
+        return Interval(*np.clip(candidates, low, high).tolist())
 
     def bulk(self, z: float) -> float:
-        """In-plane bulk modulus in Pa."""
+        """Return the in-plane bulk modulus in Pa from z̄ in 1/Pa."""
         return float(self.fractions @ self.moduli[0] - z * self.differences[0] ** 2)
 
     def lateral_and_axial(self, z: float) -> tuple[float, float]:
-        """C13 = C23 of a cell of square symmetry, and C33, from z̄ in 1/Pa; in Pa."""
+        """Return C13 = C23 of a cell of square symmetry, and C33, in Pa, from z̄ in 1/Pa."""
         _, lateral, axial = self.moduli @ self.fractions
         bulk_contrast, lateral_contrast, _ = self.differences
         coupling = bulk_contrast * lateral_contrast
@@ -132,7 +165,14 @@ class Mixture:
 
 @dataclass(frozen=True, eq=False)
 class AxialStiffness:
-    """C13, C23 and C63, shape (3,), and C33, with their declared absolute errors, in Pa."""
+    """Stiffness along the fibres, with declared absolute errors, in Pa.
+
+    Args:
+        lateral: C13, C23 and C63, shape (3,).
+        axial: C33.
+        lateral_errors: Errors of `lateral`, shape (3,).
+        axial_error: Error of `axial`.
+    """
 
     lateral: Array
     axial: float
@@ -141,36 +181,51 @@ class AxialStiffness:
 
     @classmethod
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
-        """C13, C23, C63 and C33 from a computed plane stiffness by Hill's relations, with errors.
+        """Return the stiffness along the fibres from the plane stiffness by Hill's relations.
 
         None without a cell of two isotropic phases, a plane stiffness and its errors.
         """
-        cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
+        cell = result.cell
+        stiffness = result.stiffness
+        errors = result.stiffness_errors
         if cell is None or stiffness is None or errors is None:
             return None
         if not all(isinstance(phase, Phase) for phase in cell.phases):
             return None
-        mixture, response = Mixture.of_cell(cell), stiffness @ EQUIBIAXIAL / 2
-        bulk = float(response @ EQUIBIAXIAL / 2)
-        z, *z_bounds = mixture.z_from_bulk(bulk, float(result.modulus_errors[0]))
-        z_error = max(abs(bound - z) for bound in z_bounds)
-        dk, dl, _ = mixture.differences
+        mixture = Mixture.of_cell(cell)
+        equibiaxial = np.array([1.0, 1.0, 0.0])
+        response = stiffness @ equibiaxial / 2
+        bulk = float(response @ equibiaxial / 2)
+        z, lower, upper = mixture.z_from_bulk(bulk, float(result.modulus_errors[0]))
+        z_error = max(z - lower, upper - z)
+        bulk_contrast, lateral_contrast, _ = mixture.differences
         mean_lateral, axial = mixture.lateral_and_axial(z)
-        # the part of C (1, 1, 0)/2 that is not of square symmetry enters times Δl/Δk
-        ratio = dl / dk if abs(dk) > 1e-9 * mixture.moduli[0].max() else 0.0
-        anisotropic = response - bulk * EQUIBIAXIAL
-        mean_error = z_error * abs(dk * dl)
+
+        # The part of C (1, 1, 0)/2 that is not of square symmetry enters times Δl/Δk. It vanishes
+        # where Δk does, since the phases then have equal stress under (1, 1, 0).
+        is_contrast = abs(bulk_contrast) > 1e-9 * mixture.moduli[0].max()
+        ratio = lateral_contrast / bulk_contrast if is_contrast else 0.0
+        anisotropic = response - bulk * equibiaxial
+        mean_error = z_error * abs(bulk_contrast * lateral_contrast)
+        anisotropic_errors = abs(ratio) * (errors @ equibiaxial) / 2
         return cls(
-            lateral=mean_lateral * EQUIBIAXIAL + ratio * anisotropic,
+            lateral=mean_lateral * equibiaxial + ratio * anisotropic,
             axial=axial,
-            lateral_errors=mean_error * EQUIBIAXIAL + abs(ratio) * (errors @ EQUIBIAXIAL) / 2,
-            axial_error=z_error * dl**2,
+            lateral_errors=mean_error * equibiaxial + anisotropic_errors,
+            axial_error=z_error * lateral_contrast**2,
         )
 
-    def condense_axial_stress(self, stiffness: Array, errors: Array) -> tuple[Array, Array]:
-        """C − c cᵀ/C33 without stress along the fibres, and errors of its entries, (3, 3) in Pa."""
+    def free_constants(self, stiffness: Array, errors: Array) -> EngineeringConstants:
+        """Return the constants of C − c cᵀ/C33, in which there is no stress along the fibres.
+
+        Args:
+            stiffness: C of plane strain, shape (3, 3), in Pa.
+            errors: Declared absolute errors of its entries, shape (3, 3), in Pa.
+        """
         c = self.lateral
         reduction = np.outer(c, c) / self.axial
         by_lateral = np.outer(abs(c), self.lateral_errors) / self.axial
         by_axial = abs(reduction) * self.axial_error / self.axial
-        return stiffness - reduction, errors + by_lateral + by_lateral.T + by_axial
+        return EngineeringConstants.of_stiffness(
+            stiffness - reduction, errors + by_lateral + by_lateral.T + by_axial
+        )

@@ -38,9 +38,12 @@ class Elimination:
     def __init__(
         self, pairs: Ints, cells: Ints, rows: range, size: int, comm: MPI.Intracomm
     ) -> None:
-        self._num_nodes, self._sizes = len(pairs), (len(rows), size)
+        self._num_nodes = len(pairs)
+        self._sizes = (len(rows), size)  # on this rank, and on all
         self._map = PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
         self.matrix = self._zero_matrix(cells, rows)
+
+        # Values of the unknowns of this rank's nodes are fetched from the ranks that own them.
         self._free_nodes = np.flatnonzero(pairs >= 0)
         blocks = pairs[self._free_nodes].astype(PETSc.IntType)
         needed = PETSc.IS().createBlock(2, blocks, comm=PETSc.COMM_SELF)
@@ -49,17 +52,23 @@ class Elimination:
         self._scatter = PETSc.Scatter().create(vector, needed, self._values, None)
 
     def _zero_matrix(self, cells: Ints, rows: range) -> PETSc.Mat:
-        has_unknown, size = cells >= 0, self._sizes[1]
-        cell = np.broadcast_to(np.arange(len(cells))[:, None], cells.shape)[has_unknown]
-        unit = np.ones(len(cell), np.int8)
-        cell_to_pair = sp.csr_matrix((unit, (cell, cells[has_unknown])), (len(cells), size // 2))
+        """Return zeros in this rank's rows of the pattern of all pairs that share a cell."""
+        num_pairs = self._sizes[1] // 2
+        has_unknown = cells >= 0
+        all_cells = np.arange(len(cells))[:, np.newaxis]
+        cell = np.broadcast_to(all_cells, cells.shape)[has_unknown]
+        ones = np.ones(len(cell), np.int8)
+        places = (cell, cells[has_unknown])
+        cell_to_pair = sp.csr_matrix((ones, places), (len(cells), num_pairs))
         pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
         neighbours = pair_to_cell @ cell_to_pair
         neighbours.sort_indices()
+
         blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
         bsr = blocks, neighbours.indices, neighbours.indptr
         pattern = sp.bsr_matrix(bsr, shape=self._sizes).tocsr()
-        indptr, indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+        indptr = pattern.indptr.astype(PETSc.IntType)
+        indices = pattern.indices.astype(PETSc.IntType)
         matrix = PETSc.Mat().createAIJ((self._sizes, self._sizes), bsize=2, comm=self._map.comm)
         matrix.setPreallocationCSR((indptr, indices, np.zeros(pattern.nnz)))
         matrix.setLGMap(self._map, self._map)
@@ -67,7 +76,7 @@ class Elimination:
         return matrix
 
     def forces(self, values: Array) -> PETSc.Vec:
-        """Pᵀ f of forces on this rank's nodes, (nodes · 2,): those of partners are added."""
+        """Return Pᵀ f of forces on this rank's nodes, shape (2 nodes,): partners are added."""
         vector = PETSc.Vec().createMPI(self._sizes, bsize=2, comm=self._map.comm)
         vector.setLGMap(self._map)
         nodes = np.arange(self._num_nodes, dtype=PETSc.IntType)
@@ -76,7 +85,7 @@ class Elimination:
         return vector
 
     def displacements(self, vector: PETSc.Vec) -> Array:
-        """P U of this rank's nodes, zero where held, shape (nodes, 2)."""
+        """Return P U at this rank's nodes, zero where held, shape (nodes, 2)."""
         self._scatter.scatter(vector, self._values)
         displacements = np.zeros((self._num_nodes, 2))
         displacements[self._free_nodes] = self._values.array_r.reshape(-1, 2)
@@ -103,49 +112,63 @@ class LevelNumbering:
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
-        self.grid, self.planar = grid, unknowns(grid.plane.points)
+        self.grid = grid
+        self.planar = unknowns(grid.plane.points)
         self.level_size = 2 * (int(self.planar.max()) + 1)
         self.mid_level_size = 2 * (int(self.planar[: grid.plane.vertices].max()) + 1)
         self.stride = self.level_size + self.mid_level_size
         self.size = grid.layers * self.stride + self.level_size
-        # the last ranks have a level more, and with it no mid-level above their last one: so
-        # levels go with the prisms that are divided evenly, and few entries are of other ranks
-        first, last = ((grid.layers + 1) * k // comm.size for k in (comm.rank, comm.rank + 1))
-        self.levels, self.mid_levels = range(first, last), range(first, min(last, grid.layers))
-        ends = (min(k * self.stride, self.size) for k in (first, last))
-        self.rows = range(*ends)
+
+        # The last ranks have a level more, and with it no mid-level above their last one. So levels
+        # go with the prisms, which are divided evenly, and few entries are of other ranks.
+        first = (grid.layers + 1) * comm.rank // comm.size
+        last = (grid.layers + 1) * (comm.rank + 1) // comm.size
+        self.levels = range(first, last)
+        self.mid_levels = range(first, min(last, grid.layers))
+        self.rows = range(min(first * self.stride, self.size), min(last * self.stride, self.size))
         self.layers = range(max(0, first - 1), self.mid_levels.stop) if self.levels else range(0)
 
     @cached_property
     def pairs(self) -> Ints:
-        """Number p of each node's pair of displacements, −1 where held."""
-        planar, layers = self.planar, self.grid.layers
-        vertices = planar[: self.grid.plane.vertices]
-        first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level
-        on_levels = np.where(planar >= 0, planar + first_pair, -1)
-        mid_first = first_pair[:-1] + self.level_size // 2
-        on_mid_levels = np.where(vertices >= 0, vertices + mid_first, -1)
+        """Number p of each node's pair of displacements, −1 where it is held, shape (nodes,)."""
+        vertices = self.planar[: self.grid.plane.vertices]
+        first_on_level = np.arange(self.grid.layers + 1)[:, np.newaxis] * (self.stride // 2)
+        first_on_mid_level = first_on_level[:-1] + self.level_size // 2
+        on_levels = np.where(self.planar >= 0, self.planar + first_on_level, -1)
+        on_mid_levels = np.where(vertices >= 0, vertices + first_on_mid_level, -1)
         return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
     def split(self, fields: Any) -> tuple[Any, Any]:
-        """Views of hats, (…, layers + 1, n), and bubbles, (…, layers, v), of fields, (…, size).
+        """Return views of hats and bubbles of fields.
 
-        In these a field is the hats of all levels, then the bubbles of all mid-levels.
+        Args:
+            fields: Coefficients of the hats of all levels, then of the bubbles of all mid-levels,
+                shape (…, size).
+
+        Returns:
+            Hats, shape (…, layers + 1, level_size), and bubbles, (…, layers, mid_level_size).
         """
-        layers, first_bubble = self.grid.layers, (self.grid.layers + 1) * self.level_size
-        hats, bubbles = fields[..., :first_bubble], fields[..., first_bubble:]
+        layers = self.grid.layers
+        first_bubble = (layers + 1) * self.level_size
         shape = fields.shape[:-1]
-        return hats.reshape(*shape, layers + 1, -1), bubbles.reshape(*shape, layers, -1)
+        hats = fields[..., :first_bubble].reshape(*shape, layers + 1, -1)
+        return hats, fields[..., first_bubble:].reshape(*shape, layers, -1)
 
     def nodal_values(self) -> sp.csr_matrix:
-        """Matrix from hats and bubbles, as in `split`, to unknowns: to nodal values."""
-        layers, v = self.grid.layers, self.mid_level_size
+        """Return the matrix from hats and bubbles, in the order of `split`, to nodal values.
+
+        The value on a level is its hat. That on a mid-level is its bubble and half of the hats
+        above and below.
+        """
+        layers = self.grid.layers
+        vertices = np.arange(self.mid_level_size)
         hats, bubbles = self.split(np.arange(self.size))
-        on_levels = np.arange(layers + 1)[:, None] * self.stride + np.arange(self.level_size)
-        on_mid_levels = np.arange(layers)[:, None] * self.stride + self.level_size + np.arange(v)
-        # a mid-level has its bubble and half of the hats above and below
-        rows = [on_levels, on_mid_levels, on_mid_levels, on_mid_levels]
-        columns = [hats, bubbles, hats[:-1, :v], hats[1:, :v]]
-        values = np.repeat([1.0, 1.0, 0.5, 0.5], [part.size for part in rows])
-        places = tuple(np.concatenate([part.ravel() for part in x]) for x in (rows, columns))
-        return sp.csr_matrix((values, places), (self.size, self.size))
+        on_levels = np.arange(layers + 1)[:, np.newaxis] * self.stride + np.arange(self.level_size)
+        on_mid_levels = on_levels[:-1, :1] + self.level_size + vertices
+        below = hats[:-1, : self.mid_level_size]
+        above = hats[1:, : self.mid_level_size]
+        rows = np.concatenate([on_levels.ravel(), np.tile(on_mid_levels.ravel(), 3)])
+        columns = np.concatenate([part.ravel() for part in (hats, bubbles, below, above)])
+        ones = np.ones(hats.size + bubbles.size)
+        values = np.concatenate([ones, np.full(2 * bubbles.size, 0.5)])
+        return sp.csr_matrix((values, (rows, columns)), (self.size, self.size))

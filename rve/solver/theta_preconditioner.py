@@ -27,7 +27,7 @@ and the solutions of all levels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -40,8 +40,12 @@ from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.stochastic import ThetaDistribution
 from alphacut.stochastic.theta.quadrature import level_rule
 
-Fields = tuple[Array, Array]  # hats and bubbles
-PREFIX, LEVEL = "rve_", "level_"  # of PETSc options, and after it of the levels' solvers
+Fields = tuple[Array, Array]
+"""Hats, shape (…, layers + 1, n), and bubbles, shape (…, layers, v), of n and v unknowns."""
+PREFIX = "rve_"
+"""Prefix of PETSc options of the whole system."""
+LEVEL = "level_"
+"""Prefix, after `PREFIX`, of options of the levels' solvers."""
 
 
 @dataclass(frozen=True)
@@ -63,26 +67,42 @@ class ThetaMass:
     projection: Array
 
 
-def theta_mass(law: ThetaDistribution, levels: Array) -> ThetaMass:
-    """Masses along θ, weighted by the density, of hats at the levels and bubbles between them."""
-    layers, points = len(levels) - 1, 3
-    t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2  # the points of a layer
-    shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat, bubble of a layer
-    density = level_rule(law, levels, points=points).weights.reshape(layers, points)
-    layer_mass = np.einsum("lq,iq,jq->lij", density, shapes, shapes)
-    k = np.arange(layers)
-    number = np.stack([k, k + 1, k + layers + 1], axis=1)
-    mass = np.zeros((2 * layers + 1,) * 2)
-    np.add.at(mass, (number[:, :, None], number[:, None, :]), layer_mass)
-    hats, bubbles = mass[: layers + 1, : layers + 1], mass[layers + 1 :, layers + 1 :]
+def theta_mass(distribution: ThetaDistribution, levels: Array) -> ThetaMass:
+    """Return the masses along θ of hats at the levels and of bubbles between them.
+
+    Args:
+        distribution: Distribution of θ, whose density is the weight.
+        levels: θ of the levels, rising, shape (layers + 1,).
+    """
+    layers = len(levels) - 1
+    points = 3  # of Gauss in a layer, exact for products of bubbles
+    t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2
+    shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat and bubble of a layer
+    weights = level_rule(distribution, levels, points=points).weights.reshape(layers, points)
+    layer_mass = np.einsum("lq,iq,jq->lij", weights, shapes, shapes)
+
+    # Add up the layers: hats are numbered first, then bubbles.
+    layer = np.arange(layers)
+    number = np.stack([layer, layer + 1, layer + layers + 1], axis=1)
+    size = 2 * layers + 1
+    mass = np.zeros((size, size))
+    np.add.at(mass, (number[:, :, np.newaxis], number[:, np.newaxis, :]), layer_mass)
+    hats = mass[: layers + 1, : layers + 1]
+    bubbles = mass[layers + 1 :, layers + 1 :]
     coupling = mass[: layers + 1, layers + 1 :]  # M_hb
     projection: Array = np.asarray(np.linalg.solve(hats, coupling), float)
     orthogonal_mass = bubbles - coupling.T @ projection  # G
-    roots = _inverse_root(hats), _inverse_root(orthogonal_mass)
-    return ThetaMass(hats.diagonal(), bubbles.diagonal(), *roots, projection)
+    return ThetaMass(
+        hats=hats.diagonal(),
+        bubbles=bubbles.diagonal(),
+        inverse_root=_inverse_root(hats),
+        bubble_inverse_root=_inverse_root(orthogonal_mass),
+        projection=projection,
+    )
 
 
 def _inverse_root(matrix: Array) -> Array:
+    """Return the symmetric A^-½ of a symmetric positive definite matrix."""
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
@@ -93,12 +113,17 @@ def precondition(
     residual: Fields,
     solve: Callable[[Array, Array], Fields],
 ) -> Fields:
-    """P⁻¹ r in hats, (…, layers + 1, n), and bubbles, (…, layers, v), as at the head of the file.
+    """Return P⁻¹ r in hats and bubbles, by the formula at the head of this file.
 
-    `injection` is J, (n, v), and `solve` gives diag(K_k⁻¹) and diag(K_b⁻¹) times such values.
+    Args:
+        mass: Masses along θ.
+        injection: J from linear to quadratic triangles, shape (n, v).
+        residual: Hats and bubbles of r.
+        solve: Function that returns diag(K_k⁻¹) and diag(K_b⁻¹) times hats and bubbles.
     """
     hats, bubbles = residual
-    hat_root, bubble_root = mass.inverse_root, mass.bubble_inverse_root  # M^-½, G^-½
+    hat_root = mass.inverse_root  # M^-½
+    bubble_root = mass.bubble_inverse_root  # G^-½
     projected = columnwise(injection.T, bubble_root @ mass.projection.T @ hats)
     hats, bubbles = solve(hat_root @ hats, bubble_root @ bubbles - projected)
     bubbles = bubble_root @ bubbles
@@ -106,30 +131,38 @@ def precondition(
 
 
 def columnwise(matrix: sp.csr_matrix, values: Array) -> Array:
-    """Product of a matrix, (m, n), with the last axis of values, (…, n); shape (…, m)."""
+    """Return the product of a matrix, (m, n), with the last axis of values, (…, n): (…, m)."""
     product = matrix @ values.reshape(-1, values.shape[-1]).T
     return np.ascontiguousarray(product.T).reshape(*values.shape[:-1], -1)
 
 
 class ThetaPreconditioner:
-    """P⁻¹ of reduced stiffnesses of one numbering; a context of PETSc's ``pc_type python``."""
+    """P⁻¹ of reduced stiffnesses of one numbering; a context of PETSc's ``pc_type python``.
+
+    Args:
+        numbering: Numbering of the unknowns.
+        comm: Communicator.
+    """
 
     def __init__(self, numbering: LevelNumbering, comm: MPI.Intracomm) -> None:
-        self._numbering, self._comm = numbering, comm
-        self._injection, self._nodal_values = injection(numbering), numbering.nodal_values()
-        self._rank_levels = numbering.levels, numbering.mid_levels
+        self._numbering = numbering
+        self._comm = comm
+        self._injection = injection(numbering)
+        self._nodal_values = numbering.nodal_values()
         self._solvers: list[PlaneSolver] = []
 
     def set_up(
-        self, law: ThetaDistribution, blocks: Iterable[sp.csr_matrix]
+        self, distribution: ThetaDistribution, blocks: Iterable[sp.csr_matrix]
     ) -> ThetaPreconditioner:
         """Factorise the blocks of this rank's levels, then mid-levels; return the preconditioner.
 
-        The blocks, in hats and bubbles and with sorted indices, keep their pattern from one call to
-        the next.
+        Args:
+            distribution: Distribution of θ.
+            blocks: Diagonal blocks of the stiffness in hats and bubbles, with sorted indices. They
+                keep their pattern from one call to the next.
         """
         numbering = self._numbering
-        self._mass = theta_mass(law, numbering.grid.level_thetas(law))
+        self._mass = theta_mass(distribution, numbering.grid.level_thetas(distribution))
         masses = [*self._mass.hats[numbering.levels], *self._mass.bubbles[numbering.mid_levels]]
         for number, (block, mass) in enumerate(zip(blocks, masses, strict=True)):
             if number == len(self._solvers):
@@ -142,23 +175,36 @@ class ThetaPreconditioner:
 
         On one rank several residuals may stand one after another in a vector.
         """
-        forces = self._gathered(residual.array_r).reshape(-1, self._numbering.size)
-        fields = self._numbering.split((self._nodal_values.T @ forces.T).T)
-        fields = precondition(self._mass, self._injection, fields, self._solve)
-        flat = np.concatenate([x.reshape(len(forces), -1) for x in fields], axis=1)
+        numbering = self._numbering
+        forces = self._gathered(residual.array_r).reshape(-1, numbering.size)
+        fields = numbering.split((self._nodal_values.T @ forces.T).T)
+        hats, bubbles = precondition(self._mass, self._injection, fields, self._solve)
+        count = len(forces)
+        flat = np.concatenate([hats.reshape(count, -1), bubbles.reshape(count, -1)], axis=1)
         values = self._nodal_values @ flat.T
-        result.array[:] = values[self._numbering.rows.start : self._numbering.rows.stop].T.ravel()
+        result.array[:] = values[numbering.rows.start : numbering.rows.stop].T.ravel()
 
-    def _solve(self, *loads: Array) -> Fields:
-        """Solutions of all levels and of all mid-levels, of which each rank solves its own."""
-        solvers, solutions = iter(self._solvers), []
-        for load, rows in zip(loads, self._rank_levels, strict=True):
-            solution = np.empty((len(load), len(rows), load.shape[-1]))
-            for k, level in enumerate(rows):
-                solution[:, k] = next(solvers).solve(load[:, level])
-            solutions.append(self._gathered(solution, axis=1))
-        hats, bubbles = solutions
+    def _solve(self, hat_loads: Array, bubble_loads: Array) -> Fields:
+        """Return the solutions of all levels and mid-levels, of which each rank solves its own."""
+        num_levels = len(self._numbering.levels)
+        hats = self._solve_own(self._solvers[:num_levels], hat_loads, self._numbering.levels)
+        bubbles = self._solve_own(
+            self._solvers[num_levels:], bubble_loads, self._numbering.mid_levels
+        )
         return hats, bubbles
+
+    def _solve_own(self, solvers: Sequence[PlaneSolver], loads: Array, levels: range) -> Array:
+        """Return the solutions of all ranks, each by its solvers of its levels.
+
+        Args:
+            solvers: Solver of each of this rank's levels.
+            loads: Right-hand sides, shape (fields, all levels, unknowns of a level).
+            levels: This rank's levels.
+        """
+        solutions = np.empty((len(loads), len(levels), loads.shape[-1]))
+        for k, (solver, level) in enumerate(zip(solvers, levels, strict=True)):
+            solutions[:, k] = solver.solve(loads[:, level])
+        return self._gathered(solutions, axis=1)
 
     def _gathered(self, part: Array, *, axis: int = 0) -> Array:
         """Return the parts of all ranks, one after another along an axis."""
@@ -168,11 +214,12 @@ class ThetaPreconditioner:
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
-        levels, mid_levels = map(len, self._rank_levels)
-        count = f"{levels} levels and {mid_levels} mid-levels on the first rank"
+        levels = self._numbering.levels
+        mid_levels = self._numbering.mid_levels
+        count = f"{len(levels)} levels and {len(mid_levels)} mid-levels on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
-        if 0 in self._rank_levels[0]:  # on the rank that has it
+        if 0 in levels:  # on the rank that has it
             self._solvers[0].ksp.view(rank_viewer)
         viewer.restoreSubViewer(rank_viewer)
 
@@ -180,11 +227,13 @@ class ThetaPreconditioner:
 class PlaneSolver:
     """Solver of a level's block over its mass along θ, by default a Cholesky factor.
 
-    The symbolic factor of the pattern, whose indices are sorted, is kept.
+    Args:
+        pattern: Matrix with the pattern of all blocks, whose indices are sorted. The symbolic
+            factor of it is kept.
     """
 
     def __init__(self, pattern: sp.csr_matrix) -> None:
-        self._values = np.ones(pattern.nnz)  # PETSc's matrix has its values here
+        self._values = np.ones(pattern.nnz)  # PETSc's matrix has its values in this array
         csr = self._values, pattern.indices, pattern.indptr
         self._matrix = aij(sp.csr_matrix(csr, pattern.shape))
         self.ksp = cholesky(self._matrix, PREFIX + LEVEL)
@@ -194,7 +243,7 @@ class PlaneSolver:
         self._values[:] = values
         self._matrix.assemble()
         self.ksp.setOperators(self._matrix)
-        self.ksp.setFromOptions()  # so that PETSc knows them as used
+        self.ksp.setFromOptions()  # so that PETSc knows the options as used
         self.ksp.setUp()
 
     def solve(self, loads: Array) -> Array:
@@ -205,31 +254,42 @@ class PlaneSolver:
 
 
 def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
-    """Diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles, sorted.
+    """Yield the diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles.
 
-    `matrix` is an assembled reduced stiffness.
+    Their indices are sorted.
+
+    Args:
+        matrix: Assembled reduced stiffness.
+        numbering: Numbering of its unknowns.
     """
+    # A hat has half of its value on the mid-level below too. Below the first level of this rank
+    # that mid-level belongs to another rank, so that its unknowns are taken as well.
     rows = numbering.rows
-    # unknowns of other ranks are those of the mid-level below the first level alone
     first = max(0, rows.start - numbering.mid_level_size)
-    span = PETSc.IS().createStride(rows.stop - first, first, 1, comm=PETSc.COMM_SELF)
-    starts, columns, values = matrix.createSubMatrices(span)[0].getValuesCSR()
-    stiffness = sp.csr_matrix((values, columns, starts), (rows.stop - first,) * 2)
-    all_hats, all_bubbles = numbering.split(np.arange(numbering.size))
-    hats, bubbles = all_hats[numbering.levels], all_bubbles[numbering.mid_levels]
-    T = numbering.nodal_values()[first : rows.stop][:, np.append(hats, bubbles)]
+    size = rows.stop - first
+    span = PETSc.IS().createStride(size, first, 1, comm=PETSc.COMM_SELF)
+    indptr, indices, values = matrix.createSubMatrices(span)[0].getValuesCSR()
+    stiffness = sp.csr_matrix((values, indices, indptr), (size, size))
+    hats, bubbles = numbering.split(np.arange(numbering.size))
+    own = [*hats[numbering.levels], *bubbles[numbering.mid_levels]]
+    T = numbering.nodal_values()[first : rows.stop][:, np.concatenate([np.empty(0, int), *own])]
     products = T.T.tocsr() @ stiffness @ T
-    for start, stop in pairwise(np.cumsum([0, *map(len, hats), *map(len, bubbles)])):
+    ends = np.cumsum([0, *map(len, own)])
+    for start, stop in pairwise(ends):
         yield products[start:stop, start:stop].sorted_indices()
 
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Matrix J from linear to quadratic triangles; midpoints get the mean of their vertices."""
+    """Return the matrix J from linear to quadratic triangles.
+
+    A midpoint gets the mean of the vertices of its edge.
+    """
     ends = interpolated_vertices(numbering)
     node, end = np.nonzero(ends >= 0)  # not of fixed vertices
-    halves = np.full(len(node), 0.5), (node, ends[node, end])
+    halves = np.full(len(node), 0.5)
     shape = len(ends), numbering.mid_level_size // 2
-    return sp.kron(sp.csr_matrix(halves, shape), sp.eye(2), "csr")
+    scalar = sp.csr_matrix((halves, (node, ends[node, end])), shape)
+    return sp.kron(scalar, sp.eye(2), "csr")
 
 
 def interpolated_vertices(numbering: LevelNumbering) -> Ints:
@@ -237,7 +297,8 @@ def interpolated_vertices(numbering: LevelNumbering) -> Ints:
 
     Shape (nodes, 2), in numbers of the unknown pairs. A vertex has itself twice.
     """
-    plane, unknown = numbering.grid.plane, numbering.planar
+    plane = numbering.grid.plane
+    unknown = numbering.planar
     vertices = np.arange(numbering.mid_level_size // 2)
-    first = np.unique(unknown[plane.vertices :], return_index=True)[1]  # node of each midpoint's
+    _, first = np.unique(unknown[plane.vertices :], return_index=True)  # a midpoint of each pair
     return np.concatenate([np.stack([vertices, vertices], axis=1), unknown[plane.ends[first]]])
