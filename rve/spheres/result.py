@@ -1,9 +1,8 @@
 """Result of a cell with a sphere: cubic moduli, their isotropic average, and their bounds.
 
-Voigt order in three dimensions: 11, 22, 33, 23, 13, 12, shears with 2 ε.
-
-Stresses over θ are those of the plane loads, with ε33 = 0: σ11 under ε11 = ε22 = 0.01 and σ12
-under ε12 = 0.01. E and ν are Hill's isotropic average of the mean stiffness, not eq. 16.
+Stiffness matrices are in Voigt order 11, 22, 33, 23, 13, 12, with shear strains 2 ε. The stress
+curves over θ are those of the plane loads, with ε33 = 0: σ11 under ε11 = ε22 = 0.01 and σ12 under
+ε12 = 0.01. E and ν are Hill's isotropic average of the mean stiffness, and not those of eq. 16.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ HILL = "Hill's isotropic average"
 
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Stiffness in Voigt order, (…, 6, 6), from K, (C11 − C12)/2 and C44, (…,), in their unit."""
+    """Return the stiffness in Voigt order, shape (…, 6, 6), from K, (C11 − C12)/2 and C44, (…,)."""
     voigt = np.zeros((*np.shape(bulk), 6, 6))
     voigt[..., :3, :3] = np.asarray(bulk - 2 / 3 * deviator)[..., None, None]
     for i in range(3):
@@ -33,38 +32,48 @@ def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
 
 
 def cubic_moduli(stiffness: Array) -> Array:
-    """K, (C11 − C12)/2 and C44, (…, 3), of the cubic part of a stiffness (…, 6, 6)."""
+    """Return K, (C11 − C12)/2 and C44 of the cubic part of a stiffness (…, 6, 6): shape (…, 3)."""
     diagonal = np.diagonal(stiffness, axis1=-2, axis2=-1)
-    axial, shear = diagonal[..., :3].mean(axis=-1), diagonal[..., 3:].mean(axis=-1)
+    axial = diagonal[..., :3].mean(axis=-1)
+    shear = diagonal[..., 3:].mean(axis=-1)
     lateral = (stiffness[..., 0, 1] + stiffness[..., 0, 2] + stiffness[..., 1, 2]) / 3
     return np.stack([(axial + 2 * lateral) / 3, (axial - lateral) / 2, shear], axis=-1)
 
 
 def hill_shear(moduli: Array) -> Array:
-    """Mean of Voigt's and Reuss's average of shear (Hill 1952) of K, (C11 − C12)/2, C44, (…, 3)."""
-    deviator, shear = moduli[..., 1], moduli[..., 2]
-    voigt, reuss = (2 * deviator + 3 * shear) / 5, 5 / (2 / deviator + 3 / shear)
+    """Return Hill's shear modulus (1952), the mean of Voigt's and of Reuss's average, shape (…,).
+
+    `moduli` are K, (C11 − C12)/2 and C44, shape (…, 3).
+    """
+    deviator = moduli[..., 1]
+    shear = moduli[..., 2]
+    voigt = (2 * deviator + 3 * shear) / 5
+    reuss = 5 / (2 / deviator + 3 / shear)
     return np.asarray((voigt + reuss) / 2)
 
 
 def hill_average(moduli: Array) -> Array:
-    """Young's modulus (in the unit of `moduli`) and Poisson's ratio of Hill's average, (…, 2)."""
-    bulk, shear = moduli[..., 0], hill_shear(moduli)
+    """Return Young's modulus and Poisson's ratio of Hill's average, shape (…, 2).
+
+    `moduli` are K, (C11 − C12)/2 and C44, shape (…, 3), in whose unit Young's modulus is.
+    """
+    bulk = moduli[..., 0]
+    shear = hill_shear(moduli)
     young = 9 * bulk * shear / (3 * bulk + shear)
     return np.stack([young, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HomogenisedSpheres(HomogenisedStiffness):
-    """Effective behaviour of the simple cubic array with what it cost.
+    """Homogenised stiffness of the simple cubic array of spheres.
 
-    As `HomogenisedStiffness`, but `curve.stiffness` has shape (n, 6, 6), and `errors` and `moduli`
-    are those of K, (C11 − C12)/2 and C44.
+    It differs from `HomogenisedStiffness` in that `curve.stiffness` has shape (n, 6, 6), and that
+    `errors` and `moduli` are those of K, (C11 − C12)/2 and C44.
     """
 
     @property
     def convention(self) -> str:
-        """Name of the average that E and ν are of."""
+        """Name of the average of which E and ν are given."""
         return HILL
 
     @property
@@ -94,15 +103,16 @@ class HomogenisedSpheres(HomogenisedStiffness):
 
 
 def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
-    """Copy of a result with the relative violations of symmetry and bounds as its checks."""
+    """Return a result with its checks: relative violations of symmetry and of Hashin's bounds."""
     cell = result.cell
     assert cell is not None
     fraction = SPHERES.fractions(cell.radius_map(result.curve.theta))
-    fractions, weights = np.stack([1 - fraction, fraction]), result.curve.weights
+    fractions = np.stack([1 - fraction, fraction])
+    weights = result.curve.weights
     moduli = [phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)]
     stiffness = [cubic_voigt(bulk, shear, shear) for bulk, shear in moduli]
-    energy, bulk = np.asarray(result.stiffness), float(result.moduli[0])
-    checks = order_checks(energy, np.eye(6), fractions, weights, stiffness)
-    checks |= bulk_check(bulk, hashin_shtrikman(fractions, cell.phases, space=True)[0] @ weights)
+    checks = order_checks(np.asarray(result.stiffness), np.eye(6), fractions, weights, stiffness)
+    bulk_bounds = hashin_shtrikman(fractions, cell.phases, space=True)[0] @ weights
+    checks |= bulk_check(float(result.moduli[0]), bulk_bounds)
     checks = checks_within_limits(checks, discretisation=ROUND_OFF + result.largest_error)
     return replace(result, checks=checks)
