@@ -271,53 +271,71 @@ def read_table(
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
     _require_cell_of_each_head(table)
-    location = file.location(table.start)
-    stated = [*peaks_in_text(table.above, unit)]
     has_times = table.has_times or (table.width == 2 and step is None)
     is_series = table.width == 1 or (not has_times and bool(step and unit))
-    if is_series and not channel:
-        _require_acceleration(table, table.column_heads)
-        if step is None or not unit:
-            raise table.refusal('say records.unit = "g" and records.step = "0.005 s"')
-        return recording_in_si(location, "numbers", unit, step, table.series(), stated=stated)
+    if not is_series or channel:
+        return _read_columns(table, step, unit, channel=channel, has_times=has_times)
+    _require_acceleration(table, table.column_heads)
+    if step is None or not unit:
+        raise table.refusal('say records.unit = "g" and records.step = "0.005 s"')
+    location = file.location(table.start)
+    stated = peaks_in_text(table.above, unit)
+    return recording_in_si(location, "numbers", unit, step, table.series(), stated=stated)
 
+
+def _read_columns(
+    table: _Table, step: float | None, unit: str, *, channel: str, has_times: bool
+) -> Recording:
+    """Return the recording in one column of a table.
+
+    Args:
+        table: The table, of two rows or more.
+        step: Step in s that the case states.
+        unit: Unit that the case states.
+        channel: Number or name of the column; empty if there is only one beside the times.
+        has_times: Whether the first column has times.
+
+    Raises:
+        RefusedError: As of `read_table`.
+    """
     if table.head:  # without one, the last row of a series of numbers may be a short one
         table.numbers()
-    columns = table.columns
     index = 1
     heads = table.column_heads
     name = ""
     if channel or table.width > 2:
         index = _choose_column(table, channel, has_times=has_times)
-        heads = [f"{columns[index].name} [{columns[index].unit}]"]
-        name = f"{index + 1} {columns[index].name}".strip()
+        chosen = table.columns[index]
+        heads = [f"{chosen.name} [{chosen.unit}]"]
+        name = f"{index + 1} {chosen.name}".strip()
     _require_acceleration(table, heads)
-    column = columns[index]
-    is_understood = table.width > 2 or columns[0].is_time
-    own_unit = column.unit if is_understood else ""
-    if cure := _cure_of_head(table, column, unit=own_unit or unit):
+
+    # Of two columns without a head that begins with times only the case's unit counts.
+    is_understood = table.width > 2 or table.columns[0].is_time
+    if is_understood and table.columns[index].unit:
+        unit = table.columns[index].unit
+    if cure := _cure_of_head(table, table.columns[index], unit=unit):
         raise table.refusal(cure)
     numbers = table.numbers()
     remarks: list[str] = []
-    if not has_times:
-        if step is None:
-            raise table.refusal('say records.step = "0.005 s"')
-    else:
+    if has_times:
         step, remarks = _step_and_remarks(table, stated_step=step)
-        if is_understood and not columns[0].unit:
+        if is_understood and not table.columns[0].unit:
             remarks.append("its times have no unit, taken as s")
+    elif step is None:
+        raise table.refusal('say records.step = "0.005 s"')
     if table.head and not is_understood:
         what = f"its head, {table.head[:40]}, is not understood"
         remarks.append(f"{what}: the case's unit is taken")
     return recording_in_si(
-        location,
+        table.file.location(table.start),
         "CSV",
-        own_unit or unit,
+        unit,
         step,
         numbers[:, index],
         name,
-        (*remarks,),
-        stated=stated,
+        tuple(remarks),
+        stated=peaks_in_text(table.above, unit),
     )
 
 
