@@ -56,7 +56,7 @@ class CellContent(Section, defer_build=True):
 
     @property
     def has_spheres(self) -> bool:
-        """True if the particles of the cell are spheres."""
+        """Whether the particles of the cell are spheres."""
         return self.cell is not None and self.cell.particles == "spheres"
 
     @property
@@ -80,25 +80,31 @@ class CellContent(Section, defer_build=True):
     def random_cell(
         self,
     ) -> tuple[RadiusMapSection | ThetaSection | FractionMap, RoundCell | MeshedCell]:
-        """The radius map, or the law of θ of a mesh, and the phases; RefusedError without them."""
+        """The radius map, or the distribution of θ of a mesh, and the phases.
+
+        Raises:
+            RefusedError: The case has no cell with a particle or a mesh, or no radius.
+        """
         if self.mesh_cell is not None:
             return self.radius or ThetaSection(), self.mesh_cell
+        allowed = "a section [cell] with a particle"
+        if self.image_cell is not None:
+            cure = f"run {command_to_paste('modulus', 'CASE.toml')}"
+            raise RefusedError("cell", "an image", allowed, cure)
         if self.particle_cell is None:
-            value = "an image" if self.image_cell else None
-            cure = f"run {command_to_paste('modulus', 'CASE.toml')}" if value else ""
-            raise RefusedError("cell", value, "a section [cell] with a particle", cure)
+            raise RefusedError("cell", None, allowed)
         radius = self.radius_map or self.particle_cell.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
         return radius, self.particle_cell
 
     def require_consistent(self) -> None:
-        """Refuses sections that do not fit each other."""
+        """Refuse sections that do not fit each other."""
         self._require_mesh()
         self._require_stages()
 
     def _require_mesh(self) -> None:
-        """Refuses a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
+        """Refuse a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
@@ -118,22 +124,26 @@ class CellContent(Section, defer_build=True):
         require(tolerance is None or has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
+        """Refuse stages without the sections that they need, and two sources of a radius."""
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
         has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell
-        needs: dict[str, tuple[str, ...]] = {stage: (stage,) for stage in self.stages}
-        needs["modulus"] = ("cell",) if has_map else ("radius", "cell")
         for stage in self.stages:
-            for key in needs[stage]:
-                allowed = f"[{key}], which stage {stage} needs"
-                require(getattr(self, key) is not None, key, None, allowed)
+            if stage == "modulus" and not has_map:
+                self._require_section(stage, "radius")
+            self._require_section(stage, "cell" if stage == "modulus" else stage)
         source = "stage microstructure" if is_computed else "cell.fraction"
         is_repeated = self.radius is not None and (is_computed or has_fraction)
         require_alone("radius", is_repeated, source)
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
-        method = self.modulus.method
-        methods = (method,) if self.cell is None else self.cell.methods
-        require(method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell")
+        if self.cell is not None:
+            method, methods = self.modulus.method, self.cell.methods
+            allowed = f"{', '.join(methods)} for this cell"
+            require(method in methods, "modulus.method", method, allowed)
+
+    def _require_section(self, stage: str, key: str) -> None:
+        is_there, allowed = getattr(self, key) is not None, f"[{key}], which stage {stage} needs"
+        require(is_there, key, None, allowed)
 
 
 class CellCase(CellContent):

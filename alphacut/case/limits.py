@@ -167,7 +167,7 @@ class QuestionSection(Section):
         return limits
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuses outputs that the structure lacks, and limits that this question cannot take."""
+        """Refuse outputs that the structure lacks, and limits that this question cannot take."""
         self.limits_of(structure)
 
 
@@ -201,7 +201,7 @@ class ProbabilitySection(QuestionSection):
     """random draws at each fuzzy point"""
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuses limits and random inputs that the structure does not have."""
+        """Refuse limits and random inputs that the structure does not have."""
         super().require_answerable(structure)
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
@@ -233,7 +233,7 @@ class FragilitySection(QuestionSection):
     structure would reach all limits under all records if it were elastic"""
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuses structures with forces or a start beside the record, and unfit limits."""
+        """Refuse structures with forces or a start beside the record, and unfit limits."""
         super().require_answerable(structure)
         with _naming("fragility.limits"):
             require_fragile(structure.model, self.limits_of(structure))

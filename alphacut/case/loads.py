@@ -36,24 +36,31 @@ class ForceHistory(NamedTuple):
 
 
 def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
-    kind, *words = (word.strip() for word in str(value).split(","))
-    static = [word for word in words if word == "static"]
+    """Return the history that a text such as "harmonic, 1.5 Hz, 90 deg, from 2 s" states.
+
+    Its first word is a kind or the name of a file. Then come a frequency and perhaps a phase, of a
+    harmonic force alone, and one of "from TIME" and "static".
+    """
+    kind, *words = [word.strip() for word in str(value).split(",")]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
-    numbers = [word for word in words if word not in static and not word.startswith("from ")]
-    counts = (1, 2) if kind == "harmonic" else (0,)  # a frequency and perhaps a phase
-    max_options = 0 if kind == "impulse" else 1
-    fits = len(numbers) in counts and len(static) + len(starts) <= max_options
-    require(fits and not (static and kind == "harmonic"), "", value, HISTORY)
+    numbers = [word for word in words if word != "static" and not word.startswith("from ")]
+    is_static = "static" in words
+    n_options = len(words) - len(numbers)
+    is_harmonic = kind == "harmonic"
+    has_its_numbers = len(numbers) in (1, 2) if is_harmonic else not numbers
+    has_its_options = n_options <= (0 if kind == "impulse" else 1)
+    fits = has_its_numbers and has_its_options and not (is_static and is_harmonic)
+    require(fits, "", value, HISTORY)
     if kind == "impulse":
         return ForceHistory(None, "N*s")
     try:
         start = quantity.parse_number(starts[0], "s") if starts else 0.0
-        if kind == "harmonic":
-            phase = quantity.parse_number(numbers[1], "rad") if numbers[1:] else 0.0
+        if is_harmonic:
             frequency = quantity.parse_number(numbers[0], "Hz")
+            phase = quantity.parse_number(numbers[1], "rad") if len(numbers) == 2 else 0.0
             return ForceHistory(History.harmonic(frequency, phase, start))
         if kind == "step":
-            return ForceHistory(History.constant(start, is_static=bool(static)))
+            return ForceHistory(History.constant(start, is_static=is_static))
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
     try:
@@ -61,7 +68,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     except RefusedError as error:
         raise RefusedError("", kind, f"{HISTORY}; {error.allowed}") from None
     force = read_force_history(path)
-    history = History(force.step, force.samples, start, is_static=bool(static))
+    history = History(force.step, force.samples, start, is_static=is_static)
     return ForceHistory(history, "" if force.has_unit else "N")
 
 
@@ -90,13 +97,15 @@ class ForceSection(Section):
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
     def require_consistent(self) -> None:
-        """Refuses amplitudes whose unit is not that of the time history."""
+        """Refuse amplitudes whose unit is not that of the time history."""
         require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
         dimension = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
-            is_same, shown = unit == self.history.unit, unit or "a number"
-            key = f"force.amplitude.{unknown}"
-            require(is_same, key, shown, f'{dimension.name}, as "{dimension.example}"')
+            key, allowed = (
+                f"force.amplitude.{unknown}",
+                f'{dimension.name}, as "{dimension.example}"',
+            )
+            require(unit == self.history.unit, key, unit or "a number", allowed)
 
 
 def with_forces(
@@ -140,9 +149,11 @@ class Scale:
 
 
 def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
-    """Recordings of all files below the case's folder that "records/*.AT2" or "a.v2#1" matches."""
+    """Return the recordings of all files that "records/*.AT2" or "a.v2#1" matches.
+
+    Files stand below the case's folder; the text after # is the channel of each file.
+    """
     folder: Path = (info.context or {}).get("folder", Path())
-    # the text after # is the channel of each file
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
@@ -150,26 +161,32 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)
-    step, unit = info.data.get("step"), info.data.get("unit") or ""
-    return read_recordings(paths, channel=channel, step=step, unit=unit)
+    step, unit = info.data.get("step"), info.data.get("unit")
+    return read_recordings(paths, channel=channel, step=step, unit=unit or "")
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
+    """Return a unit of accelerations as it was given, or refuse it."""
     is_unit = acceleration_factor(str(value)) is not None
     require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 
 
 def _parse_scale(value: object, _: ValidationInfo) -> Scale:
+    """Return the scale that a factor such as 1.2 or a text such as "PGA = 0.3 g" states."""
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
-    measure, equals, size = (part.strip() for part in str(value).partition("="))
+    measure, equals, size = [part.strip() for part in str(value).partition("=")]
+    has_measure = bool(equals)
     try:
-        number = quantity.parse_number(*((size, "m/s^2") if equals else (value, "")))
+        if has_measure:
+            number = quantity.parse_number(size, "m/s^2")
+        else:
+            number = quantity.parse_number(value, "")
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    fits = number > 0 and (measure in ("PGA", "Sa(T1)") or not equals)
-    require(fits, "", value, allowed)
-    return Scale(number, measure if equals else "")
+    is_known = measure in ("PGA", "Sa(T1)") or not has_measure
+    require(number > 0 and is_known, "", value, allowed)
+    return Scale(number, measure if has_measure else "")
 
 
 Files = Annotated[tuple[Recording, ...], text(_read_recordings)]
@@ -199,5 +216,5 @@ class RecordsSection(Section):
         return tuple(recording for group in self.files for recording in group)
 
     def require_consistent(self) -> None:
-        """Refuses two files of the same name, which is that of their results."""
+        """Refuse two files of the same name, which is that of their results."""
         require_distinct("records.files", self.recordings)

@@ -77,12 +77,12 @@ class RadiusMapSection(ThetaSection):
         return self.at({name: number.nominal for name, number in self.numbers.items()})
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
-        """The map at crisp values of its parameters."""
-        a1, a2, a3, a4 = (values[name] for name in self.numbers)
+        """Return the map at crisp values of its parameters, by their names."""
+        a1, a2, a3, a4 = [values[name] for name in self.numbers]
         return HermiteMap(a1, a2, a3, a4, self.law)
 
     def require_consistent(self) -> None:
-        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
+        """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
         # corners of the supports suffice, as the map is linear in a1 … a4
         for ends in itertools.product(*({*x.support} for x in self.numbers.values())):
             corner = dict(zip(self.numbers, ends, strict=True))
@@ -102,11 +102,11 @@ class PhaseSection(Section):
     loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
 
     def require_consistent(self) -> None:
-        """Refuses a Poisson's ratio beside a stiffness, and Young's modulus without one."""
-        isotropic = isinstance(self.modulus, FuzzyNumber)
-        value = "without poisson" if self.poisson is None else "with poisson"
+        """Refuse a Poisson's ratio beside a stiffness, and Young's modulus without one."""
+        is_isotropic, has_ratio = isinstance(self.modulus, FuzzyNumber), self.poisson is not None
+        value = "with poisson" if has_ratio else "without poisson"
         allowed = "poisson beside Young's modulus, none beside a stiffness"
-        require(isotropic == (self.poisson is not None), "", value, allowed)
+        require(is_isotropic == has_ratio, "", value, allowed)
 
     @property
     def nominal(self) -> Phase | VoigtPhase:
@@ -147,15 +147,15 @@ class MeshedCell(Section):
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
         """Loss factor of the stiffness of each phase; empty for none."""
-        losses = (phase.loss for phase in self.phases.values())
+        losses = [phase.loss for phase in self.phases.values()]
         return tuple(loss for loss in losses if loss is not None)
 
     def require_consistent(self) -> None:
-        """Refuses losses of some phases alone."""
-        missing = [name for name, phase in self.phases.items() if phase.loss is None]
-        is_complete = len(missing) in (0, len(self.phases))
-        key = f"cell.phases.{[*missing, ''][0]}.loss"
-        require(is_complete, key, None, "a loss factor of each phase, 0 for none")
+        """Refuse losses of some phases alone."""
+        for name, phase in self.phases.items():
+            is_complete = phase.loss is not None or not self.losses
+            key, allowed = f"cell.phases.{name}.loss", "a loss factor of each phase, 0 for none"
+            require(is_complete, key, None, allowed)
 
 
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
@@ -192,21 +192,30 @@ class RoundCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """The elastic constants by name."""
-        phases, constants = ("matrix", "inclusion"), ("modulus", "poisson")
-        names = [f"{phase}_{constant}" for phase in phases for constant in constants]
-        pairs = [(name, getattr(self, name)) for name in names]
-        return {name: number for name, number in pairs if isinstance(number, FuzzyNumber)}
+        """The elastic constants by the names of their keys."""
+        constants: dict[str, FuzzyNumber] = {}
+        names = ("matrix_modulus", "matrix_poisson", "inclusion_modulus", "inclusion_poisson")
+        for name in names:
+            number = getattr(self, name)
+            if isinstance(number, FuzzyNumber):  # no stiffness of three rows
+                constants[name] = number
+        return constants
 
     @property
     def outline(self) -> Ellipse | None:
-        """Outline of the particle, None for round ones; RefusedError of unknown shapes."""
+        """Outline of the particle, None for round ones.
+
+        Raises:
+            RefusedError: The shape is unknown.
+        """
         if self.particles in ("cylinders", "spheres"):
             return None
         match = ELLIPSES.match(self.particles)
+        if match is None:
+            raise RefusedError("cell.particles", self.particles, SHAPES)
         try:
-            aspect, degrees = map(float, match.groups() if match else ())
-        except ValueError:  # not two, or no numbers
+            aspect, degrees = float(match[1]), float(match[2])
+        except ValueError:
             raise RefusedError("cell.particles", self.particles, SHAPES) from None
         return Ellipse(aspect, degrees)
 
@@ -260,22 +269,24 @@ class RoundCell(Section):
         return LOSSES if self.losses else ()
 
     def require_consistent(self) -> None:
-        """Refuses unknown shapes, keys too few or too many, touching particles, and odd rings."""
+        """Refuse unknown shapes, keys too few or too many, and touching particles."""
         outline = self.outline or circle  # refuses unknown shapes
         has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if has_ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
         require(is_isotropic == has_ratio, "cell.inclusion_poisson", value, allowed)
-        fits, allowed = is_isotropic or self.particles != "spheres", "Young's modulus of spheres"
-        require(fits, "cell.inclusion_modulus", "a plane stiffness", allowed)
+        is_solved = is_isotropic or self.particles != "spheres"
+        key, allowed = "cell.inclusion_modulus", "Young's modulus of spheres"
+        require(is_solved, key, "a plane stiffness", allowed)
         if self.fraction is not None:
+            largest = self.fraction.support.upper
             touching = float(self.shape.fractions(1 / reach(outline)))
-            fits, value = self.fraction.support.upper < touching, f"{self.fraction.support.upper:g}"
             allowed = f"values below {touching:.6g}, where particles touch"
-            require(fits, "cell.fraction", value, allowed)
-        missing = [key for key in LOSSES if getattr(self, key) is None]
-        key, allowed = f"cell.{[*missing, ''][0]}", "a loss of either phase, 0 for none"
-        require(len(missing) != 1, key, None, allowed)
+            require(largest < touching, "cell.fraction", f"{largest:g}", allowed)
+        has_losses = self.matrix_loss is not None or self.inclusion_loss is not None
+        for name in LOSSES:
+            is_complete = getattr(self, name) is not None or not has_losses
+            require(is_complete, f"cell.{name}", None, "a loss of either phase, 0 for none")
 
 
 PhaseModulus = Annotated[
@@ -312,8 +323,11 @@ class ImageCell(Section):
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:
         """E and ν of each phase."""
-        ratios = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
-        return tuple(zip(self.modulus, ratios, strict=True))
+        return tuple(zip(self.modulus, self._of_phases(self.poisson), strict=True))
+
+    def _of_phases(self, values: tuple[FuzzyNumber, ...]) -> tuple[FuzzyNumber, ...]:
+        """Return one value for each phase; a single one holds for all of them."""
+        return values * len(self.modulus) if len(values) == 1 else values
 
     @property
     def is_solid(self) -> list[bool]:
@@ -323,14 +337,11 @@ class ImageCell(Section):
     @property
     def losses(self) -> tuple[FuzzyNumber, ...]:
         """Loss factors of the stiffness of each phase; empty for none."""
-        losses = self.loss or ()
-        return losses * len(self.modulus) if len(losses) == 1 else losses
+        return self._of_phases(self.loss or ())
 
     def require_consistent(self) -> None:
-        """Refuses thresholds beside labels or neither, and numbers of values that do not fit."""
-        has_one = bool(self.threshold) != bool(self.labels)
-        value = "beside cell.labels" if self.threshold else None
-        require(has_one, "cell.threshold", value, "one of cell.threshold and cell.labels")
+        """Refuse two keys for the same thing or neither, and numbers of values that do not fit."""
+        self._require_one("threshold", "labels")
         n_phases = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
         counts = {"modulus": (n_phases,), "poisson": (1, n_phases), "loss": (0, 1, n_phases)}
         for key, fitting in counts.items():
@@ -338,16 +349,20 @@ class ImageCell(Section):
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
-        fits, allowed = all(self.is_solid) or not self.loss, "none beside a pore or a rigid phase"
+        is_possible = all(self.is_solid) or not self.loss
         cure = "pores in one material leave its loss factor; else take a small modulus for pores"
-        require(fits, "cell.loss", "there", allowed, cure)
-        value = "beside cell.voxel" if self.pixel else None
-        has_one = bool(self.pixel) != bool(self.voxel)
-        require(has_one, "cell.pixel", value, "one of cell.pixel and cell.voxel")
+        require(is_possible, "cell.loss", "there", "none beside a pore or a rigid phase", cure)
+        self._require_one("pixel", "voxel")
         n_sides, allowed = len(self.pixel or ()), "a side, or a width and a height"
         require(n_sides <= 2, "cell.pixel", n_sides, allowed)
         n_sides, allowed = len(self.voxel or ()), "a side, or those along x, y and z"
         require(n_sides in (0, 1, 3), "cell.voxel", n_sides, allowed)
+
+    def _require_one(self, key: str, other: str) -> None:
+        """Refuse both of two keys, and neither."""
+        is_there, has_other = bool(getattr(self, key)), bool(getattr(self, other))
+        value = f"beside cell.{other}" if is_there else None
+        require(is_there != has_other, f"cell.{key}", value, f"one of cell.{key} and cell.{other}")
 
     @property
     def dimension(self) -> int:
@@ -358,7 +373,9 @@ class ImageCell(Section):
     def lengths(self) -> tuple[float, ...]:
         """Sides of a pixel along (y, x) or of a voxel along (z, y, x), in m."""
         lengths: tuple[float, ...] = self.voxel or self.pixel or ()
-        return (lengths * self.dimension if len(lengths) == 1 else lengths)[::-1]
+        if len(lengths) == 1:
+            return lengths * self.dimension
+        return lengths[::-1]
 
     @property
     def sides(self) -> tuple[float, ...]:

@@ -112,16 +112,19 @@ class MatricesSection(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure from the matrices; `modulus` takes the place of parameter E."""
+        """Return the structure; `modulus` takes the place of parameter E, if there is one.
+
+        See `StructureSection.structure`.
+        """
         damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
         ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
         numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
-        rows: dict[str, Array] = {
-            Output(name, output.unit): self._vector_over_unknowns(f"outputs.{name}.row", output.row)
-            for name, output in self.outputs.items()
-        }
+        rows: dict[str, Array] = {}
+        for name, output in self.outputs.items():
+            row = self._vector_over_unknowns(f"outputs.{name}.row", output.row)
+            rows[Output(name, output.unit)] = row
         try:
             model = MatrixStructure(
                 {name: number.nominal for name, number in numbers.items()},
@@ -132,7 +135,7 @@ class MatricesSection(StructureSection):
                 ground=self.accelerogram,
                 pattern=self._ground_pattern(),
                 ratios=tuple(ratios),
-                row_factors={name: self.outputs[name].factor for name in rows},
+                row_factors={name: output.factor for name, output in self.outputs.items()},
             )
             if damping is not None:
                 ratios = self._material_damping_ratios(damping, model, loss or LOSS_STAND_IN)
@@ -147,32 +150,46 @@ class MatricesSection(StructureSection):
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Ratio "zeta" of all modes if E is in every term of K; else "zeta1" … of each mode."""
-        has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
+        """Return the damping ratios that the loss factor of the material of E gives, by name.
+
+        Args:
+            damping: Has the ratio of joints, which is added.
+            model: The structure without these ratios.
+            loss: Loss factor of the material.
+
+        Returns:
+            "zeta" of all modes if E is in every term of K; else "zeta1" … of each mode, by the
+            fraction of its strain energy in the terms with E.
+
+        Raises:
+            RefusedError: E is in no term of K.
+        """
+        has_modulus = ["E" in dict(factor.powers) for factor, _ in self.stiffness]
         require(any(has_modulus), "damping_ratio", "material", "a term of the stiffness with E")
         if all(has_modulus):
             return damping_ratios_by_name(damping, loss)
-        fractions = modal_energy_fractions(model, np.flatnonzero(has_modulus))
-        ratios = tuple(
-            damping_from_loss(loss, joints=damping.joints, energy_fraction=fraction)
-            for fraction in fractions
-        )
-        return damping_ratios_by_name(ratios, None)
+        ratios: list[FuzzyNumber] = []
+        for fraction in modal_energy_fractions(model, np.flatnonzero(has_modulus)):
+            ratio = damping_from_loss(loss, joints=damping.joints, energy_fraction=fraction)
+            ratios.append(ratio)
+        return damping_ratios_by_name(tuple(ratios), None)
 
     def _vector_over_unknowns(self, key: str, entries: Mapping[str, float]) -> Array:
+        """Return entries by unknown as a vector, 0 at the others; refuse other names."""
         for name in entries:
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
             require(name in self.unknowns, f"matrices.{key}", name, allowed)
         return np.array([entries.get(name, 0.0) for name in self.unknowns])
 
     def _ground_pattern(self) -> Array:
+        """Return how each unknown moves rigidly with the ground, shape (unknowns,)."""
         if isinstance(self.direction, dict):
             return self._vector_over_unknowns("direction", self.direction)
-        pattern = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
-        return np.array(pattern)
+        directions = [name.rpartition(".")[2] for name in self.unknowns]
+        return np.array([float(direction == self.direction) for direction in directions])
 
     def require_consistent(self) -> None:
-        """Refuses names out of alphabet, no outputs, and a record without a direction."""
+        """Refuse names out of alphabet, no outputs, and a record without a direction."""
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         require_names("matrices.parameters", self.parameters)
         outputs = [Output(name, output.unit) for name, output in self.outputs.items()]
@@ -182,7 +199,7 @@ class MatricesSection(StructureSection):
         _ = self.nominal  # refuses matrices that do not fit together
 
     def require_pattern(self) -> None:
-        """Refuses a direction in which the ground moves no unknown."""
+        """Refuse a direction in which the ground moves no unknown."""
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
         is_moved = bool(self._ground_pattern().any())

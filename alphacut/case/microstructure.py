@@ -47,7 +47,7 @@ class PackingSection(Section):
         return MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)
 
     def require_readable(self, *, spheres: bool) -> None:
-        """Refuses a fraction that does not pack, and radii that are none."""
+        """Refuse a fraction that does not pack, and radii that are none."""
         shape = SPHERES if spheres else DISCS
         fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
@@ -72,7 +72,7 @@ class PackingSection(Section):
         )
 
     def require_consistent(self) -> None:
-        """Refuses a file of radii beside their ends, and one end alone or none without a file."""
+        """Refuse a file of radii beside their ends, and one end alone or none without a file."""
         ends = (self.smallest_radius, self.largest_radius)
         fits = None not in ends if self.file is None else ends == (None, None)
         key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
@@ -129,13 +129,13 @@ class MicrostructureSection(Section):
         )
 
     def require_readable(self, *, spheres: bool) -> None:
-        """Refuses a fraction that does not pack, and a file that is not read."""
+        """Refuse a fraction that does not pack, and a file that is not read."""
         if self.packing is not None:
             self.packing.require_readable(spheres=spheres)
         _ = self.measured
 
     def require_consistent(self) -> None:
-        """Refuses several sources of the particles, or none."""
+        """Refuse several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
         value = f"with {count} of them" if count else None
         require(count == 1, "microstructure", value, allowed)

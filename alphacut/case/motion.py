@@ -85,7 +85,7 @@ class EnvelopeSection(Section):
     step: Time = Field(description="time step")
 
     def require_steps(self, key: str, duration: float) -> None:
-        """Refuses a duration in s that is no whole number of steps, or more than `MOST_STEPS`."""
+        """Refuse a duration in s that is no whole number of steps, or more than `MOST_STEPS`."""
         steps = duration / self.step
         is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps  # round-off
         if not is_multiple or steps > MOST_STEPS:

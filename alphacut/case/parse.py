@@ -28,8 +28,6 @@ KINDS = {
 }
 """What a key takes, by Pydantic's name of the error."""
 C = TypeVar("C", bound=Section)
-Refusal = tuple[str, object, str, str]
-"""Key, value, allowed values and cure of a `RefusedError`."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class ParsedCase(Generic[C]):
 
 
 def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> ParsedCase[C]:
-    """Reads a TOML case file as the content `model`, with changes ``KEY=VALUE``.
+    """Read a TOML case file as the content `model`, with changes ``KEY=VALUE``.
 
     Raises:
         BadInput: With every problem of the case.
@@ -60,31 +58,36 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        problems = (
-            RefusedError(*refusal, "command line" if _is_below(refusal[0], changed) else str(path))
-            for refusal in _refusals(model, error)
-        )
-        raise BadInput({str(problem): problem for problem in problems}.values()) from None
+        problems: dict[str, RefusedError] = {}
+        for x in _refusals(model, error):
+            place = "command line" if _is_below(x.key, changed) else str(path)
+            problem = RefusedError(x.key, x.value, x.allowed, x.cure, place)
+            problems[str(problem)] = problem
+        raise BadInput(problems.values()) from None
     return ParsedCase(path, text, content, tuple(changes))
 
 
 def _parse_toml(path: Path, text: str) -> dict[str, object]:
-    """The top table of a TOML text; an error of syntax is raised with the file and the line."""
+    """Return the top table of a TOML text.
+
+    Raises:
+        BadInput: The text is not TOML; it names the file and the line.
+    """
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except (RecursionError, ValueError) as error:
-        what, place = str(error).partition(" (at")[0].lower(), str(path)
-        shown = ""  # an integer of too many digits has no line
+        shown, place = "the file", str(path)
+        # an integer of too many digits has no line
         if match := re.search(r"\(at line (\d+), column \d+\)", str(error)):
             place += f":{match[1]}"
-            shown = text.splitlines()[int(match[1]) - 1].strip()
-        raise BadInput(
-            [RefusedError(shown or "the file", f"not TOML: {what}", "", "", place)]
-        ) from None
+            shown = text.splitlines()[int(match[1]) - 1].strip() or shown
+        what = str(error).partition(" (at")[0].lower()
+        problem = RefusedError(shown, f"not TOML: {what}", "", "", place)
+        raise BadInput([problem]) from None
 
 
-def _refusals(model: type[Section], error: ValidationError) -> Iterator[Refusal]:
-    """What is wrong by each error of Pydantic; a misspelt key is not missing as well."""
+def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedError]:
+    """Yield what is wrong by each error of Pydantic; a misspelt key is not missing as well."""
     details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
@@ -92,24 +95,32 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[Refusal]
         if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
-            names = "" if close else ", ".join(_sibling_names(model, key))
-            yield key, f"an unknown {kind}", names, f"did you mean {close}?" if close else ""
+            names, cure = ", ".join(_sibling_names(model, key)), ""
+            if close:
+                names, cure = "", f"did you mean {close}?"
+            yield RefusedError(key, f"an unknown {kind}", names, cure)
         elif key not in suggested.values():
             yield _refusal(model, key, detail)
 
 
 def _without_indices(key: str) -> str:
+    """Return the name of a key without the numbers of its entries, as "study.name"."""
     return re.sub(r"\[\d+\]", "", key)
 
 
 def _sibling_names(model: type[Section], key: str) -> list[str]:
+    """Return the names of all keys of the section that a key stands in."""
     section, _, _ = _without_indices(key).rpartition(".")
-    names = (name.rpartition(".") for name, _, _ in _walk_keys("", model))
-    return [*dict.fromkeys(name for inside, _, name in names if inside == section)]
+    siblings: dict[str, None] = {}
+    for full_name, _, _ in _walk_keys("", model):
+        inside, _, name = full_name.rpartition(".")
+        if inside == section:
+            siblings[name] = None
+    return list(siblings)
 
 
 def _suggested_key(model: type[Section], key: str) -> str:
-    """Full name of the known key nearest to an unknown one; empty where none is near."""
+    """Return the full name of the known key nearest to an unknown one; empty if none is near."""
     section, dot, name = key.rpartition(".")
     if close := nearest(name, _sibling_names(model, key)):
         return f"{section}{dot}{close}"
@@ -117,52 +128,66 @@ def _suggested_key(model: type[Section], key: str) -> str:
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
-def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> Refusal:
-    """What is wrong with a key whose value is wrong or missing, by the error of Pydantic."""
+def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedError:
+    """Return what is wrong with a key whose value is wrong or missing, by the error of Pydantic."""
     context = detail.get("ctx", {})
     cause, kind = context.get("error"), detail["type"]
     if isinstance(cause, RefusedError):
-        return cause.key or key, cause.value, cause.allowed, cause.cure
-    about = keys_of(model).get(_without_indices(key))
-    words = (about and about.description) or "a section"
+        return RefusedError(cause.key or key, cause.value, cause.allowed, cause.cure)
     if kind == "missing":
-        return key, None, words, ""
+        about = keys_of(model).get(_without_indices(key))
+        words = about.description if about is not None else None
+        return RefusedError(key, None, words or "a section")
     given = detail["input"]  # as it stood in the file, near enough
     value = f'"{given}"' if isinstance(given, str) else printable(given).replace("'", '"')
     if kind == "literal_error":
         allowed = str(context["expected"]).replace("'", '"')
         names = re.findall(r'"([^"]+)"', allowed)
-        return key, value, allowed, suggestion(str(given), names)
+        return RefusedError(key, value, allowed, suggestion(str(given), names))
     if kind == "tuple_type":
-        return key, value, "an array", f"write {key.rpartition('.')[2]} = [{value}]"
-    return key, value, str(cause or KINDS.get(kind, detail["msg"])), ""
+        cure = f"write {key.rpartition('.')[2]} = [{value}]"
+        return RefusedError(key, value, "an array", cure)
+    return RefusedError(key, value, str(cause or KINDS.get(kind, detail["msg"])))
 
 
 def _full_key(location: tuple[int | str, ...]) -> str:
-    """Full name of a key, entries counted from 1, without the tags of unions, as <image>."""
-    parts = (f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in location)
-    return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
+    """Return the full name of a key from its place in Pydantic's errors.
+
+    Entries are counted from 1, and the tags of unions, such as <image>, are left out.
+    """
+    key = ""
+    for part in location:
+        if isinstance(part, int):
+            key += f"[{part + 1}]"
+        elif not part.startswith("<"):
+            key += f".{part}"
+    return key.lstrip(".")
 
 
 def _is_below(key: str, changed: Sequence[str]) -> bool:
-    """True for a changed key, one of its entries, or a key of its table."""
+    """Return whether a key was changed, or is an entry or a key of the table of one."""
     return any(re.match(rf"{re.escape(name)}(?![\w-])", key) for name in changed)
 
 
 def apply_changes(
     model: type[Section], table: dict[str, object], changes: Sequence[str]
 ) -> tuple[str, ...]:
-    """Puts every change KEY=VALUE into the table of a case; returns the keys, each known."""
+    """Put every change KEY=VALUE into the table of a case, in place, and return the keys.
+
+    Raises:
+        RefusedError: A change has no value, or its key is unknown or given before.
+    """
     full_keys = [key for key in keys_of(model) if not key.startswith("study.")]
     keys: list[str] = []
     for change in changes:
-        key, _, value = (part.strip() for part in change.partition("="))
-        endings = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
-        cure = next(endings, suggestion(key, full_keys)) or "docs/case-format.md has all keys"
+        key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
-        has_value = "=" in change
-        require(has_value or key not in full_keys, "--set", f"{change}, without a value", allowed)
-        require(key in full_keys, "--set", f"{change}, of an unknown key", allowed, cure)
+        if key not in full_keys:
+            close = [full for full in full_keys if full.endswith(f".{key}")]
+            cure = f"did you mean {close[0]}?" if close else suggestion(key, full_keys)
+            cure = cure or "docs/case-format.md has all keys"
+            raise RefusedError("--set", f"{change}, of an unknown key", allowed, cure)
+        require(bool(equals), "--set", f"{change}, without a value", allowed)
         require(key not in keys, "--set", f"{change}, of a key given before", "each key once")
         _set_key(table, key, _parse_value(value))
         keys.append(key)
@@ -170,15 +195,18 @@ def apply_changes(
 
 
 def _set_key(table: object, key: str, value: object) -> None:
+    """Set a key by its full name in place; nothing is set below a value that is no table."""
     *outer, last = key.split(".")
     for name in outer:
-        table = table.setdefault(name, {}) if isinstance(table, dict) else None
+        if not isinstance(table, dict):
+            return
+        table = table.setdefault(name, {})
     if isinstance(table, dict):
         table[last] = value
 
 
 def _parse_value(text: str) -> object:
-    """Value that a text states: as TOML if it is TOML, words with commas as an array, else text."""
+    """Return the value of a text: of TOML, an array of words with commas, or the text itself."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (RecursionError, ValueError):
@@ -190,35 +218,39 @@ def _parse_value(text: str) -> object:
 
 @cache
 def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
-    """All keys below a section's class by their full names, sections left out."""
+    """Return all keys below the class of a section by their full names, sections left out."""
     return {name: info for name, info, is_section in _walk_keys("", model) if not is_section}
 
 
 def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
-    """Yields each key below a section's class: full name, field, whether it is a section."""
+    """Yield full name, field, and whether it is a section, of each key below a class."""
     for key, info in model.model_fields.items():
-        name, parts = f"{prefix}{key}", [info.annotation, *_annotation_parts(info.annotation)]
-        models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]
+        name = f"{prefix}{key}"
+        parts = [info.annotation, *_annotation_parts(info.annotation)]
+        models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
         yield name, info, bool(models)
         for inner in models:
             yield from _walk_keys(f"{name}.", inner)
 
 
 def quantity_of(info: FieldInfo) -> Quantity | None:
-    """The quantity of a key, or of the entries of its array."""
-    parts = [*info.metadata, *_annotation_parts(info.annotation)]
-    return next((part for part in parts if isinstance(part, Quantity)), None)
+    """Return the quantity of a key, or of the entries of its array."""
+    for part in (*info.metadata, *_annotation_parts(info.annotation)):
+        if isinstance(part, Quantity):
+            return part
+    return None
 
 
 def allowed_values(info: FieldInfo) -> str:
-    """Allowed values of a key in words; empty where it takes any text."""
+    """Return the allowed values of a key in words; empty where it takes any text."""
     quantity = quantity_of(info)
-    choices = [part for part in _annotation_parts(info.annotation) if isinstance(part, str)]
-    return quantity.allowed if quantity else ", ".join(choices)
+    if quantity is not None:
+        return quantity.allowed
+    return ", ".join(part for part in _annotation_parts(info.annotation) if isinstance(part, str))
 
 
 def _annotation_parts(annotation: Any) -> Iterator[Any]:
-    """Yields everything inside an annotation, what is annotated with it too."""
+    """Yield everything inside an annotation, what is annotated with it too."""
     for part in (*get_args(annotation), *getattr(annotation, "__metadata__", ())):
         yield part
         yield from _annotation_parts(part)
