@@ -1,8 +1,8 @@
-"""Arrays in files of NumPy (.npy, .npz), whose heads are checked before anything is allocated.
+"""Arrays in files of NumPy (.npy, .npz), whose heads are checked before memory is allocated.
 
-`numpy.load` takes memory for the shape that a head states before it looks for the data. Here a
-shape must agree with the bytes that follow it, and the uncompressed size of a member of a .npz file
-with the memory that is free. Pickled objects are never read.
+`numpy.load` allocates memory for the shape that a head states before it looks for the data. Here
+the shape must agree with the number of bytes that follow, and the uncompressed size of a member of
+a .npz file with the free memory. Pickled objects are never loaded.
 """
 
 from __future__ import annotations
@@ -20,29 +20,32 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.memory import require_free_memory
 
 Numbers = NDArray[np.generic]
+formats: Any = np.lib.format  # whose functions have no types
 ALLOWED = "an array of real numbers as numpy.save writes it"
-formats: Any = np.lib.format  # NumPy does not say the types of its functions
 LONGEST_HEAD = 1 << 16
-"""Bytes; heads of arrays of numbers have 128 or 192."""
-MAX_MEMBERS = 1000
-"""Arrays of a .npz file."""
-MAX_DIMENSIONS = 8
+"""Largest number of bytes of a head; heads of arrays of numbers have 128 or 192."""
 DEFLATE_RATIO = 1032
-"""Bytes that a byte of deflated data can stand for: 258 bytes take two bits (RFC 1951)."""
+"""Largest number of bytes for which one byte of deflated data can stand (RFC 1951)."""
 
 
 class ArrayHead:
-    """Shape, type and order of an array in the format .npy, and where its numbers begin.
+    """The head of an array in the format .npy.
 
     Args:
         name: Name of the file, for messages.
-        start: The first bytes of the file, at least its whole head.
-        size: Bytes of the file.
-        kinds: Letters of the kinds of NumPy that are allowed: b, u, i, f, S, U, c.
+        start: The first bytes of the file, with at least its whole head.
+        size: Number of bytes of the file.
+        kinds: Letters of the kinds of NumPy's types that are allowed, among b, u, i, f, S, U, c.
+
+    Attributes:
+        shape: Shape of the array.
+        dtype: Type of its numbers.
+        order: "C" or "F", as in `numpy.reshape`.
+        offset: Number of bytes before the first number.
 
     Raises:
-        RefusedError: It is no such head, holds other objects than numbers, or the file has another
-            size than the head states.
+        RefusedError: The head is damaged, the array holds other things than numbers, or the file
+            has another size than the head states.
     """
 
     def __init__(self, name: str, start: bytes, *, size: int, kinds: str) -> None:
@@ -51,19 +54,21 @@ class ArrayHead:
             version = formats.read_magic(stream)
             read = {(1, 0): formats.read_array_header_1_0, (2, 0): formats.read_array_header_2_0}
             shape, is_fortran, dtype = read[version](stream)
-        except Exception as error:  # readers of damaged heads raise errors of many kinds
+        except Exception as error:  # of a damaged head, errors of many types
             reason = str(error).partition("\n")[0] or type(error).__name__
             raise RefusedError(name, f"unreadable ({reason})", ALLOWED) from None
         self.shape: tuple[int, ...] = shape
         self.dtype: np.dtype[Any] = dtype
-        self.order: Literal["C", "F"] = "F" if is_fortran else "C"
+        self.order: Literal["C", "F"] = "C"
+        if is_fortran:
+            self.order = "F"
         self.offset = stream.tell()
         is_known = self.dtype.kind in kinds and self.dtype.itemsize <= LONGEST_HEAD
         cure = "save numbers, as array.astype(float)"
         if self.dtype.kind == "c":
             cure = "save its real part, array.real"
         require(is_known, name, f"{self.dtype} of shape {self.shape}", ALLOWED, cure)
-        is_shape = len(self.shape) <= MAX_DIMENSIONS and all(n >= 0 for n in self.shape)
+        is_shape = len(self.shape) <= 8 and all(n >= 0 for n in self.shape)
         require(is_shape, name, f"of shape {self.shape}", ALLOWED)
         expected = self.offset + math.prod(self.shape) * self.dtype.itemsize
         value = f"of {size} bytes, where its head states shape {self.shape} of {self.dtype}"
@@ -71,10 +76,15 @@ class ArrayHead:
 
 
 def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
-    """Return the array in a .npy file, mapped: its numbers are read when they are used.
+    """Return the array in a .npy file as a memory map, whose numbers are read when they are used.
 
-    `kinds` are letters of the kinds of NumPy that are allowed. Files cut off or with pickled
-    objects raise RefusedError; those that cannot be opened, OSError.
+    Args:
+        path: The file.
+        kinds: Letters of the kinds of NumPy's types that are allowed.
+
+    Raises:
+        RefusedError: The file is cut off, damaged, or holds other things than numbers.
+        OSError: The file cannot be opened.
     """
     with path.open("rb") as file:
         start = file.read(LONGEST_HEAD)
@@ -85,13 +95,13 @@ def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
 
 
 class ArrayArchive:
-    """The arrays in a .npz file by name, each read when it is asked for.
+    """The arrays in a .npz file, each of which is read when it is asked for.
 
     Args:
         path: The file.
 
     Raises:
-        RefusedError: It is no archive that `numpy.savez` writes.
+        RefusedError: It is not an archive as `numpy.savez` writes it, or has over 1000 members.
     """
 
     def __init__(self, path: Path) -> None:
@@ -99,18 +109,27 @@ class ArrayArchive:
         try:
             with ZipFile(path) as archive:
                 members = archive.infolist()
-        except Exception as error:  # readers of damaged archives raise errors of many kinds
+        except Exception as error:  # of a damaged archive, errors of many types
             raise RefusedError(path.name, f"unreadable ({error})", "an archive .npz") from None
-        require(len(members) <= MAX_MEMBERS, path.name, f"{len(members)} arrays", f"{MAX_MEMBERS}")
+        require(len(members) <= 1000, path.name, f"{len(members)} arrays", "up to 1000")
         self.members = {member.filename.removesuffix(".npy"): member for member in members}
 
     @property
     def names(self) -> list[str]:
         """Names of the arrays."""
-        return [*self.members]
+        return list(self.members)
 
     def read(self, name: str, *, kinds: str = "buif") -> Numbers:
-        """Return an array; refuse one that is damaged, too large for memory or of other kinds."""
+        """Return one of the arrays.
+
+        Args:
+            name: Its name, one of `names`.
+            kinds: Letters of the kinds of NumPy's types that are allowed.
+
+        Raises:
+            RefusedError: The member is damaged, of other kinds, larger than the free memory, or
+                larger than its compressed bytes can stand for.
+        """
         member = self.members[name]
         place = f"{self.path.name}:{name}"
         is_known = member.compress_type in (ZIP_STORED, ZIP_DEFLATED)
@@ -126,7 +145,7 @@ class ArrayArchive:
         try:
             with ZipFile(self.path) as archive, archive.open(member) as file:
                 content = file.read(member.file_size)
-        except Exception as error:  # as above
+        except Exception as error:  # of a damaged archive, errors of many types
             raise RefusedError(place, f"unreadable ({error})", "an undamaged archive") from None
         head = ArrayHead(place, content, size=len(content), kinds=kinds)
         return np.ndarray(head.shape, head.dtype, content, head.offset, order=head.order)
