@@ -101,11 +101,12 @@ class ForceSection(Section):
         require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
         dimension = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
-            key, allowed = (
-                f"force.amplitude.{unknown}",
-                f'{dimension.name}, as "{dimension.example}"',
-            )
-            require(unit == self.history.unit, key, unit or "a number", allowed)
+            key = f"force.amplitude.{unknown}"
+            allowed = f'{dimension.name}, as "{dimension.example}"'
+            cure = ""
+            if not self.history.unit:
+                cure = "the file of the history states the unit: give a factor, as 1.0"
+            require(unit == self.history.unit, key, unit or "a number", allowed, cure)
 
 
 def with_forces(

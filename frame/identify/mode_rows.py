@@ -73,7 +73,8 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         mode = values[columns["mode"]]
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         allowed = "a mode from 1, frequency and deviations above 0"
-        require(fits, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
+        cure = "write decimal points" if len(cells) > len(header) else ""
+        require(fits, f"{path.name}, row {row}", ",".join(cells)[:80], allowed, cure)
         modes[int(mode)].append(values)
     return tuple(
         _measurements_of_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes)

@@ -607,22 +607,41 @@ def read_force_history(path: Path) -> ForceHistory:
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
-    allowed = "time [s],force [kN], or time [s],force of a course without a unit"
-    if table.width != 2:
-        raise file.refusal(table.start, table.head[:80] or "without a head", allowed)
-    time, force = table.columns
-    is_head = time.is_time and re.match(r"\W*(?:force|load|f)\b", force.name) is not None
-    if not is_head or not seconds_of(time.unit):
-        raise file.refusal(table.start, table.head[:80] or "without a head", allowed)
-    if force.unit and force.unit not in NEWTONS:
-        cure = f"units are {', '.join(NEWTONS)}"
-        raise file.refusal(table.start, table.head[:80], allowed, cure)
+    _require_cell_of_each_head(table)
+    if cure := _cure_of_force_head(table):
+        allowed = "time [s],force [kN], or time [s],force of a course without a unit"
+        raise file.refusal(table.start, table.head[:80] or "without a head", allowed, cure)
     numbers = table.numbers()
     steps = _even_steps(table, or_step="")
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
         first_row, *_ = table.rows
-        raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s")
+        cure = f'write times from 0 s on, and in the case "{file.name}, from {steps.first:g} s"'
+        raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s", cure)
     if not numbers[:, 1].any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")
-    samples = NEWTONS.get(force.unit, 1.0) * numbers[:, 1]
-    return ForceHistory(steps.step, np.asarray(samples), has_unit=bool(force.unit))
+    unit = table.columns[1].unit
+    samples = NEWTONS.get(unit, 1.0) * numbers[:, 1]
+    return ForceHistory(steps.step, np.asarray(samples), has_unit=bool(unit))
+
+
+def _cure_of_force_head(table: _Table) -> str:
+    """Return what to mend in the head of times and forces; empty if it is complete."""
+    if len(table.rows) < 2:
+        return "write two rows of numbers or more below the head"
+    if table.width != 2:
+        return "write two numbers in a row, the time and the force"
+    time, force = table.columns
+    if force.is_time:
+        return "times stand in the first column"
+    if not time.is_time or not re.match(r"\W*(?:force|load|f)\b", force.name):
+        return "name the first column time and the second one force"
+    if not seconds_of(time.unit):
+        return f"write the unit of the times: time [s], or one of {', '.join(SECONDS)}"
+    if not force.unit or force.unit in NEWTONS:
+        return ""
+    if force.unit in ("kg", "t"):
+        return "this is a unit of mass: write the weight in N, or in kgf"
+    by_small_letters = {unit.lower(): unit for unit in NEWTONS}
+    if meant := by_small_letters.get(force.unit.lower()):
+        return f"did you mean {meant}?"
+    return f"units of forces are {', '.join(NEWTONS)}"

@@ -16,7 +16,7 @@ SECONDS = {
     "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
 }  # fmt: skip
 NEWTONS = {
-    "N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
+    "N": 1.0, "kN": 1e3, "MN": 1e6, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
     "kip": 4448.2216152605,
 }  # fmt: skip
 

@@ -240,3 +240,36 @@ def test_columns_that_are_no_times_in_seconds_tell_their_cure(tmp_path, head, st
     rows = [f"{step * k:.9g},{0.1 * k * k % 1:.3f}" for k in range(9)]
     with pytest.raises(RefusedError, match=cure):
         read_recording(saved(tmp_path, rows, head))
+
+
+@pytest.mark.parametrize(
+    ("head", "cure"),
+    [
+        ("time [s],force [kn]", r"did you mean kN\?"),
+        ("time [s],force [kg]", "a unit of mass"),
+        ("time [s],force [N/m]", "units of forces are N, kN"),
+        ("time,force [kN]", r"the unit of the times: time \[s\]"),
+        ("force [kN],time [s]", "times stand in the first column"),
+        ("time [s],pressure [kPa]", "the second one force"),
+    ],
+)
+def test_heads_of_forces_tell_their_cure(tmp_path, head, cure):
+    rows = [f"{0.01 * k:.2f},{k % 7}" for k in range(30)]
+    with pytest.raises(RefusedError, match=cure):
+        read_force_history(saved(tmp_path, rows, head))
+
+
+@pytest.mark.parametrize(
+    ("change", "cure"),
+    [
+        (lambda rows: rows[3:], r"write times from 0 s on, .* from 0\.03 s"),
+        (lambda rows: rows[:1], "two rows of numbers or more"),
+        (lambda rows: [row.replace(".", ",") for row in rows], "to be decimal commas"),
+        (lambda rows: [*rows[:5], rows[6], rows[5], *rows[7:]], "sort the rows"),
+        (lambda rows: ["0.0,1"] * 9, "write times of even steps$"),
+    ],
+)
+def test_times_of_forces_tell_their_cure(tmp_path, change, cure):
+    rows = [f"{0.01 * k:.2f},{k % 7}" for k in range(30)]
+    with pytest.raises(RefusedError, match=cure):
+        read_force_history(saved(tmp_path, change(rows), "time [s],force [kN]"))
