@@ -1,10 +1,10 @@
-"""Exact motions against proved bounds: a guaranteed envelope tests itself.
+"""Exact responses against guaranteed bounds: a guaranteed envelope tests itself.
 
-Points of the lowest cut are taken in this order: inputs that the envelope names at peaks, nominal
+Points of the lowest α-cut are taken in this order: inputs that the envelope names at peaks, nominal
 values and corners, inputs named at peaks of higher levels, points of low discrepancy. Each counts
-for all levels that hold it. At the time nodes its exact motion must lie inside the bounds, between
-them no farther from a straight line than `between`, and where the envelope names these inputs it
-must equal the attained bound.
+for all levels whose cut contains it. At the time nodes the exact response must lie inside the
+bounds; between them it must be no farther from a straight line than `between`; and where the
+envelope names these inputs, it must equal the attained bound.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from hashlib import sha256
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,47 +30,45 @@ from alphacut.fuzzy.sets.boxes import quasi_random_points
 if TYPE_CHECKING:
     import xarray
 
-MIN_MOTIONS, MAX_MOTIONS = 24, 240
-"""Fewest and most motions of a test; more than the most find little that these do not."""
-MOTIONS_OF_LEVEL = 67.0
-"""Motions for each level, over the number of unknowns 2n: a tenth of a proof's work. A proof takes
-2·10⁴ multiplications for a bound, of which a level, node and output have two, and a motion 15 (the
-terms of its series) for each node, output, unknown and time of a step."""
 TIMES_OF_STEP = 4
-"""Times of a step at which motions are compared: its beginning, and times drawn within it."""
-MAX_NUMBERS = 1_000_000
-"""Most numbers of all matrices, 8 MB; structures beyond are left out, the first one never."""
+"""Times of a step at which responses are compared: its beginning, and times drawn within it; tuned:
+more find little that these do not."""
 
-MATRIX = ("motion", "row", "column")
+_MATRIX = ("motion", "row", "column")
 AXES = {
-    "mass": MATRIX,
-    "damping": MATRIX,
-    "stiffness": MATRIX,
+    "mass": _MATRIX,
+    "damping": _MATRIX,
+    "stiffness": _MATRIX,
     "rows": ("motion", "output", "state"),
     "start": ("motion", "state"),
     "pattern": ("motion", "row"),
     "forces": ("motion", "row", "load"),
     "feeds": ("motion", "output", "load"),
 }
-"""Axes of each array of a `LinearMotion`; the record and the courses of forces are those of all."""
+"""Axes of each array of a `LinearMotion` in datasets; record and courses of forces are the same for
+all."""
 
 
 class ContradictionError(FailedError):
-    """An exact motion contradicts a guaranteed envelope."""
+    """An exact response contradicts a guaranteed envelope."""
 
 
 def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
-    """Return a guaranteed envelope after comparing it with exact motions, which must agree.
+    """Return a guaranteed envelope after comparing it with exact responses, which must agree.
 
     Their number is added as the fact `motions_tested`, and their structures are stored with it.
 
     Raises:
-        ContradictionError: An exact motion leaves proved bounds, strays farther between nodes than
-            is proved, or differs from the attained bound that names its inputs.
+        ContradictionError: An exact response leaves guaranteed bounds, is farther from a straight
+            line between nodes than is guaranteed, or differs from the attained bound that names its
+            inputs.
     """
     cuts = boxes(envelope.inputs, list(envelope.alpha))
-    unknowns = structures_at(system, envelope, cuts.lower[:1])[0].rows.shape[1]
-    count = int(np.clip(len(cuts.alpha) * MOTIONS_OF_LEVEL / unknowns, MIN_MOTIONS, MAX_MOTIONS))
+    states = structures_at(system, envelope, cuts.lower[:1])[0].rows.shape[1]
+    # A tenth of a proof's work: a proof takes 2·10⁴ multiplications for a bound, of which a level,
+    # node and output have two, and a response 15 (the terms of its series) for each node, output,
+    # state and time of a step. From 24 to 240 responses are tested; more find little.
+    count = int(np.clip(len(cuts.alpha) * 67.0 / states, 24, 240))
     points = motion_inputs(envelope, cuts, count)
     motions = structures_at(system, envelope, points)
     Trial(envelope, cuts.lower, cuts.upper).require_agreement(points, motions)
@@ -81,72 +79,81 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
     """Return the structure at each of S sets of inputs of an envelope, shape (S, n)."""
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
-    ground, n = system.ground, matrices.mass.value.shape[-1]
-    record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
+    n = matrices.mass.value.shape[-1]
+    record: Array = np.zeros(0)
+    record_step = 0.0
+    if system.ground is not None:
+        record = system.ground.samples
+        record_step = system.ground.step
     courses = tuple(
         Course(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
         for x in distinct_histories(system.loads)
     )
     motions = []
     for s in range(len(points)):
-        M, K = matrices.mass.value[s], matrices.stiffness.value[s]
-        b, static, impulse = (
-            None if jet is None else jet.value[s]
-            for jet in (matrices.forces, matrices.static, matrices.impulse)
+        M = matrices.mass.value[s]
+        K = matrices.stiffness.value[s]
+        displacement = matrices.q0.value[s, :, 0]
+        velocity = matrices.v0.value[s, :, 0]
+        if matrices.static is not None:
+            displacement = displacement + np.linalg.solve(K, matrices.static.value[s, :, 0])
+        if matrices.impulse is not None:
+            velocity = velocity + np.linalg.solve(M, matrices.impulse.value[s, :, 0])
+        forces = np.zeros((n, 0))
+        if matrices.forces is not None:
+            forces = matrices.forces.value[s]
+        motion = LinearMotion(
+            mass=M,
+            damping=matrices.damping.value[s],
+            stiffness=K,
+            rows=rows.value[s],
+            start=np.append(displacement, velocity),
+            pattern=matrices.rigid[:, 0],
+            record=record,
+            record_step=record_step,
+            forces=forces,
+            feeds=matrices.accelerated @ np.linalg.solve(M, forces),
+            courses=courses,
         )
-        q0, v0 = matrices.q0.value[s, :, 0], matrices.v0.value[s, :, 0]
-        forces = np.zeros((n, 0)) if b is None else b
-        q0 = q0 if static is None else q0 + np.linalg.solve(K, static[:, 0])
-        v0 = v0 if impulse is None else v0 + np.linalg.solve(M, impulse[:, 0])
-        motions.append(
-            LinearMotion(
-                mass=M,
-                damping=matrices.damping.value[s],
-                stiffness=K,
-                rows=rows.value[s],
-                start=np.append(q0, v0),
-                pattern=matrices.rigid[:, 0],
-                record=record,
-                record_step=step,
-                forces=forces,
-                feeds=matrices.accelerated @ np.linalg.solve(M, forces),
-                courses=courses,
-            )
-        )
+        motions.append(motion)
     return motions
 
 
-def motion_inputs(envelope: Envelope, cuts: Boxes, most: int) -> Array:
-    """Return at most `most` distinct finite inputs to test, those at peaks first, (S, n)."""
+def motion_inputs(envelope: Envelope, cuts: Boxes, max_count: int) -> Array:
+    """Return at most `max_count` distinct finite inputs to test, those at peaks first, (S, n)."""
     at_peaks = [inputs_at_peaks(envelope, level) for level in range(len(envelope.alpha))]
-    count = np.arange(4 * most)
-    # every second point in the lowest level, the others in all levels in turn
-    level = np.where(count % 2, count // 2 % len(envelope.alpha), 0)
-    unit = quasi_random_points(len(cuts.names), len(count))
+    number = np.arange(4 * max_count)
+    # Every second point lies in the lowest level, and the others in all levels in turn.
+    level = np.where(number % 2, number // 2 % len(envelope.alpha), 0)
+    unit = quasi_random_points(len(cuts.names), len(number))
     inside = cuts.lower[level] + (cuts.upper - cuts.lower)[level] * unit
     candidates = np.vstack([at_peaks[0], cuts.probes, *at_peaks[1:], inside])
-    return _distinct(candidates[np.isfinite(candidates).all(1)])[:most]
+    is_finite = np.isfinite(candidates).all(axis=1)
+    return _distinct(candidates[is_finite])[:max_count]
 
 
 def inputs_at_peaks(envelope: Envelope, level: int) -> Array:
     """Return the distinct inputs that an envelope names at its outputs' peaks, shape (P, n)."""
     outputs = np.arange(len(envelope.outputs))
-    high, low = envelope.upper[level].argmax(0), envelope.lower[level].argmin(0)
-    named = envelope.upper_at[level, high, outputs], envelope.lower_at[level, low, outputs]
-    return _distinct(np.concatenate(named))
+    highest_nodes = envelope.upper[level].argmax(axis=0)
+    lowest_nodes = envelope.lower[level].argmin(axis=0)
+    at_highest = envelope.upper_at[level, highest_nodes, outputs]
+    at_lowest = envelope.lower_at[level, lowest_nodes, outputs]
+    return _distinct(np.concatenate([at_highest, at_lowest]))
 
 
 def _distinct(points: Array) -> Array:
+    """Return the points (S, n) without repetitions, each where it comes first."""
     _, first = np.unique(points, axis=0, return_index=True)
     return np.asarray(points[np.sort(first)])
 
 
-class _Tested(NamedTuple):
-    """An exact motion at inputs (n,)."""
+class _TestedMotion(NamedTuple):
+    """An exact response at inputs (n,), at J times."""
 
-    point: Array
-    values: Array  # outputs at `Trial.times`, (J, m)
-    rounding: Array  # their round-off
+    point: Array  # the inputs, (n,), in SI units
+    values: Array  # outputs, (J, m)
+    rounding: Array  # bounds of their rounding, (J, m)
     jumps: Mask  # whether a force jumps at the end of each step, (T − 1,)
 
 
@@ -163,7 +170,7 @@ def jumps_at_ends(courses: Sequence[Course], time: Array) -> Mask:
 
 
 def fractions_of_steps(time: Array, lower: Array, upper: Array) -> Array:
-    """Return fractions of each step at which motions are compared, rising from 0.
+    """Return fractions of each step at which responses are compared, rising from 0.
 
     They are drawn, so that no load can be zero at all of them as it can be at nodes and quarter
     points. The seed depends on nodes and cuts, so that a test that is repeated has the same bits.
@@ -184,29 +191,35 @@ def fractions_of_steps(time: Array, lower: Array, upper: Array) -> Array:
 
 
 class Trial:
-    """Comparison of exact motions with an envelope that is guaranteed, or has proved outer bounds.
+    """Comparison of exact responses with an envelope that is guaranteed, or has guaranteed bounds.
 
     `lower` and `upper` are ends of its inputs on all levels, shape (A, n).
     """
 
     def __init__(self, envelope: Envelope, lower: Array, upper: Array) -> None:
-        self.envelope, self.lower, self.upper = envelope, lower, upper
-        time, shape = envelope.time, envelope.lower.shape[1:]
-        # fractions of each step at which its motions are compared, (T − 1, TIMES_OF_STEP)
+        self.envelope = envelope
+        self.lower = lower
+        self.upper = upper
+        time = envelope.time
+        shape = envelope.lower.shape[1:]
+        # fractions of each step at which responses are compared, (T − 1, TIMES_OF_STEP)
         self.fractions = fractions_of_steps(time, lower, upper)
-        inside = time[:-1, None] + np.diff(time)[:, None] * self.fractions
+        inside = time[:-1, np.newaxis] + np.diff(time)[:, np.newaxis] * self.fractions
         # nodes and the times between them, (TIMES_OF_STEP (T − 1) + 1,), in s
         self.times = np.append(inside.ravel(), time[-1])
-        # what is proved between nodes, (T, m)
-        self.between = np.full(shape, np.inf) if envelope.between is None else envelope.between
-        # distance of attained bounds from the motion that rounding explains, (m,), and what the
-        # motion at named inputs may exceed them by, (T, m)
-        self.tolerance = ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max((0, 1))
-        error = envelope.attained_error
-        self.slack = self.tolerance + (np.zeros(shape) if error is None else error)
+        # what is guaranteed between nodes, (T, m)
+        self.between: Array = np.full(shape, np.inf)
+        if envelope.between is not None:
+            self.between = envelope.between
+        # distance of attained bounds from the response that rounding explains, (m,), and what the
+        # response at named inputs may exceed them by, (T, m)
+        self.tolerance = ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max(axis=(0, 1))
+        self.slack = self.tolerance + np.zeros(shape)
+        if envelope.attained_error is not None:
+            self.slack = self.tolerance + envelope.attained_error
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
-        """Refuse an envelope that exact motions at inputs (S, n) contradict.
+        """Check that exact responses at inputs (S, n) do not contradict the envelope.
 
         Raises:
             ContradictionError: As `with_motions_tested`.
@@ -214,133 +227,159 @@ class Trial:
         for k, motion in enumerate(motions):
             point = points[k]
             jumps = jumps_at_ends(motion.courses, self.envelope.time)
-            tested = _Tested(point, *motion.outputs(self.times), jumps)
+            outputs = motion.outputs(self.times)
+            tested = _TestedMotion(point, outputs.values, outputs.rounding, jumps)
             near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
-            inside = (self.lower <= point + near) & (point - near <= self.upper)
-            for level in map(int, np.flatnonzero(inside.all(1))):
+            is_inside = (self.lower <= point + near) & (point - near <= self.upper)
+            for level in map(int, np.flatnonzero(is_inside.all(axis=1))):
                 self.require_inside(level, tested)
                 self.require_attained(level, tested)
             self.require_line_deviation(tested)
 
-    def require_inside(self, level: int, motion: _Tested) -> None:
-        """Refuse proved bounds that a motion leaves, at nodes or between them."""
+    def require_inside(self, level: int, motion: _TestedMotion) -> None:
+        """Check that a response does not leave the guaranteed bounds, at nodes or between them.
+
+        Raises:
+            ContradictionError: It leaves a bound by more than rounding.
+        """
         for sign, node_bound, side in (
             (1.0, self.envelope.proved.upper[level], "above the proved upper"),
             (-1.0, self.envelope.proved.lower[level], "below the proved lower"),
         ):
-            bound = sign * _within_steps(sign * node_bound, self.between)
+            bound = sign * _bounds_at_times(sign * node_bound, self.between)
             excess = sign * (motion.values - bound) - motion.rounding
             words = f"{side} bound of α = {self.envelope.alpha[level]:g}"
             self._require(excess, bound, words, motion)
 
-    def require_attained(self, level: int, motion: _Tested) -> None:
-        """Refuse attained bounds of a level that name the inputs of a motion and differ from it."""
+    def require_attained(self, level: int, motion: _TestedMotion) -> None:
+        """Check that attained bounds of a level that name the inputs of a response equal it.
+
+        Raises:
+            ContradictionError: One differs by more than the errors that the envelope declares.
+        """
         envelope = self.envelope
         if envelope.inner is None:
             return
-        at_nodes = _Tested(
-            motion.point,
-            motion.values[::TIMES_OF_STEP],
-            motion.rounding[::TIMES_OF_STEP],
-            motion.jumps,
+        at_nodes = motion._replace(
+            values=motion.values[::TIMES_OF_STEP], rounding=motion.rounding[::TIMES_OF_STEP]
         )
-        for sign, at, inner, side in (
+        for sign, named_inputs, attained, side in (
             (1.0, envelope.upper_at[level], envelope.inner.upper[level], "upper"),
             (-1.0, envelope.lower_at[level], envelope.inner.lower[level], "lower"),
         ):
-            outside = sign * (at_nodes.values - inner)
+            outside = sign * (at_nodes.values - attained)
             # inside by the tolerance at most, outside by the slack
             excess = np.maximum(-outside - self.tolerance, outside - self.slack)
-            names_point = (at == motion.point).all(-1)
+            names_point = (named_inputs == motion.point).all(axis=-1)
             excess = np.where(names_point, excess - at_nodes.rounding, -np.inf)
             words = f"other than the attained {side} bound of α = {envelope.alpha[level]:g}"
-            self._require(excess, inner, words, at_nodes)
+            self._require(excess, attained, words, at_nodes)
 
-    def require_line_deviation(self, motion: _Tested) -> None:
-        """Refuse a motion that strays farther from straight lines between nodes than is proved.
+    def require_line_deviation(self, motion: _TestedMotion) -> None:
+        """Check that a response is no farther from straight lines between nodes than is guaranteed.
 
         In a step at whose end a force jumps it must not lie farther beyond its values at both ends.
+
+        Raises:
+            ContradictionError: It is farther by more than rounding.
         """
         ends = motion.values[::TIMES_OF_STEP]
-        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * self.fractions[..., None]
+        rise = np.diff(ends, axis=0)[:, np.newaxis] * self.fractions[..., np.newaxis]
+        inside = ends[:-1, np.newaxis] + rise
         line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
-        allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
-        allowed = np.append(np.repeat(allowed, TIMES_OF_STEP, axis=0), allowed[-1:], axis=0)
-        is_jump = np.append(np.repeat(motion.jumps, TIMES_OF_STEP), False)[:, None]
-        low, high = (
-            np.append(np.repeat(f(ends[1:], ends[:-1]), TIMES_OF_STEP, axis=0), ends[-1:], axis=0)
-            for f in (np.minimum, np.maximum)
-        )
+        of_step = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
+        allowed = _at_times(of_step, last=of_step[-1])
+        is_jump = np.append(np.repeat(motion.jumps, TIMES_OF_STEP), False)[:, np.newaxis]
+        low = _at_times(np.minimum(ends[1:], ends[:-1]), last=ends[-1])
+        high = _at_times(np.maximum(ends[1:], ends[:-1]), last=ends[-1])
         above = motion.values - np.where(is_jump, high, line)
         below = np.where(is_jump, low, line) - motion.values
         excess = np.maximum(above, below) - allowed - 2 * motion.rounding
         self._require(excess, line, "farther than `between` from the straight line at", motion)
 
-    def _require(self, excess: Array, bound: Array, words: str, motion: _Tested) -> None:
-        """Refuse a motion whose excess (J, m) over a bound is not ≤ 0; name where it is largest."""
+    def _require(self, excess: Array, bound: Array, words: str, motion: _TestedMotion) -> None:
+        """Check that all excesses of a response over a bound, shape (J, m), are at most 0.
+
+        Raises:
+            ContradictionError: One is larger, or NaN. The largest one is named.
+        """
         if bool((excess <= 0).all()):
             return
         worst = np.where(np.isnan(excess), np.inf, excess)
         j, o = np.unravel_index(int(worst.argmax()), worst.shape)
-        times = self.times[:: (len(self.times) - 1) // (len(excess) - 1)]
-        output, value = self.envelope.outputs[o], motion.values[j, o]
+        stride = (len(self.times) - 1) // (len(excess) - 1)  # of nodes alone, or of all times
+        time = self.times[::stride][j]
+        output = self.envelope.outputs[o]
         inputs = zip(self.envelope.inputs, motion.point, strict=True)
         at = ", ".join(f"{name} = {float(x)!r}" for name, x in inputs)
         what = (
-            f"the proof is wrong: {output} at t = {times[j]:g} s is {value:.9g}"
+            f"the proof is wrong: {output} at t = {time:g} s is {motion.values[j, o]:.9g}"
             f" {Output(output).unit}, {words} {bound[j, o]:.9g}, by {excess[j, o]:.3g} more than"
             f" rounding and what is declared explain, at {at}"
         )
         raise ContradictionError(what, "keep the case and report it")
 
 
-def _within_steps(upper: Array, between: Array) -> Array:
+def _at_times(of_steps: Array, *, last: Array) -> Array:
+    """Return values of steps, (T − 1, m), at the times of a `Trial`; at its end `last`, (m,)."""
+    return np.vstack([np.repeat(of_steps, TIMES_OF_STEP, axis=0), last])
+
+
+def _bounds_at_times(upper: Array, between: Array) -> Array:
     """Return upper bounds at the times of a `Trial`, (J, m), from those at nodes, (T, m)."""
-    inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
-    parts = [upper[:-1], *[inside] * (TIMES_OF_STEP - 1)]
-    return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
+    within_step = np.maximum(upper[1:], upper[:-1]) + between[1:]
+    bounds = _at_times(within_step, last=upper[-1])
+    bounds[::TIMES_OF_STEP] = upper
+    return bounds
 
 
 def variables(
     points: Array, motions: Sequence[LinearMotion]
 ) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Return dataset variables with inputs (S, n) and matrices of the first of S structures."""
-    # as many as keep three matrices each within the limit
-    count = max(1, min(len(motions), MAX_NUMBERS // (3 * motions[0].mass.size)))
-    first, courses = motions[0], motions[0].courses
-    # of each course the number of samples, and the fields after these
-    numbers = np.array([[len(x.samples), *x[1:]] for x in courses], float)
-    samples = np.concatenate([np.zeros(0), *(x.samples for x in courses)])
-    return {
-        "motion_inputs": (("motion", "parameter"), points[:count]),
-        **{
-            f"motion_{name}": (axes, np.stack([getattr(x, name) for x in motions[:count]]))
-            for name, axes in AXES.items()
-        },
-        "record": (("sample",), first.record),
-        "record_step": ((), np.array(first.record_step)),
-        "course_samples": (("course_sample",), samples),
-        "course_numbers": (("load", "number"), numbers.reshape(len(courses), 6)),
+    """Return dataset variables of tested structures: axes and values by name.
+
+    Args:
+        points: Inputs of S structures, shape (S, n).
+        motions: The structures. The first ones are stored, as many as have a million numbers in
+            three matrices each, 8 MB; the first is always stored.
+    """
+    count = max(1, min(len(motions), 1_000_000 // (3 * motions[0].mass.size)))
+    first = motions[0]
+    # Of each course the number of samples, and the fields after these.
+    numbers = np.array([[len(x.samples), *x[1:]] for x in first.courses], float)
+    samples = np.concatenate([np.zeros(0), *(x.samples for x in first.courses)])
+    found: dict[str, tuple[tuple[str, ...], Array]] = {
+        "motion_inputs": (("motion", "parameter"), points[:count])
     }
+    for name, axes in AXES.items():
+        found[f"motion_{name}"] = axes, np.stack([getattr(x, name) for x in motions[:count]])
+    found["record"] = ("sample",), first.record
+    found["record_step"] = (), np.array(first.record_step)
+    found["course_samples"] = ("course_sample",), samples
+    found["course_numbers"] = ("load", "number"), numbers.reshape(len(first.courses), 6)
+    return found
 
 
 def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
-    """Return inputs (S, n) and structures of the tested motions that a dataset holds."""
+    """Return the inputs (S, n) and the structures of the tested responses that a dataset holds."""
     values = {str(name): variable.values for name, variable in data.data_vars.items()}
-    numbers, points = values["course_numbers"], values["motion_inputs"]
+    points = values["motion_inputs"]
+    numbers = values["course_numbers"]
     ends = np.cumsum(numbers[:, 0]).astype(int)[:-1]
     samples = np.split(values["course_samples"], ends)
-    courses = tuple(
-        Course(x, step, start, bool(is_held), frequency, phase)
-        for x, (_, step, start, is_held, frequency, phase) in zip(samples, numbers, strict=False)
-    )
-    fixed: dict[str, Any] = {
-        "record": values["record"],
-        "record_step": float(values["record_step"]),
-        "courses": courses,
-    }
-    motions = [
-        LinearMotion(**{name: values[f"motion_{name}"][s] for name in AXES}, **fixed)
-        for s in range(len(points))
-    ]
+    courses = []
+    for course_samples, (_, step, start, is_held, frequency, phase) in zip(
+        samples, numbers, strict=False
+    ):
+        courses.append(Course(course_samples, step, start, bool(is_held), frequency, phase))
+    motions = []
+    for s in range(len(points)):
+        arrays = {name: values[f"motion_{name}"][s] for name in AXES}
+        motion = LinearMotion(
+            **arrays,
+            record=values["record"],
+            record_step=float(values["record_step"]),
+            courses=tuple(courses),
+        )
+        motions.append(motion)
     return points, motions

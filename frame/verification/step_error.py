@@ -21,23 +21,9 @@ from alphacut.frame.structures.linear import evaluate, has_matrices
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.fuzzy.result import Nature
 
-OPTIMA = 64
-"""Points at which bounds are reached that are looked at besides, at most."""
 MARGIN = 1.5
-"""Factor on the largest error or stray at these, since other points of the box may exceed it."""
-DIVERGED = 10.0
-"""Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
-REFERENCES = 32
-"""Points at peaks that are compared with a reference motion, at most."""
-COARSE = 0.02
-"""Error at such a point, as a fraction of the output's peak, from which on a step is refused:
-bounds are then attained by other motions than those they name."""
-CHUNK = 16
-"""Trajectories that are held at once."""
-FLOOR = 0.1
-"""Least stray of a step, as a fraction of the largest of all steps."""
-RELATIVE = 1e-11
-"""Error of a step of the reference motion as a fraction of the state."""
+"""Factor on the largest error or distance at some points, since other points of the box may exceed
+it; tuned: a larger one would declare larger errors."""
 
 
 def step_error(flow: UnitFlow) -> Array:
@@ -46,15 +32,16 @@ def step_error(flow: UnitFlow) -> Array:
     It is `MARGIN` times the largest error (`Flow.deviations`) at nominal values and corners.
 
     Raises:
-        StepError: The error of an output exceeds `DIVERGED` times its peak.
+        StepError: The error of an output exceeds ten times its peak: the scheme has left the
+            trajectory.
     """
     if flow.flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
     values, error = flow.flow.deviations(flow.boxes.probes)
-    running_error: Array = np.maximum.accumulate(error.max(0), axis=0)
-    peaks = np.abs(values).max((0, 1))
+    running_error: Array = np.maximum.accumulate(error.max(axis=0), axis=0)
+    peaks = np.abs(values).max(axis=(0, 1))
     for name, last_error, peak in zip(flow.outputs, running_error[-1], peaks, strict=True):
-        if last_error > DIVERGED * peak > 0:
+        if last_error > 10.0 * peak > 0:
             what = f"step: its error, {last_error:.2g}, passes the peak of {name}, {peak:.2g}"
             raise StepError(what, "take a smaller step")
     return MARGIN * running_error
@@ -63,95 +50,147 @@ def step_error(flow: UnitFlow) -> Array:
 def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """Return the envelope of a flow's trajectories with the time-stepping error in its errors.
 
-    `steps` (T, m) are from `step_error`. The fact `step_error` is the largest of a displacement.
+    The fact `step_error` is the largest time-stepping error of a displacement.
+
+    Args:
+        bounds: Envelope of the trajectories of the scheme.
+        flow: The trajectories.
+        steps: Time-stepping error from `step_error`, shape (T, m).
+
+    Raises:
+        StepError: The step is too coarse for a trajectory that attains a bound.
     """
     if not flow.flow.exact:
         steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
-    has_reference_unit = [unit == flow.units[flow.reference] for unit in flow.units]
-    error, basis = bounds.error + steps, bounds.basis
+    error = bounds.error + steps
+    basis = bounds.basis
     if steps.any():
         basis = (*basis, f"midpoint steps of {flow.time[1]:g} s")
+    has_reference_unit = [unit == flow.units[flow.reference] for unit in flow.units]
     facts = {"step_error": float(steps[:, has_reference_unit].max()), **bounds.facts}
-    if bounds.nature is not Nature.ATTAINED:  # else how far other motions go is not known
+    if bounds.nature is not Nature.ATTAINED:
+        # Of attained bounds it is not known how far other trajectories go.
         facts["estimated_error"] = float((error / flow.scale).max())
     return replace(bounds, error=error, basis=basis, facts=facts)
 
 
 def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
-    """Return the time-stepping error as `step_error` does, at inputs that reach bounds."""
-    # Corners alone do not suffice: between them a structure may resonate, which the scheme does at
-    # other parameters than the exact motion, or a motion may pass near an unstable equilibrium. Of
-    # a system that is not linear the peaks are compared with a method of another kind, too.
-    at, d = np.stack([bounds.lower_at, bounds.upper_at]), len(bounds.inputs)
-    peaks = np.abs([bounds.lower, bounds.upper]).argmax(2)[:, :, None, :, None]
-    highest = np.unique(np.take_along_axis(at, peaks, 2).reshape(-1, d), axis=0)
-    further_points = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
-    points = np.unique(np.vstack([highest, further_points[:OPTIMA]]), axis=0)
-    error = flow.deviations(points)[1].max(0)
+    """Return the time-stepping error as `step_error` does, at inputs that attain bounds, (T, m).
+
+    Corners alone do not suffice. Between them a structure may resonate, which the scheme does at
+    other parameters than the exact trajectory, or a trajectory may pass near an unstable
+    equilibrium. Of a system that is not linear the peaks are compared with a method of another
+    kind, too.
+    """
+    d = len(bounds.inputs)
+    inputs = np.stack([bounds.lower_at, bounds.upper_at])  # (2, A, T, m, d)
+    peak_nodes = np.abs([bounds.lower, bounds.upper]).argmax(axis=2)
+    at_peaks = np.take_along_axis(inputs, peak_nodes[:, :, np.newaxis, :, np.newaxis], axis=2)
+    peak_inputs = np.unique(at_peaks.reshape(-1, d), axis=0)
+    # Up to 64 of the other inputs are looked at besides, and up to 32 of those at peaks compared
+    # with a reference, which limits the time.
+    all_inputs = np.unique(inputs.reshape(-1, d), axis=0)
+    further_inputs = np.random.default_rng(0).permutation(all_inputs)[:64]
+    points = np.unique(np.vstack([peak_inputs, further_inputs]), axis=0)
+    error = flow.deviations(points)[1].max(axis=0)
     if isinstance(flow, LagrangianFlow):
-        error = np.maximum(error, _from_reference(bounds, flow, highest[:REFERENCES]))
+        error = np.maximum(error, _distance_from_reference(bounds, flow, peak_inputs[:32]))
     return np.asarray(MARGIN * np.maximum.accumulate(error, axis=0))
 
 
-def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
-    """Return the largest distance of motions at points (S, d) from reference motions, (T, m)."""
-    named = [dict(zip(flow.names, point, strict=True)) for point in points]
-    inputs = [{**flow.system.parameters, **x} for x in named]
+def _distance_from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
+    """Return the largest distance of trajectories at points (S, d) from reference ones, (T, m).
+
+    Raises:
+        StepError: A trajectory is off by more than a fiftieth of the output's peak. Bounds are then
+            attained by other trajectories than those they name.
+    """
+    inputs = []
+    for point in points:
+        named = dict(zip(flow.names, point, strict=True))
+        inputs.append({**flow.system.parameters, **named})
     truth = reference_motions(flow.system, inputs, bounds.time)
     error = np.abs(flow.values(points) - truth)
-    relative_error = error.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
-    if (relative_error > COARSE).any():
+    peaks = np.maximum(np.abs(truth).max(axis=(0, 1)), 1e-300)
+    relative_error = error.max(axis=1) / peaks
+    if (relative_error > 0.02).any():
         worst, output = np.unravel_index(int(relative_error.argmax()), relative_error.shape)
         at = ", ".join(f"{x} = {y:.6g}" for x, y in zip(flow.names, points[worst], strict=True))
         what = f"step: {flow.step:g} s is too coarse where a bound is attained, at {at}: there"
         what += f" {flow.outputs[output]} is off by {error[worst, :, output].max():.3g}"
         raise StepError(what, "take a smaller step, a shorter duration or narrower inputs")
-    return np.asarray(error.max(0))
+    return np.asarray(error.max(axis=0))
 
 
 def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
-    """Return the envelope with an estimated deviation between nodes, if it has no proved one."""
+    """Return the envelope with an estimate of `between`, if it has no guaranteed one."""
     if bounds.between is not None:
         return bounds
     corners = flow.boxes.probes
-    between = node_deviation(flow.flow, np.vstack([corners, (corners + flow.boxes.nominal) / 2]))
+    halfway = (corners + flow.boxes.nominal) / 2
+    between = node_deviation(flow.flow, np.vstack([corners, halfway]))
     facts = {**bounds.facts, "between_nodes": float((between / flow.scale).max())}
     return replace(bounds, between=between, facts=facts)
 
 
 def node_deviation(flow: Flow, points: Array) -> Array:
-    """Return the estimated distance of outputs from straight lines between nodes, shape (T, m).
+    """Estimate the distance of outputs from straight lines between nodes.
 
-    Row j is that of the step that ends at node j, 0 for the first node. It is `MARGIN` times the
-    largest of the step and its neighbours, and of `FLOOR` times that of any step, of trajectories
-    at parameters (S, d) in SI units.
+    It is `MARGIN` times the largest distance in the step and its neighbours, and in any step a
+    tenth of the largest of all steps at least: where some trajectories are straight, others may
+    bend.
 
     In a step in which a force jumps, so does an acceleration. It is far from the straight line
     then, but hardly beyond its values at both ends: there the distance beyond these is taken.
+
+    Args:
+        flow: The trajectories.
+        points: Parameters of some of them, shape (S, d), in SI units.
+
+    Returns:
+        Shape (T, m). Row j belongs to the step that ends at node j; the first one is 0.
     """
-    finer, parts = flow.finer()
-    fraction = (np.arange(1, parts) / parts)[:, None]
+    finer, substeps = flow.finer()
     deviation: Array = np.zeros((len(flow.time) - 1, len(flow.outputs)))
     has_jump: Mask = np.zeros(deviation.shape, bool)
-    for chunk in np.array_split(points, -(-len(points) // CHUNK)):
-        fine = finer.values(chunk)
-        ends = fine[:, ::parts]
-        inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
-        chord = ends[:, :-1, None] * (1 - fraction) + ends[:, 1:, None] * fraction
-        off_chord = np.abs(inner - chord).max((0, 2))
-        above = inner.max(2) - np.maximum(ends[:, :-1], ends[:, 1:])
-        below = np.minimum(ends[:, :-1], ends[:, 1:]) - inner.min(2)
-        beyond_ends = np.maximum(np.maximum(above, below).max(0), 0.0)
+    for chunk in np.array_split(points, -(-len(points) // 16)):  # which limits the memory
+        distances = _distances_within_steps(finer.values(chunk), substeps)
         fed = _fed_through(flow, chunk)
-        has_jump = has_jump | (fed.jumps[:, :, None] & (fed.amplitude > 0)).any(0)
-        off = np.where(has_jump, beyond_ends, off_chord)
-        deviation = np.maximum(deviation, off + _fed_between(fed, finer.time, parts))
-    # Where these trajectories are straight, others may bend, but a jump is in the same step of all.
+        jumps = (fed.jumps[:, :, np.newaxis] & (fed.amplitude > 0)).any(axis=0)
+        has_jump = has_jump | jumps
+        distance = np.where(has_jump, distances.beyond_ends, distances.from_chord)
+        deviation = np.maximum(deviation, distance + _fed_between(fed, finer.time, substeps))
+    # A jump is in the same step of all trajectories, so that neighbours do not share it.
     smooth = np.where(has_jump, 0.0, deviation)
     padded = np.pad(smooth, ((1, 1), (0, 0)))
-    candidates = [padded[:-2], deviation, padded[2:]]
-    candidates.append(np.broadcast_to(FLOOR * smooth.max(0), deviation.shape))
-    return np.concatenate([np.zeros((1, deviation.shape[1])), MARGIN * np.max(candidates, 0)])
+    least = np.broadcast_to(0.1 * smooth.max(axis=0), deviation.shape)
+    largest = np.max([padded[:-2], deviation, padded[2:], least], axis=0)
+    return np.concatenate([np.zeros((1, deviation.shape[1])), MARGIN * largest])
+
+
+class _Distances(NamedTuple):
+    """Largest distances of some trajectories within each step between nodes."""
+
+    from_chord: Array  # from the straight line through both ends, (T − 1, m)
+    beyond_ends: Array  # above the larger or below the smaller value of both ends, (T − 1, m)
+
+
+def _distances_within_steps(fine: Array, substeps: int) -> _Distances:
+    """Return the distances of trajectories at finer nodes, `fine` of shape (S, finer nodes, m)."""
+    ends = fine[:, ::substeps]
+    begin = ends[:, :-1]
+    end = ends[:, 1:]
+    in_steps = fine[:, :-1].reshape(len(fine), -1, substeps, fine.shape[-1])
+    inner = in_steps[:, :, 1:]  # (S, T − 1, substeps − 1, m)
+    fraction = (np.arange(1, substeps) / substeps)[:, np.newaxis]
+    chord = begin[:, :, np.newaxis] * (1 - fraction) + end[:, :, np.newaxis] * fraction
+    above = inner.max(axis=2) - np.maximum(begin, end)
+    below = np.minimum(begin, end) - inner.min(axis=2)
+    beyond_ends = np.maximum(above, below).max(axis=0)
+    return _Distances(
+        from_chord=np.abs(inner - chord).max(axis=(0, 2)),
+        beyond_ends=np.maximum(beyond_ends, 0.0),
+    )
 
 
 class _FedThrough(NamedTuple):
@@ -170,36 +209,49 @@ def _fed_through(flow: Flow, points: Array) -> _FedThrough:
         matrices, _ = evaluate(flow.system, flow.names, points, derivatives=False)
         if matrices.feeds is not None:
             histories = distinct_histories(flow.system.loads)
-            amplitude = np.abs(matrices.feeds.value).max(0).T[:, None]
+            amplitude = np.abs(matrices.feeds.value).max(axis=0).T[:, np.newaxis]
     jumps = np.zeros((len(histories), len(flow.time) - 1), bool)
     for row, history in zip(jumps, histories, strict=True):
         row[:] = history.jumps_in_steps(flow.time)[1:]
     return _FedThrough(histories, amplitude, jumps)
 
 
-def _fed_between(fed: _FedThrough, time: Array, parts: int) -> Array:
-    """Return what forces add to outputs between finer nodes, (steps, m), `parts` to a step.
+def _fed_between(fed: _FedThrough, time: Array, substeps: int) -> Array:
+    """Return what forces add to outputs between finer nodes, shape (steps, m).
 
     A force may be zero at all of these and not between them.
+
+    Args:
+        fed: What the forces add.
+        time: Finer nodes, in s.
+        substeps: Number of finer steps in a step.
     """
-    steps = (len(time) - 1) // parts
+    steps = (len(time) - 1) // substeps
     added = np.zeros((steps, fed.amplitude.shape[-1]))
     for history, amplitude, jumps in zip(*fed, strict=True):
-        off_chord, beyond_ends = (
-            f(history, time)[1:].reshape(steps, parts).max(1) for f in (load_deviation, load_excess)
-        )
-        added += np.where(jumps, beyond_ends, off_chord)[:, None] * amplitude
+        from_chord = load_deviation(history, time)[1:].reshape(steps, substeps).max(axis=1)
+        beyond_ends = load_excess(history, time)[1:].reshape(steps, substeps).max(axis=1)
+        distance = np.where(jumps, beyond_ends, from_chord)
+        added += distance[:, np.newaxis] * amplitude
     return added
 
 
 def reference_motions(
     system: LagrangianSystem, points: Sequence[Mapping[str, float]], times: Array
 ) -> Array:
-    """Return outputs at parameters by name and times from the start, (S, T, m), to test steps with.
+    """Return outputs of reference trajectories, to test time steps with.
 
-    Hamilton's equations in coordinates q and momenta π by Dormand and Prince's method of order 8
-    (Hairer, Nørsett, Wanner 1993), with SymPy's own functions: it shares neither scheme nor
-    compiled code with the midpoint rule that it judges.
+    Hamilton's equations in coordinates q and momenta π are integrated by Dormand and Prince's
+    method of order 8 (Hairer, Nørsett, Wanner 1993), with SymPy's own functions: it shares neither
+    scheme nor compiled code with the midpoint rule that it judges.
+
+    Args:
+        system: The system.
+        points: Parameters by name of S trajectories.
+        times: Times from the start, shape (T,), in s.
+
+    Returns:
+        Shape (S, T, m).
 
     Raises:
         FailedError: The integration does not reach the last time.
@@ -207,32 +259,37 @@ def reference_motions(
     import sympy
     from scipy.integrate import solve_ivp
 
-    eq, n = system.symbols, system.coordinates
-    momenta = sympy.Matrix(sympy.symbols(f"pi:{n}", real=True))
-    velocity, (q0, v0) = eq.velocity(momenta), system.start()
+    relative_tolerance = 1e-11  # of a step, as a fraction of the state; far below any step's error
+    eq = system.symbols
+    momenta = sympy.Matrix(sympy.symbols(f"pi:{system.coordinates}", real=True))
+    velocity = eq.velocity(momenta)
+    initial_q, initial_v = system.start()
     moving = dict(zip(eq.v, velocity, strict=True))
-    starting = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
+    starting = dict(zip([*eq.q, *eq.v], [*initial_q, *initial_v], strict=True))
     arguments = [*eq.q, *momenta, *eq.p.values()]
     rates = sympy.lambdify(arguments, [*velocity, *eq.push.subs(moving)], "math")
-    start_at = sympy.lambdify([*eq.p.values()], [*q0, *eq.momentum.subs(starting)], "math")
+    initial_state = [*initial_q, *eq.momentum.subs(starting)]
+    start_at = sympy.lambdify([*eq.p.values()], initial_state, "math")
     observed = [system.output(name, list(velocity)) for name in system.outputs]
-    outputs, motions = sympy.lambdify(arguments, observed, "math"), []
+    outputs = sympy.lambdify(arguments, observed, "math")
+    trajectories = []
     for parameters in points:
         p = [float(parameters[name]) for name in eq.p]
         start = np.array(start_at(*p), float)
-        # sizes of the states, for the absolute tolerance
+        # Magnitudes of the states, for the absolute tolerance: of the start, or of its rate.
         speed = np.abs(np.array(rates(*start, *p), float))
-        size = np.maximum(np.abs(start), speed * float(times[-1]))
+        magnitude = np.maximum(np.abs(start), speed * float(times[-1]))
+        magnitude = np.where(magnitude > 0, magnitude, magnitude.max() or 1.0)
         found = solve_ivp(
             lambda _, state, p=p: rates(*state, *p),
             (float(times[0]), float(times[-1])),
             start,
             method="DOP853",
             t_eval=times,
-            rtol=RELATIVE,
-            atol=RELATIVE * np.where(size > 0, size, size.max() or 1.0),
+            rtol=relative_tolerance,
+            atol=relative_tolerance * magnitude,
         )
         if not found.success:
             raise FailedError(f"the reference motion: {found.message}")
-        motions.append([outputs(*state, *p) for state in found.y.T])
-    return np.array(motions, float)
+        trajectories.append([outputs(*state, *p) for state in found.y.T])
+    return np.array(trajectories, float)
