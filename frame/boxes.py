@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.base.arrays import Ints, Mask
 from alphacut.base.errors import require_numbers
+from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
@@ -116,6 +117,15 @@ class Boxes:
         ends = np.concatenate([self.lower, self.upper], axis=1)
         is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
         return self.on_levels(np.flatnonzero(is_new)), np.cumsum(is_new) - 1
+
+    def inside_out(self, progress: Progress | None) -> Iterator[tuple[int, Progress]]:
+        """Yield the row of each box from the narrowest to the widest, with its part of a progress.
+
+        What is attained in a narrow box is attained in all wider ones.
+        """
+        count = len(self.alpha)
+        for done in range(count):
+            yield count - 1 - done, nth_subprogress(progress, done, count)
 
     @property
     def probes(self) -> Array:

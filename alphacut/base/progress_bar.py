@@ -24,6 +24,11 @@ def subprogress(progress: Progress | None, first: float, last: float) -> Progres
     return lambda done: progress(first + (last - first) * done)
 
 
+def nth_subprogress(progress: Progress | None, number: int, count: int) -> Progress:
+    """Return a function that reports the progress of one of several equal parts, from 0."""
+    return subprogress(progress, number / count, (number + 1) / count)
+
+
 @contextmanager
 def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """Give a context a function to report the completed fraction with.

@@ -102,6 +102,7 @@ class LimitDecision(LimitResult):
             places_before = floor(log10(abs(value) or 1e-3))
             return percent_text(rounded(value, side, nature, max(4 + places_before, 1)))
         # The number that is shown is rounded, which is in the unit of the limit.
+        # It must stay a bound there: rounding in SI could move it back across the exact value.
         factor = 1.0
         if self.stated_unit is not None:
             factor = self.stated_unit.factor
@@ -138,8 +139,9 @@ class Decision(Answer):
                 relation = {"lower": "≥", "upper": "≤"}[part.peak.bound_side]
                 bound_text = f"{relation} {bound_text}"
             attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
-            if bound and np.isfinite(bound) and np.isfinite(attained):
-                gap = f"{abs((bound - attained) / bound):.1%}"
+            # A gap of a bound of zero has no meaning as a fraction.
+        if bound and np.isfinite(bound) and np.isfinite(attained):
+            gap = f"{abs((bound - attained) / bound):.1%}"
         return {
             "limit": part.words,
             "verdict": part.verdict_and_motion,
@@ -243,6 +245,7 @@ def decide(
         )
     if len(decisions) > 1:
         decisions[ANY] = _decide_any(list(decisions.values()))
+    # All peaks have the same levels and enclose the same set.
     first = next(iter(found.values()))
     return Decision(first.alpha, decisions, encloses=first.encloses)
 
@@ -344,6 +347,8 @@ def _verdict(
         lowest_level: Lowest level α that was computed.
         is_exceeded: Whether some response of a cut is known to exceed the limit.
     """
+    # Nothing is known below the lowest level. If the possibility of exceeding the limit is at most
+    # this level, exceeding it is excluded on this level and on all higher ones.
     if possibility[1] <= lowest_level:
         return "not exceeded"
     if necessity[0] >= 1 - lowest_level:
@@ -358,5 +363,7 @@ def _lowest_excluding_level(alpha: Array, is_excluded: Mask) -> float:
         alpha: Rising levels, shape (levels,).
         is_excluded: The mask, shape (levels,).
     """
+    # The level above the last one that is not excluded; beyond all levels it is 1, because nothing
+    # is more possible than that.
     first = np.flatnonzero(~is_excluded).max(initial=-1) + 1
     return float(np.append(alpha, 1.0)[first])

@@ -8,6 +8,10 @@ peaks have guaranteed bounds and attained values. The peak of a frame that yield
 proportional to the record; the limit is then exceeded on a set of measures, which is found by
 incremental dynamic analysis (`incremental`). α is a level of possibility, not a probability, and is
 never multiplied by one.
+
+A case reaches `fragility_of` as follows. `alphacut/stages/suite.py` computes the peaks under each
+record (`suites.record_peaks`, `peaks.close_peaks`), `alphacut/stages/answers.py` passes them on,
+and `alphacut/report/results.py` prints the first columns of `Fragility.table`.
 """
 
 from __future__ import annotations
@@ -20,7 +24,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.incremental import (
     GRID_RATIO,
@@ -76,6 +80,8 @@ class CriticalMeasures:
         for end in fields(self):
             values = getattr(self, end.name)
             object.__setattr__(self, end.name, np.where(np.isnan(values), np.inf, values))
+        # Ends that agree but for rounding are accepted. They are checked because results are read
+        # back from files, too.
         reached = np.stack([self.low_reached, self.high_reached])
         reached_with_rounding = reached * (1 + 1e-9)
         is_rising = (self.low <= reached_with_rounding) & (reached <= self.high * (1 + 1e-9))
@@ -97,6 +103,8 @@ class CriticalMeasures:
         min_peaks = [peak.min_peak_bounds for peak in peaks]
 
         def critical(peak_bounds: list[Array]) -> Array:
+            # A bound of a largest value may be negative: such a peak reaches no positive limit,
+            # whatever the scale, and its critical measure is infinite.
             positive_peaks = np.maximum(np.stack(peak_bounds, axis=-1), 0.0)  # (levels, records)
             with np.errstate(divide="ignore"):
                 return np.asarray(np.asarray(measures) * limit / positive_peaks)
@@ -163,6 +171,7 @@ class CriticalMeasures:
             Lower and upper bound of the number of records under which a structure of the cut
             exceeds the limit, shape (levels, measures) each.
         """
+        # Comparisons of all records with all measures, shape (levels, records, measures).
         for_all = self.high[:, :, np.newaxis] < measure
         for_some = self.low[:, :, np.newaxis] < measure
         return Ends(for_all.sum(axis=1), for_some.sum(axis=1))
@@ -226,6 +235,7 @@ def counts_between(records: Sequence[Increments], name: str, measure: Array) -> 
     for record in records:
         by_some, by_all = record.is_exceeded(name)
         after = np.searchsorted(record.measure, measure)
+        # Outside the measures that were tried, the first or the last one counts.
         before = np.maximum(after - 1, 0)
         after = np.minimum(after, len(record.measure) - 1)
         count_all += by_all[:, before] & by_all[:, after]
@@ -275,6 +285,7 @@ class LimitFragility(LimitResult):
         low = self.critical.low[level]
         high = self.critical.high[level]
         curves = []
+        # The ends agree on a level where the inputs are crisp; one curve is drawn then.
         ends = [low, high]
         if np.array_equal(low, high):
             ends = [low]
@@ -494,6 +505,8 @@ def _set_text(measures: Array, demands: Array) -> str:
         measures: Rising measures, shape (measures,).
         demands: Peak over limit at these measures, same shape; NaN for a collapse.
     """
+    # The mask is padded, so that each interval has a change at its start and one behind its end. A
+    # comparison with NaN is false, which makes a collapse exceed the limit.
     exceeds = np.concatenate([[False], ~(demands <= 1), [False]])
     changes = np.flatnonzero(np.diff(exceeds.astype(int))).reshape(-1, 2)
     texts = [f"{measures[start]:.4g} … {measures[stop - 1]:.4g}" for start, stop in changes]
@@ -539,6 +552,8 @@ def fragility(
     named = limits_by_name(limits, ())
     require_fragile(model, list(named.values()))
     require_choice("intensity", intensity, MEASURES)
+    # Peaks of linear structures are proportional to the record, so that one scale suffices; frames
+    # that yield are moved at many scales.
     peaks: SuitePeaks | None = None
     increments: dict[str, Increments] = {}
     if yields(model):
@@ -547,7 +562,7 @@ def fragility(
             model, inputs, records, named, intensity=intensity, most=most, step=step, alpha=alpha
         )
         for k, (name, analysis) in enumerate(analyses.items()):
-            tick = subprogress(progress, k / len(analyses), (k + 1) / len(analyses))
+            tick = nth_subprogress(progress, k, len(analyses))
             increments[name] = increments_of(analysis, named, tick)
     else:
         peaks = over_records(
@@ -578,9 +593,11 @@ def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
     yields, all limits must be of magnitudes.
     """
     is_moved_by_record = has_matrices(model) and not model.loads and model.is_at_rest
+    # A start or a force would add a part to the response that does not scale with the record.
     allowed = "linear structures and frames that yield, at rest and without forces"
     require(is_moved_by_record, "fragility", value="of another motion", allowed=allowed)
     for limit in limits:
+        # A structure that exceeds a limit at rest has no critical measure.
         if yields(model):
             fits = limit.side == ""
             allowed = "limits of magnitudes, of columns that yield"
@@ -762,6 +779,7 @@ def _grid(critical: CriticalMeasures, demands: Sequence[Increments]) -> Array:
     If measures were tried, the grid ends with the largest one at the latest, and with this one if
     a critical measure lies beyond it.
     """
+    # The grid is a tenth wider than the critical measures, so that bands begin at 0 and end at 1.
     is_finite = np.isfinite(critical.high)
     largest = 1.1 * float(critical.high.max(initial=0.0, where=is_finite))
     if not is_finite.any():

@@ -95,6 +95,7 @@ class IncrementalAnalysis:
                 for scale in pair:
                     self._move(scale, extremes)
             demands = np.stack([self._extremes(scale)[0] for scale in scales], axis=-1)
+            # All sets of scales begin with one at which nothing is exceeded.
             if np.any(demands[SOME, ..., 0] > 1):
                 # A structure found since then exceeds a limit at the first scale.
                 self._move(scales[0] / GRID_RATIO, self.cuts.nominal)
@@ -146,7 +147,7 @@ class IncrementalAnalysis:
         timed._move(grid[0], structures)  # compiles the kernels
         start = time.perf_counter()
         for scale in (grid[len(grid) // 2], grid[-1]):
-            timed._move(scale, structures)
+            timed._move(scale, structures)  # nothing is moved twice at a scale
         seconds_of_round = (time.perf_counter() - start) / 2
         return rounds * len(structures), rounds * seconds_of_round
 
@@ -190,6 +191,7 @@ class IncrementalAnalysis:
     def _grid(self, structures: Array) -> list[float]:
         """Return the scales of the grid; at the first one all structures are elastic."""
         first = self.elastic_scales(structures).min() / GRID_RATIO
+        # At least two scales, even if the largest scale moves the structure elastically.
         first = min(first, self.greatest_scale / 2)
         count = int(np.ceil(np.log(self.greatest_scale / first) / np.log(GRID_RATIO))) + 1
         return list(map(float, np.geomspace(first, self.greatest_scale, count)))
@@ -241,6 +243,7 @@ class IncrementalAnalysis:
         n_inputs = len(self.cuts.names)
         nothing = np.empty((0, n_inputs)), np.empty((0, self.n_demands))
         moved, demands = self.moved.get(scale, nothing)
+        # Rows are compared by their bits: the same structure always has the same coordinates.
         known_rows = {row.tobytes() for row in moved}
         points = np.unique(points.reshape(-1, n_inputs), axis=0)
         points = points[[row.tobytes() not in known_rows for row in points]]
@@ -416,6 +419,7 @@ def incremental(
     require(yields(model), "incremental", value=value, allowed=allowed)
     tried = np.unique([checked_number("scale", scale, positive=True) for scale in scales])
     outputs = list(map(str, model.outputs))
+    # With limits of 1 in SI units, demands are peaks.
     limits = [(output, 1.0) for output in outputs]
     cuts = boxes(inputs, alpha)
     peaks: dict[str, dict[str, Array]] = {}

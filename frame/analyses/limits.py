@@ -123,6 +123,7 @@ def limits_by_name(
         is_magnitude = limit.side in ("", "mean")
         checked_number(f"limit of {limit.peak}", limit.number, positive=is_magnitude)
 
+    # One peak may have several limits, such as those of different states; then the text names them.
     peaks = [limit.peak for limit in single]
     named = {}
     for limit in single:
@@ -181,6 +182,7 @@ class LimitResult:
         in_si = engineering(self.limit, self.unit)
         if not self.stated:
             return in_si
+        # Minus signs are typographic in texts.
         stated = re.sub(r"-(?=[\d.])", MINUS, self.stated)
         is_fraction = stated.endswith("%") or re.fullmatch(r"1\s*/\s*\d+", stated)
         if is_fraction and self.unit:
@@ -190,6 +192,7 @@ class LimitResult:
     @property
     def stated_unit(self) -> ShownUnit | None:
         """The unit in which the limit was stated; None for a fraction or a plain number."""
+        # A number followed by a unit; fractions ("1/200") and percentages have no unit.
         number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)"
         match = re.fullmatch(number_and_unit, self.stated.replace(MINUS, "-"))
         if match is None or not self.limit or not float(match[1]):

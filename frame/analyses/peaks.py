@@ -330,6 +330,7 @@ def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
     if not is_known.any():
         return {}
     values = np.where(is_known, values, -np.inf)
+    # Unknown values count as -∞, so that the largest known one is found.
     farthest = np.unravel_index(values.argmax(), values.shape)
     return dict(zip(band.inputs, map(float, points[farthest]), strict=True))
 
@@ -340,6 +341,7 @@ def _oriented(low: Array, high: Array, name: str) -> Ends:
         return Ends(-high, -low)
     if name.startswith("max "):
         return Ends(low, high)
+    # |q| is at least the distance of the interval from zero.
     return Ends(np.maximum(np.maximum(low, -high), 0.0), np.maximum(high, -low))
 
 
@@ -359,6 +361,7 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 def _tighter(first: Peak, second: Peak) -> Peak:
     """Return the combined bounds of two analyses of a peak that is no smallest value."""
     both = [first, second]
+    # The guarantees are listed from the weakest to the strongest one.
     strength = list(Nature)
     better = max(both, key=lambda peak: (strength.index(peak.nature), -peak.error.max()))
     found = with_combined(better, both, np.max, "reached", "least_lower")
@@ -409,6 +412,7 @@ def close_peaks(
     The arguments are those of `envelope`, and `names` are the names of the peaks, such as "q3" and
     "max q3".
     """
+    # Each output once: "q3" and "max q3" belong to the same one.
     outputs = tuple(dict.fromkeys(map(output_of, names)))
     magnitudes = all(name == output_of(name) for name in names)
     band = envelope(

@@ -273,6 +273,8 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     """
     support = number.support
     uniform = np.linspace(support.lower, support.upper, 4001)
+    # The corners of the membership function belong to the grid, so that it is integrated exactly
+    # where it is linear between them.
     grid = np.unique(np.append(uniform, number.cuts[1:]))
     membership = number.membership(grid)
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2
@@ -311,6 +313,7 @@ def _step_error(flow: Flow, points: Array) -> Array:
         flow: Response as a function of all inputs.
         points: Inputs whose responses are compared with more accurate ones, shape (points, inputs).
     """
+    # Errors of time stepping accumulate, so that an estimate holds for all later nodes.
     errors = flow.deviations(points)[1].max(axis=0)
     return np.asarray(MARGIN * np.maximum.accumulate(errors, axis=0))
 
@@ -356,6 +359,7 @@ def _peak_ratios(
     of_points = []
     for k in range(len(points)):
         magnitudes = np.abs(flow.values(_joined(points[k], draws))[:, :, columns]).swapaxes(1, 2)
+        # A magnitude is not negative, whatever the error.
         low = np.maximum(magnitudes - step_error, 0.0)  # (draws, limits, times)
         high = magnitudes + step_error
         bounds = (low, high, within_steps(high, between))
@@ -424,6 +428,8 @@ def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
     """
     from scipy.special import betaincinv  # takes time to import
 
+    # The limits are quantiles of beta distributions. They are 0 if no draw counts and 1 if all do,
+    # where a parameter of the distributions would be zero.
     lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
     upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
     return Ends(np.where(least > 0, lower, 0.0), np.where(most < total, upper, 1.0))
@@ -436,6 +442,7 @@ def _fractions_above(peaks: Array, limits: Array) -> Array:
         peaks: Peaks, shape (points, draws).
         limits: Limits, shape (limits,).
     """
+    # In a sorted row, the fraction at most a limit is the rank of the limit.
     rows = np.sort(peaks, axis=1)
     return np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
 
@@ -450,6 +457,7 @@ def _bounds_over_points(values: Array, level: Ints) -> Ends:
     Returns:
         Both bounds, shape (levels, …).
     """
+    # The cut of a level contains those of all higher levels and their points.
     by_level = [values[level >= k] for k in range(level.max() + 1)]
     return Ends(
         np.array([x.min(axis=0) for x in by_level]), np.array([x.max(axis=0) for x in by_level])

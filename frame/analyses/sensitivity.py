@@ -157,6 +157,7 @@ def _steepest_ascent(
     best = -np.inf
     while True:
         tried = np.tile(point, (1 + values.size, 1))
+        # Besides the point itself: three points for each input, one for each of its values.
         for k in range(len(values)):
             tried[1 + 3 * k : 4 + 3 * k, k] = values[k]
         tried = np.unique(tried, axis=0)

@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored, with_combined
 from alphacut.frame.analyses.spectral import spectral_acceleration
@@ -132,6 +132,7 @@ def scaled_records(
     scaled = []
     for number, record in enumerate(suite, start=1):
         name = record.name or f"record {number}"
+        # An oscillator with more damping than the critical one does not oscillate.
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
         measures = {"PGA": record.extremes[0], "Sa(T1)": response}
         is_moving = min(measures.values()) > 0
@@ -148,6 +149,7 @@ def scaled_records(
             intensity = arias_fractions(record.samples, record.step)
             truncated_fraction = 1 - float(intensity[int(length / record.step + 1e-9)])
 
+        # Both measures are proportional to the record.
         factor = scale / measures.get(measure, 1.0)
         scaled_measures = {title: factor * value for title, value in measures.items()}
         facts = RecordPeaks(
@@ -165,6 +167,7 @@ def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str,
     """Return sentences on what is unusual in a record, as it was before scaling."""
     warnings = [f"of record {name} {remark}" for remark in record.remarks]
     mean_fraction = float(record.samples.mean()) / record.extremes[0]
+    # A larger mean hints at an offset of the instrument, whose displacement grows quadratically.
     if abs(mean_fraction) > 0.01:
         what = f"the mean of record {name} is {percent_text(mean_fraction)} of its peak"
         warnings.append(f'{what}; records.baseline = "mean" subtracts it')
@@ -321,7 +324,7 @@ def over_records(
     names = tuple(names) or tuple(map(str, model.outputs))
     found = {}
     for k, record in enumerate(records):
-        tick = subprogress(progress, k / len(records), (k + 1) / len(records))
+        tick = nth_subprogress(progress, k, len(records))
         found[record.name] = record_peaks(
             model, inputs, record, names, step=step, alpha=alpha, progress=tick
         )
@@ -347,6 +350,7 @@ def summarised(
     farthest: dict[str, str] = {}
     statistics: dict[str, dict[str, Array]] = {}
     for name, peak in largest.items():
+        # No record is known to move a structure of the enclosed set farthest.
         if not encloses:
             reached = {record: found[name].outwards.reached[0] for record, found in peaks.items()}
             farthest[name] = max(reached, key=reached.__getitem__)
@@ -444,6 +448,7 @@ def mean_peaks(
         # contains all higher ones.
         mean_of_smallest = np.maximum(mean.lower - mean.error, mean.least_lower)
         of_higher_cuts = np.maximum.accumulate(mean_of_smallest[::-1])[::-1]
+        # The largest mean of the structures tried that belong to each cut.
         in_cuts = np.where(is_in_cut, means, -np.inf)
         reached = np.maximum(of_higher_cuts, in_cuts.max(axis=1))
         farthest = tried[in_cuts[0].argmax()].tolist()

@@ -239,6 +239,7 @@ def tolerances(
             )
             tried[scale] = peaks(band)
             if progress:
+                # Each bisection takes about log2(1/precision) steps.
                 progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
@@ -253,6 +254,7 @@ def tolerances(
         return any(found[x].max_peak_bounds.lower[0] > y for x, y in largest_allowed.items())
 
     # The largest scale at which exceeding a limit is excluded, from the largest one that is known.
+    # Supports are nested, so that exceedance is excluded at all smaller scales as well.
     width = precision * most
     kept = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
     if kept < most and is_excluded(kept):
@@ -260,6 +262,7 @@ def tolerances(
         kept = _bisected(is_excluded, kept, not_excluded, width)
 
     # The largest scale at which no known response exceeds a limit, and the next one that was tried.
+    # Of inputs that enclose a set, no response is known to belong to the set.
     encloses = enclosed_set(inputs.values())
     clear = None
     passed = np.inf
@@ -304,6 +307,7 @@ def _bisected(holds: Callable[[float], bool], lower: float, upper: float, width:
         upper: Upper end of the interval.
         width: Width of the interval at which the bisection ends.
     """
+    # The condition holds at `lower` and does not hold at `upper` throughout.
     while upper - lower > width:
         middle = (lower + upper) / 2
         if holds(middle):

@@ -18,7 +18,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import checked_number
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress, nth_subprogress, subprogress
 from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
@@ -170,8 +170,7 @@ class DualProof:
             problem.upper[:] = upper[nodes, o, s]
             problems[o, s] = problem
 
-        n_levels = len(goal.needed)
-        tick = subprogress(goal.tick, k / n_levels, (k + 1) / n_levels)
+        tick = nth_subprogress(goal.tick, k, len(goal.needed))
         with KernelThreads(goal.workers, self.call_kernels) as pool:
             # 1. Find multipliers with low bounds, and inputs with large values of the models.
             if is_complete:

@@ -173,18 +173,15 @@ class GraphFollower:
         by which an independent sample exceeds the bounds. If neighbouring trajectories diverge
         there is no estimate, and the bounds are attained only.
         """
-        n_levels = len(flow.boxes.alpha)
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis])
-        shape = (n_levels, *storage.top.shape)
+        shape = (len(flow.boxes.alpha), *storage.top.shape)
         bounds = np.zeros(shape)
         predicted_gain = np.zeros(shape)
         best = np.full(shape, -1)
         limit = self.tolerance * flow.scale[:, np.newaxis]  # gain worth a graph, (outputs, 1)
         bend = float(self.order > 1)
-        follow_progress = subprogress(progress, 0.0, 0.8)
-        for done, level in enumerate(reversed(range(n_levels))):
-            tick = subprogress(follow_progress, done / n_levels, (done + 1) / n_levels)
+        for level, tick in flow.boxes.inside_out(subprogress(progress, 0.0, 0.8)):
             box = flow.boxes.unit_ends(level)
             maxima = storage.predicted(storage.all_places, box, local_maximum, bend=bend)
             predicted = maxima.value.reshape(storage.top.shape)

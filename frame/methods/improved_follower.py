@@ -129,12 +129,11 @@ class ImprovedFollower:
         chunk_size = _chunk_size(flow)
         nominal = flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis]
         has_crossings = d > MAX_GLOBAL_INPUTS and isinstance(flow.flow, LinearFlow)
-        for done, level in enumerate(reversed(range(n_levels))):
+        for level, tick in flow.boxes.inside_out(progress):
             # Points of the quasi-random sequence that no other level and no other seed uses.
             box = flow.boxes.unit_ends(level)
             skip = 100_003 * (n_levels * self.seed + level + 1)
-            tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
-            max_graphs = self.budget * (done + 1) // n_levels
+            max_graphs = self.budget * (n_levels - level) // n_levels
             first = len(storage)
             has_width = bool((box[1] > box[0]).any())
             explored = points = nominal
@@ -147,7 +146,7 @@ class ImprovedFollower:
             elif len(storage):
                 points = nominal[:0]  # the only point of the box has a graph
             models = _LevelModels(storage, box, self._limit(flow), asked[level])
-            if done:  # a wider box contains what a narrower one attains
+            if level + 1 < n_levels:  # a wider box contains what a narrower one attains
                 models.sampled[:] = out.bounds[level + 1]
                 models.sampled_at[:] = out.points[level + 1]
             models.explore(explored)

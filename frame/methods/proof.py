@@ -24,7 +24,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optima
@@ -261,7 +261,7 @@ def bound_levels(
     all_optima: list[Optima] = []  # from the narrowest level on, as the two following lists
     all_proved: list[Array] = []
     n_boxes: list[int] = []
-    for done, level in enumerate(reversed(range(n_levels))):
+    for level, tick in model.boxes.inside_out(progress):
         lower, upper = model.boxes.unit_ends(level)
         optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
         if all_optima:  # a wider box contains what the narrower one attains
@@ -277,7 +277,7 @@ def bound_levels(
             gap=search_gap,
             budget=budget,
             workers=workers,
-            progress=subprogress(progress, done / n_levels, (done + 1) / n_levels),
+            progress=tick,
         )
         LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], count)
         all_optima.append(optima)

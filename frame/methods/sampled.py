@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import checked_number
-from alphacut.base.progress_bar import Progress, subprogress
+from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.envelope import Envelope
@@ -62,12 +62,11 @@ class Sampled:
         shape = (n_levels, len(flow.time), len(flow.outputs), 2)
         bounds = np.full(shape, -np.inf)
         at = np.zeros((*shape, len(flow.boxes.names)))
-        for done, level in enumerate(reversed(range(n_levels))):
-            if done:  # a wider box contains the trajectories of the narrower one
+        for level, tick in flow.boxes.inside_out(progress):
+            if level + 1 < n_levels:  # a wider box contains the trajectories of the narrower one
                 bounds[level] = bounds[level + 1]
                 at[level] = at[level + 1]
             points = self.points(*flow.boxes.unit_ends(level))
-            tick = subprogress(progress, done / n_levels, (done + 1) / n_levels)
             values, index = largest_values(flow, points, tick)
             better = values > bounds[level]
             bounds[level][better] = values[better]
