@@ -42,6 +42,12 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     found = [_column(header.cells, name, path) for name in columns]
     values = np.empty((len(rows), len(columns)))
     for k, line in enumerate(rows):
+        n_cells = len(line.cells)
+        if n_cells > len(header.cells) and all(line.cells):
+            what = f"{n_cells} fields below a header of {len(header.cells)}"
+            cure = "write decimal points, if these are decimal commas"
+            key = f"{path.name}, row {line.row}"
+            raise RefusedError(key, what, "as many fields as the header has", cure)
         numbers = [number(path, line.row, line.cells, column) for column, _ in found]
         values[k] = np.multiply(numbers, [factor for _, factor in found])
     return np.array([line.row for line in rows]), values
@@ -103,7 +109,13 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
     text = cells[column].strip() if column < len(cells) else ""
     if len(text) > 100 or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
-        raise RefusedError(f"{path.name}, row {row}, column {column + 1}", repr(text[:40]), allowed)
+        cure = ""
+        if re.search(r"\d[;,\t]\d", text):
+            cure = (
+                "separate fields by the same mark as those of the header, and write decimal points"
+            )
+        key = f"{path.name}, row {row}, column {column + 1}"
+        raise RefusedError(key, repr(text[:40]), allowed, cure)
     return float(text)
 
 
