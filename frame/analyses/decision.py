@@ -140,8 +140,8 @@ class Decision(Answer):
                 bound_text = f"{relation} {bound_text}"
             attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
             # A gap of a bound of zero has no meaning as a fraction.
-        if bound and np.isfinite(bound) and np.isfinite(attained):
-            gap = f"{abs((bound - attained) / bound):.1%}"
+            if bound and np.isfinite(bound) and np.isfinite(attained):
+                gap = f"{abs((bound - attained) / bound):.1%}"
         return {
             "limit": part.words,
             "verdict": part.verdict_and_motion,
