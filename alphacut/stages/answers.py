@@ -47,11 +47,14 @@ class Times(TypedDict):
 
 @dataclass(frozen=True)
 class Response:
-    """What questions are asked about: a structure, its motion of section [envelope], and peaks.
+    """What questions are asked about.
 
-    `peaks` are those of the outputs, None where no question reads them. `suite` has the peaks under
-    each record, if there is a suite, and `increments` those over its scales, of a frame that
-    yields.
+    Args:
+        structure: The structure.
+        task: Its response of section [envelope].
+        peaks: Peaks of the outputs; None where no question reads them.
+        suite: Peaks under each record, if there is a suite.
+        increments: Peaks over the scales of each record by its name, of a frame that yields.
     """
 
     structure: Structure
@@ -72,7 +75,7 @@ class Response:
 
 
 def decision(section: DecisionSection, response: Response, _: Progress) -> Decision:
-    """The answer to [decision]."""
+    """Return the answer to [decision]."""
     structure, found = response.structure, response.suite or response.peaks
     assert found is not None
     limits = section.limits_of(structure)
@@ -85,7 +88,7 @@ def decision(section: DecisionSection, response: Response, _: Progress) -> Decis
 
 
 def probability_of(section: ProbabilitySection, response: Response, tick: Progress) -> Probability:
-    """The answer to [probability]."""
+    """Return the answer to [probability]."""
     structure = response.structure
     random = structure.inputs(section.random, "probability.random")
     return probability(
@@ -101,7 +104,7 @@ def probability_of(section: ProbabilitySection, response: Response, tick: Progre
 
 
 def tolerances_of(section: TolerancesSection, response: Response, tick: Progress) -> Tolerances:
-    """The answer to [tolerances]."""
+    """Return the answer to [tolerances]."""
     is_known = response.task.section.alpha[0] == 0
     return tolerances(
         response.structure.model,
@@ -115,7 +118,7 @@ def tolerances_of(section: TolerancesSection, response: Response, tick: Progress
 
 
 def fragility_answer(section: FragilitySection, response: Response, _: Progress) -> Fragility:
-    """The answer to [fragility]."""
+    """Return the answer to [fragility]; refuse a question without records."""
     linear = response.structure.linear
     if response.suite is None or linear is None:
         raise RefusedError("fragility", "without records", "a section [records]")
@@ -140,7 +143,7 @@ ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
 
 
 def stage(kind: type[Answer], section: QuestionSection, response: Response) -> Stage[Answer]:
-    """The stage of the answer of a kind to the question of a section."""
+    """Return the stage of the answer of a kind to the question of a section."""
     compute, inputs = partial(_computed, kind, section, response), [section, response]
     return Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
 
@@ -152,7 +155,7 @@ def _computed(
 
 
 def require_tolerances(section: TolerancesSection, response: Response) -> None:
-    """Refuses a largest scale of the supports at which an input is inadmissible."""
+    """Refuse a largest scale of the supports at which an input is inadmissible."""
     try:
         require_admissible_scale(response.structure.model, response.inputs, section.most)
     except RefusedError as error:

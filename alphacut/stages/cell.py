@@ -93,8 +93,12 @@ class CellProblem:
         """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
         numbers = self.numbers
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-        names = ("inclusion_modulus", "matrix_modulus", *numbers)
-        return fuzzy or next(({x: numbers[x]} for x in names if x in numbers), {})
+        if fuzzy:
+            return fuzzy
+        for name in ("inclusion_modulus", "matrix_modulus", *numbers):
+            if name in numbers:
+                return {name: numbers[name]}
+        return {}
 
     @property
     def nominal_radius(self) -> RadiusMap | ThetaDistribution:
@@ -129,40 +133,43 @@ class CellProblem:
     def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
         """Return the model that the sections name.
 
-        With `estimate` it declares errors, if need be by a reference solution; `parallel` says
-        whether all MPI ranks work on one cell together.
+        Args:
+            estimate: Whether it declares errors, if need be by a reference solution.
+            parallel: Whether all MPI ranks work on one cell together.
 
         Raises:
             RefusedError: The model needs DOLFINx, which is not installed.
         """
         try:
-            if isinstance(self.cell, MeshedCell):
-                from alphacut.rve.prism.own_mesh import MeshModel
+            if isinstance(self.cell, RoundCell):
+                return self._round_model(self.cell, estimate=estimate, parallel=parallel)
+            from alphacut.rve.prism.own_mesh import MeshModel
 
-                assert self.mesh.file is not None
-                options: Any = {"petsc": self.petsc, "parallel": parallel}
-                return MeshModel(self.mesh.file, refine=self.mesh.refine, **options)
-            fitting = fitting_models(
-                self.cell.particle_kind, is_isotropic=self.cell.stiffness is None
-            )
-            name = self.modulus.method
-            entry = next(iter(fitting.values())) if name == "auto" else fitting[name]
-            return entry.load().with_resolution(
-                Resolution(
-                    tolerance=self.modulus.tolerance,
-                    mesh_size=self.mesh.size,
-                    layers=self.mesh.layers,
-                    outline=self.cell.outline or circle,
-                    whole_stiffness=self.average != AXES,
-                    energies=bool(self.cell.losses),
-                    petsc=self.petsc,
-                    parallel=parallel,
-                    estimate=estimate,
-                )
-            )
+            assert self.mesh.file is not None
+            options: Any = {"petsc": self.petsc, "parallel": parallel}
+            return MeshModel(self.mesh.file, refine=self.mesh.refine, **options)
         except ImportError as error:
             value, cure = self.modulus.method, missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None
+
+    def _round_model(self, cell: RoundCell, *, estimate: bool, parallel: bool) -> AnyModel:
+        """Return the model of a cell with one particle; raise ImportError as `ModelEntry.load`."""
+        fitting = fitting_models(cell.particle_kind, is_isotropic=cell.stiffness is None)
+        name = self.modulus.method
+        if name == "auto":
+            name = next(iter(fitting))
+        resolution = Resolution(
+            tolerance=self.modulus.tolerance,
+            mesh_size=self.mesh.size,
+            layers=self.mesh.layers,
+            outline=cell.outline or circle,
+            whole_stiffness=self.average != AXES,
+            energies=bool(cell.losses),
+            petsc=self.petsc,
+            parallel=parallel,
+            estimate=estimate,
+        )
+        return fitting[name].load().with_resolution(resolution)
 
     def solve(self, **options: bool) -> HomogenisedStiffness:
         """Return the homogenised stiffness at the nominal values; `options` as of `model`."""
@@ -175,27 +182,27 @@ class CellProblem:
         return result if self.average is None else result.with_average(self.average)
 
     def references(self) -> References:
-        """Particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
+        """Return the particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
 
         The bounds are at the stated fraction, else at the mean fraction of the radius map. Of
         anisotropic phases there is `fraction` alone; nothing of a mesh from a file.
         """
         if isinstance(self.cell, MeshedCell):
             return {}
-        radius, stated = self.nominal.radius_map, self.stated_fraction
-        rule = gauss_rule(radius.distribution, points=NODES)
+        radius_map = self.nominal.radius_map
+        rule = gauss_rule(radius_map.distribution, points=NODES)
         is_space = self.cell.particles == "spheres"
         if is_space:
-            fractions = self.cell.shape.fractions(radius(rule.nodes))
+            fractions = self.cell.shape.fractions(radius_map(rule.nodes))
         else:
             fractions = self.nominal.fraction(rule.nodes)
-        found: References = {"fraction": float(rule.mean(fractions))}
-        phases = [x for x in self.cell.nominal_phases if isinstance(x, Phase)]
+        fraction = float(rule.mean(fractions))
+        found: References = {"fraction": fraction}
+        phases = [phase for phase in self.cell.nominal_phases if isinstance(phase, Phase)]
         if len(phases) < 2:
             return found
-        fraction = found["fraction"]
-        if stated is not None:
-            fraction = found["fraction_of_case"] = stated
+        if self.stated_fraction is not None:
+            fraction = found["fraction_of_case"] = self.stated_fraction
         bounds = reference_bounds(phases, fractions=[1 - fraction, fraction], space=is_space)
         lower, upper = bounds.young
         found["hashin_shtrikman_E_GPa"] = lower / GPA, upper / GPA
@@ -225,19 +232,23 @@ class CellProblem:
 
 
 def key_and_unit(name: str) -> tuple[str, float]:
-    """Key of an elastic constant in results, and its unit in SI: E_x_GPa and 1e9, nu_xy and 1."""
+    """Return the key of an elastic constant in results, and its unit in SI.
+
+    They are E_x_GPa and 1e9 of E_x, nu_xy and 1 of nu_xy.
+    """
     return (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
 
 
 def constant_label(key: str) -> str:
-    """Label of a constant: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
+    """Return the label of a constant: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
     return key.replace("nu", "ν").replace("_GPa", ", GPa")
 
 
 def isotropic_label(average: str) -> str:
-    """Label of the Hashin–Shtrikman bounds beside E of an average, in words."""
-    is_other = average == AVERAGES[AXES]
-    return f"{ISOTROPIC}, which that of {average} is not" if is_other else ISOTROPIC
+    """Return the label of the Hashin–Shtrikman bounds beside E of an average, in words."""
+    if average == AVERAGES[AXES]:
+        return f"{ISOTROPIC}, which that of {average} is not"
+    return ISOTROPIC
 
 
 def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:
@@ -245,7 +256,15 @@ def require_bounds(young: tuple[float, float], references: References, particles
 
     E is outside by more than `BOUNDS_SLACK` where the radius map holds another fraction, since
     cells denser than any cube are cut off, or because the mean over cells with different spheres
-    need not obey the bounds. `young` has the bounds of E at the nominal inputs, in GPa.
+    need not obey the bounds.
+
+    Args:
+        young: Lower and upper bound of E at the nominal inputs, in GPa.
+        references: The bounds.
+        particles: Particles as the case has them.
+
+    Raises:
+        RefusedError: E is outside.
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return

@@ -213,7 +213,7 @@ def tasks(
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
-    """The stage of one study."""
+    """Return the stage of one study."""
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
     inputs += [task.limited]
     compute = partial(task.compute, structure)

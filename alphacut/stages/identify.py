@@ -15,7 +15,7 @@ from alphacut.frame.identify.identify import Evidence
 def identify_inputs(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[LearnedInputs, Structure]:
-    """What measured modes teach about the inputs, and the structure with the learned inputs.
+    """Return what measured modes teach about the inputs, and the structure with the learned ones.
 
     Where the measurement refutes the frame, the answer says so and the structure is as before.
     """
@@ -27,12 +27,12 @@ def identify_inputs(
 
 
 def require_learnable(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> None:
-    """Refuses what `identify_inputs` refuses."""
+    """Refuse what `identify_inputs` refuses."""
     Evidence.of(**_arguments(section, structure, alpha))
 
 
 def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> dict[str, Any]:
-    """Arguments of `identify` for a section; RefusedError where it makes none."""
+    """Return the arguments of `identify` for a section; refuse one that makes none."""
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     try:
         modes = read_modes(

@@ -34,13 +34,27 @@ SPACE = "along the axes"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ImageResult:
-    """Proved bounds of an image or volume, moduli in GPa.
+    """Guaranteed bounds of an image or volume, moduli in GPa.
 
-    On the highest level `lower_GPa` and `upper_GPa` bound the stiffness in the sense of Loewner,
-    (3, 3) of the plane or (6, 6) of space, `nu` and `shear_GPa` those of its average. As α-cuts
-    `plane` has the constants along the axes by definition and name, `proved_losses` loss factors
-    at nominal moduli to first order; `widths_GPa` has the widths of E by cause. Bounds that pores
-    or rigid phases leave unknown are null.
+    Bounds that pores or rigid phases leave unknown are null in files.
+
+    Args:
+        alpha: Levels, shape (A,).
+        E_GPa: α-cuts of Young's modulus of an average of the stiffness.
+        lower_GPa: Lower bound of the stiffness on the highest level, in the sense of Loewner, shape
+            (3, 3) of the plane or (6, 6) of space.
+        upper_GPa: Upper bound, likewise.
+        nu: Bounds of Poisson's ratio of the average on the highest level, by side.
+        shear_GPa: Bounds of its shear modulus.
+        average: Name of the average.
+        plane: α-cuts of the constants along the axes, by definition and name.
+        nature: Guarantee of all bounds.
+        seconds: Time that they took.
+        widths_GPa: Width of E at the lowest level by cause.
+        fractions: Fractions of the phases by name.
+        division: Number of elements along a side of a pixel or voxel.
+        references: Hashin–Shtrikman bounds.
+        proved_losses: α-cuts of the loss factors at nominal moduli, to first order.
     """
 
     alpha: Array
@@ -63,7 +77,7 @@ class ImageResult:
 def stage(
     cell: ImageCell, alpha: tuple[float, ...], average: str, device: str
 ) -> Stage[ImageResult]:
-    """The stage of an image, on some levels; E and ν are of an average of its stiffness."""
+    """Return the stage of an image on some levels; E and ν are of an average of its stiffness."""
     digests = [file_digest(file) for file in files_of(cell.image)]
     inputs = [cell, alpha, average, digests]  # bounds are the same on every device
     compute = partial(compute_cuts, cell, alpha, average, device)
@@ -71,17 +85,24 @@ def stage(
 
 
 def study_of(cell: ImageCell) -> ImageStudy:
-    """The study of the image that a case names; RefusedError where phases do not fit it."""
+    """Return the study of the image that a case names.
+
+    Raises:
+        RefusedError: The image is not read, or the phases do not fit it.
+    """
     image = GreyImage(read_grid(cell.image, cell.sides), cell.lengths)
     losses = cell.losses or (None,) * len(cell.pairs)
-    phases = [ImagePhase(*pair, loss) for pair, loss in zip(cell.pairs, losses, strict=True)]
+    phases = [
+        ImagePhase(young, poisson, loss)
+        for (young, poisson), loss in zip(cell.pairs, losses, strict=True)
+    ]
     return image_study(image, phases, thresholds=cell.threshold or (), labels=cell.labels or ())
 
 
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, device: str, context: StageContext
 ) -> StageResult[ImageResult]:
-    """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E."""
+    """Compute α-cuts of E and of the stiffness of an image, and how its sources widen E."""
     found = solve_study(
         study_of(cell), alpha=alpha, average=average, device=device, tick=context.tick
     )
@@ -89,7 +110,7 @@ def compute_cuts(
 
 
 def image_result(found: FuzzyImageStiffness) -> ImageResult:
-    """The numbers of a fuzzy stiffness in the units of results."""
+    """Return the numbers of a fuzzy stiffness in the units of results."""
     top, is_space = found.cuts[-1], len(found.lengths) == 3
     along_axes = in_units_of_results(found.constants)
     references = References()

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from alphacut.base.kept_files import file_digest, write_text
+from alphacut.base.progress_bar import subprogress
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.io.files import Document
 from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic import FittedRadiusMap, fit_radius_map
 
 PACKED = 0.35
-"""Part of the work that packing takes, for the progress."""
+"""Fraction of the work that packing takes, for the progress; measured on cases/concrete.toml."""
 
 
 Draw = Callable[[FittedRadiusMap, Path, MicrostructureSection], None]
@@ -25,54 +27,64 @@ Draw = Callable[[FittedRadiusMap, Path, MicrostructureSection], None]
 def stage(
     section: MicrostructureSection, *, spheres: bool, draw: Draw | None = None
 ) -> Stage[Document]:
-    """The stage that computes the fuzzy radius map of particles, whatever the number of workers.
+    """Return the stage that computes the fuzzy radius map of particles.
 
     If there is a folder, it gets radius.toml, a section of a case, figures if there is what draws
     them, and circles.csv of an image.
     """
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
-
-    def compute(context: StageContext) -> StageResult[Document]:
-        particles = section.particles(
-            spheres=spheres,
-            workers=context.workers,
-            progress=lambda done: context.tick(PACKED * done),
-        )
-        fitted = fit_radius_map(
-            particles,
-            limits=section.limits,
-            seed=section.seed,
-            workers=context.workers,
-            progress=lambda done: context.tick(PACKED + (1 - PACKED) * done),
-        )
-        numbers, folder = fitted.numbers(), context.folder
-        if folder is not None:
-            write_text(folder / "radius.toml", fragment(numbers))
-            if draw is not None:
-                draw(fitted, folder / "figures", section)
-            if section.image is not None:
-                rows = np.column_stack([particles[0].centres, particles[0].radii])
-                columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
-                np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)
-        return StageResult(numbers, fitted.to_dataset())
-
+    compute = partial(_computed, section, spheres, draw)
     return Stage("microstructure", inputs, ("stochastic",), Document, compute)
 
 
+def _computed(
+    section: MicrostructureSection, spheres: bool, draw: Draw | None, context: StageContext
+) -> StageResult[Document]:
+    particles = section.particles(
+        spheres=spheres,
+        workers=context.workers,
+        progress=subprogress(context.tick, 0.0, PACKED),
+    )
+    fitted = fit_radius_map(
+        particles,
+        limits=section.limits,
+        seed=section.seed,
+        workers=context.workers,
+        progress=subprogress(context.tick, PACKED, 1.0),
+    )
+    numbers, folder = fitted.numbers(), context.folder
+    if folder is not None:
+        write_text(folder / "radius.toml", fragment(numbers))
+        if draw is not None:
+            draw(fitted, folder / "figures", section)
+        if section.image is not None:
+            rows = np.column_stack([particles[0].centres, particles[0].radii])
+            columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
+            np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)
+    return StageResult(numbers, fitted.to_dataset())
+
+
 def fragment(numbers: Mapping[str, Any]) -> str:
-    """The case section [radius] as TOML text, with fractions as comments, from a `summary`."""
+    """Return the section [radius] of a case as TOML text, with fractions as comments.
+
+    Args:
+        numbers: Of `FittedRadiusMap.numbers`.
+    """
     measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
-    stated, map_fraction = numbers["fraction_of_case"], numbers[f"mean_{measure}_fraction_of_map"]
+    map_fraction = numbers[f"mean_{measure}_fraction_of_map"]
     words = f"; of the particles: {numbers[f'{measure}_fraction']:.4f}"
-    words += "" if stated is None else f"; of the case: {stated:g}"
+    if numbers["fraction_of_case"] is not None:
+        words += f"; of the case: {numbers['fraction_of_case']:g}"
     lines = [
         f"[radius]  # from {numbers['cells']} cells; the limits keep"
         f" {numbers['share_kept']:.4%} of their {measure}",
         f"# {measure} fraction of this map at its nominal values: {map_fraction:.4f}{words}",
     ]
     for name, value in numbers["radius"].items():
-        is_fuzzy = isinstance(value, list)
-        ends = ", ".join(f"{x:.10g}" for x in (value if is_fuzzy else [value]))
-        lines.append(f"{name} = [{ends}]" if is_fuzzy else f"{name} = {ends}")
+        if isinstance(value, list):
+            corners = ", ".join(f"{corner:.10g}" for corner in value)
+            lines.append(f"{name} = [{corners}]")
+        else:
+            lines.append(f"{name} = {value:.10g}")
     return "\n".join(lines) + "\n"

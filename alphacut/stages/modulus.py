@@ -43,11 +43,27 @@ PLANS: dict[str, Plan] = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModulusResult:
-    """α-cuts of a cell, moduli in GPa; nature and relative errors of E, references and cost.
+    """α-cuts of the constants of a cell, moduli in GPa.
 
-    `fibres` has the constants of cylinders by name, as E_T_GPa; `plane` those along x and y by
-    definition and name. `solver` says how finite elements are assembled and solved, "" without
-    them. Errors by source and checks are the largest of all samples.
+    Args:
+        alpha: Levels, shape (A,).
+        E_GPa: α-cuts of Young's modulus.
+        nu_cuts: α-cuts of Poisson's ratio.
+        fibres: Constants across and along cylinders by name, as E_T_GPa.
+        plane: Constants along x and y by definition and name.
+        method: Model as the case names it.
+        solver: How finite elements are assembled and solved; empty without them.
+        plan: Plan of the samples.
+        samples: Number of samples.
+        solves: Number of linear systems.
+        seconds: Time that they took.
+        nature: Guarantee of the bounds of E.
+        particles: Particles as the case has them.
+        average: Average of the stiffness that gives E and ν.
+        error: Relative error of E by source, the largest of all samples.
+        checks: Largest violation of each property that right results have.
+        references: Particle fraction and Hashin–Shtrikman bounds.
+        loss: α-cuts of the loss factors, if phases have some.
     """
 
     alpha: Array
@@ -90,7 +106,7 @@ def infinite_if_unknown(cuts: Ends) -> Ends:
 
 
 def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusResult:
-    """The numbers of a fuzzy stiffness in the units of results."""
+    """Return the numbers of a fuzzy stiffness in the units of results."""
     bounds = stiffness.bounds
     known = {name: stiffness.cuts(name) for name in stiffness.constants}
     plane: dict[str, dict[str, Ends]] = {}
@@ -128,7 +144,7 @@ def solved(
     alpha: Sequence[float] | None = None,
     **campaign: Unpack[CampaignOptions],
 ) -> FuzzyStiffness:
-    """The fuzzy stiffness of a cell; `campaign` are further arguments of `fuzzy_stiffness`."""
+    """Return the fuzzy stiffness of a cell; `campaign` goes to `fuzzy_stiffness`."""
     losses = dict(zip(problem.cell.loss_names, problem.cell.losses, strict=True))
     return fuzzy_stiffness(
         problem.model(),
@@ -143,7 +159,7 @@ def solved(
 
 
 def identity(problem: CellProblem) -> Document:
-    """All but the fuzzy inputs that the outputs of a sample depend on: the key of its store."""
+    """Return all but the fuzzy inputs that a sample depends on, which is the key of its store."""
     cell, modulus = problem.cell, problem.modulus
     return {
         "modulus": modulus.model_dump(exclude={"plan", "alpha"}),
@@ -161,7 +177,7 @@ def identity(problem: CellProblem) -> Document:
 
 
 def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusResult]:
-    """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
+    """Compute all samples and the α-cuts; stored samples of an interrupted run are taken."""
     stiffness = solved(
         problem,
         workers=context.workers,
@@ -173,7 +189,7 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
 
 
 def stage(problem: CellProblem) -> Stage[ModulusResult]:
-    """The stage that computes the α-cuts of a cell by samples."""
+    """Return the stage that computes the α-cuts of a cell by samples."""
     plan, alpha = problem.modulus.plan, problem.modulus.alpha
     inputs = [identity(problem), problem.inputs, problem.stated_fraction, plan, alpha]
     packages, run = ("stochastic", "rve", "fuzzy"), partial(compute, problem)
@@ -181,18 +197,22 @@ def stage(problem: CellProblem) -> Stage[ModulusResult]:
 
 
 def require_levels(alpha: tuple[float, ...], key: str) -> None:
-    """Refuses levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
+    """Refuse levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
     complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
     require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
 
 def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
-    """The fuzzy loss factor of E; None where the phases have none."""
+    """Return the fuzzy loss factor of E; None where the phases have none."""
     return _number(data, "loss_E") if "loss_E" in data else None
 
 
 def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:
-    """The fuzzy Young's modulus in Pa that α-cuts with levels from 0 to 1 make."""
+    """Return the fuzzy Young's modulus in Pa that α-cuts with levels from 0 to 1 make.
+
+    Raises:
+        RefusedError: It is not positive, or the levels are others.
+    """
     minimum = float(data["E"].min())
     require(minimum > 0, "modulus", value=f"{minimum / GPA:.3g} GPa", allowed="a modulus above 0")
     require_levels(tuple(map(float, data["alpha"].values)), "modulus.alpha")

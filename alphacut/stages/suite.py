@@ -29,7 +29,11 @@ from alphacut.stages.store import Stage, StageContext, StageResult
 def suite_records(
     section: RecordsSection, envelope: EnvelopeSection, structure: Structure
 ) -> tuple[ScaledRecord, ...]:
-    """The records of a suite as they move the structure, in the order of the case."""
+    """Return the records of a suite as they move the structure, in the order of the case.
+
+    Raises:
+        RefusedError: The structure is not linear, or a record lasts no whole number of steps.
+    """
     records = scaled_records(
         structure.model,
         [recording.accelerogram(section.baseline) for recording in section.recordings],
@@ -44,22 +48,22 @@ def suite_records(
 
 
 def linear_model(structure: Structure) -> LinearSystem:
-    """The model of a structure that records may move; scaled records are refused of others."""
+    """Return the model of a structure that records move, since `suite_records` refuses others."""
     assert structure.linear is not None
     return structure.linear
 
 
 def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
-    """The structure moved by a record."""
+    """Return the structure moved by a record in place of its own."""
     return replace(structure, model=linear_model(structure).moved_by(record.ground))
 
 
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
-    """The stage that computes the peaks of a structure under a record."""
+    """Return the stage that computes the peaks of a structure under a record."""
     inputs = [structure.model, structure.numbers, record, task]
-    compute, work = partial(_peaks, structure, task, record), record.duration
-    name, packages = f"record_{record.name}", ("fuzzy", "frame")
-    return Stage(name, inputs, packages, dict[str, Peak], compute, work=work)
+    compute, packages = partial(_peaks, structure, task, record), ("fuzzy", "frame")
+    name = f"record_{record.name}"
+    return Stage(name, inputs, packages, dict[str, Peak], compute, work=record.duration)
 
 
 def _peaks(
@@ -83,7 +87,7 @@ def suite_peaks(
     records: Sequence[ScaledRecord],
     peaks: Mapping[str, Mapping[str, Peak]],
 ) -> SuitePeaks:
-    """Worst, mean and statistics over the records, from the peaks under each by its name."""
+    """Return worst, mean and statistics over the records, from the peaks under each by its name."""
     return summarised(
         linear_model(structure),
         structure.inputs(task.fuzzy),
@@ -100,7 +104,7 @@ def analyses_of(
     task: EnvelopeTask,
     records: Sequence[ScaledRecord],
 ) -> dict[str, IncrementalAnalysis]:
-    """Analyses of a frame that yields by the record's name, over the measure of the section."""
+    """Return analyses of a frame that yields, over the intensity measure, by the record's name."""
     frame = structure.model
     assert yields(frame)
     return incremental_analyses(
@@ -118,12 +122,19 @@ def analyses_of(
 def incremental_stage(
     section: FragilitySection, structure: Structure, name: str, analysis: IncrementalAnalysis
 ) -> Stage[Increments]:
-    """The stage that moves a frame that yields at scales of the record of a name."""
+    """Return the stage that moves a frame that yields by a record at several scales.
+
+    Args:
+        section: The question.
+        structure: The structure.
+        name: Name of the record.
+        analysis: Its analysis, of `analyses_of`.
+    """
     limits = limits_by_name(section.limits_of(structure), ())
 
     def compute(context: StageContext) -> StageResult[Increments]:
         return StageResult(increments_of(analysis, limits, context.tick))
 
-    inputs, work = [analysis, list(limits.values())], analysis.duration
-    packages = ("fuzzy", "frame")
+    inputs, packages = [analysis, list(limits.values())], ("fuzzy", "frame")
+    work = analysis.duration
     return Stage(f"incremental_{name}", inputs, packages, Increments, compute, work=work)

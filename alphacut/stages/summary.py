@@ -144,7 +144,7 @@ class Parts:
 
     @classmethod
     def of(cls, results: Results, **further: object) -> Self:
-        """The numbers of results, and further fields of this class."""
+        """Return the numbers of results, with further fields of this class."""
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
         parts: dict[str, Any] = {
             **{name: x.numbers for name, x in results.single.items()},
@@ -160,7 +160,7 @@ class Parts:
         return cls(**{**parts, **results.answers, **further})
 
     def parts(self) -> Document:
-        """All parts by name but those that the run lacks, as a JSON document."""
+        """Return all parts by name but those that the run lacks, as a JSON document."""
         values = {x.name: getattr(self, x.name) for x in fields(self)}
         is_there = {name: value is not None and value != {} for name, value in values.items()}
         return {name: to_document(x) for name, x in values.items() if is_there[name]}
@@ -238,12 +238,12 @@ class Summary(Parts):
     fingerprints: dict[PlainName, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
-        """The summary as a JSON object."""
+        """Return the summary as a JSON object."""
         return as_json(self.parts(), indent=2)
 
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
-        """The summary in a folder of results; RefusedError where it is missing or damaged."""
+        """Return the summary in a folder of results; refuse one that is missing or damaged."""
         content = folder.content(SUMMARY)
         try:
             return from_document(cls, json.loads(content))
@@ -253,7 +253,7 @@ class Summary(Parts):
             raise RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN) from None
 
     def require_run_of(self, folder: ResultsFolder) -> None:
-        """Refuses a folder with files of another run than that of this summary."""
+        """Refuse a folder with files of another run than that of this summary."""
         changed = [
             name
             for name, source in self.fingerprints.items()
