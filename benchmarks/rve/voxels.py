@@ -60,7 +60,7 @@ def solve(
                                                      (matrix.shear, particle.shear)))  # fmt: skip
     model = ImageModel((1.0, 1.0, 1.0), division, ConjugateGradient(accuracy), device=device)
     start, used = perf_counter(), process_time()
-    bounds = model.solve(ModuliImages((bulk, bulk), (shear, shear))).bounds
+    bounds = model.solve(ModuliImages.crisp(bulk, shear)).bounds
     return bounds, perf_counter() - start, process_time() - used
 
 

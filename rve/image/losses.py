@@ -81,8 +81,7 @@ def _lower_bounds_with(
 ) -> dict[str, float]:
     """Return lower bounds of the constants with the moduli of one phase times a factor."""
     factors = np.where(phase == changed_phase, factor, 1.0)
-    moduli = factors * images.bulk[0], factors * images.shear[0]
-    stresses = model.solve_side(0, *moduli, solution.lower)
+    stresses = model.solve_side(factors * images.lower, stress=True, start=solution.lower)
     assert stresses is not None  # None beside pores alone
     stiffness = inverse_below(stresses.energy.upper)
     bounds = concave_constants(StiffnessBounds(stiffness, stiffness), model.average)

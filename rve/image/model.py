@@ -16,7 +16,7 @@ from alphacut.base.progress_bar import Progress
 from alphacut.base.threads import KernelThreads
 from alphacut.rve.image.bounds import Enclosure, StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import Element, element_of
+from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import SideSolution, solve_side
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
@@ -79,11 +79,6 @@ class ImageModel:
                 allowed=f"{1 / max_ratio:g} to {max_ratio:g}",
             )
 
-    @property
-    def elements(self) -> tuple[Element, Element]:
-        """Elements of stresses and of displacements."""
-        return element_of(self.sides, stress=True), element_of(self.sides, stress=False)
-
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
         """Return proved bounds of the stiffness of all images with moduli in given intervals.
 
@@ -102,9 +97,9 @@ class ImageModel:
                 missing.
             FailedError: The solver does not converge.
         """
-        shape = images.bulk[0].shape
-        what = f"{len(self.sides)} for a grid of shape {shape}"
-        require(len(shape) == len(self.sides), "sides", what, "one for each axis")
+        dimension = len(images.shape)
+        what = f"{len(self.sides)} for a grid of shape {images.shape}"
+        require(dimension == len(self.sides), "sides", what, "one for each axis")
         is_stopped = Event()
 
         def raise_if_stopped() -> None:
@@ -117,24 +112,25 @@ class ImageModel:
                 is_stopped.set()
                 raise
 
-        def solve(end: int, guess: SideSolution | None) -> SideSolution | None:
-            """Return stresses for the lower moduli (end 0) or displacements for the upper (1)."""
-            moduli = images.moduli_of_fields(end)
+        def solve(stress: bool, guess: SideSolution | None) -> SideSolution | None:
+            """Return stresses for the lower moduli, or displacements for the upper ones."""
+            moduli = images.moduli_of_fields(stress=stress)
             if moduli is None:
                 return None
-            return self.solve_side(end, *moduli, guess, raise_if_stopped)
+            return self.solve_side(moduli, stress=stress, start=guess, watch=raise_if_stopped)
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
-        has_kernels = len(shape) == 3 and self.device == "cpu"
+        elements = [element_of(self.sides, stress=stress) for stress in (True, False)]
+        has_kernels = dimension == 3 and self.device == "cpu"
         with KernelThreads(
             workers=2 if self.device == "cpu" else 1,
-            call_kernels=partial(call_kernels, self.elements if has_kernels else ()),
+            call_kernels=partial(call_kernels, elements if has_kernels else []),
         ) as pool:
             try:
-                lower, upper = pool.map(solve, (0, 1), guesses)
+                lower, upper = pool.map(solve, (True, False), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
                 is_stopped.set()
-        components = 3 * (len(shape) - 1)  # of the strain in Voigt's order: 3 or 6
+        components = 3 * (dimension - 1)  # of the strain in Voigt's order: 3 or 6
         lower_bound: Array = np.zeros((components, components))
         if lower is not None:
             lower_bound = inverse_below(lower.energy.upper)
@@ -145,19 +141,19 @@ class ImageModel:
 
     def solve_side(
         self,
-        end: int,
-        bulk: Array,
-        shear: Array,
+        moduli: Array,
+        *,
+        stress: bool,
         start: SideSolution | None,
         watch: Callable[[], None] | None = None,
     ) -> SideSolution | None:
-        """Return stresses (end 0) or displacements (end 1) of least energy for given moduli.
+        """Return stresses or displacements of least energy for given moduli.
 
         Args:
-            end: 0 for stresses, whose energy bounds the compliance from above; 1 for displacements,
-                whose energy bounds the stiffness from above.
-            bulk: Bulk modulus of each pixel or voxel in Pa, of the plane K + G/3.
-            shear: Shear modulus, of the same shape.
+            moduli: Bulk modulus (of the plane K + G/3) and shear modulus of each pixel or voxel in
+                Pa, shape (2, *grid).
+            stress: Whether to solve for stresses, whose energy bounds the compliance from above;
+                else for displacements, whose energy bounds the stiffness from above.
             start: Solution whose fields are the first guess.
             watch: Function in place of that of the solver.
 
@@ -167,9 +163,9 @@ class ImageModel:
         """
         to_device = device_array(self.device)
         return solve_side(
-            self.elements[end],
-            to_device(bulk),
-            to_device(shear),
+            element_of(self.sides, stress=stress),
+            bulk=to_device(moduli[0]),
+            shear=to_device(moduli[1]),
             solver=replace(self.solver, watch=watch or self.solver.watch),
             division=self.division,
             start=None if start is None else start.fields,
@@ -197,17 +193,15 @@ class ImageModel:
             bounds.append(solution.bounds)
             if progress is not None:
                 progress(len(bounds) / len(images))
-        # intervals of E, ν and the other constants, (levels, constants, 2); each contains those of
-        # higher levels, since every image of a cut is one of the wider cuts
-        intervals = np.array(
-            [[x.young(self.average), x.poisson(self.average), *x.constants()] for x in bounds]
-        )
-        np.minimum.accumulate(intervals[..., 0], out=intervals[..., 0])
-        np.maximum.accumulate(intervals[..., 1], out=intervals[..., 1])
-        cuts = []
-        for level_bounds, (young, poisson, *constants) in zip(bounds, intervals, strict=True):
-            ends = Enclosure(*young), Enclosure(*poisson)
-            cuts.append(ImageCut(level_bounds, *ends, np.array(constants)))
+        # Each interval contains those of higher levels, since every image of a cut is one of the
+        # wider cuts.
+        young = _nested([x.young(self.average) for x in bounds])
+        poisson = _nested([x.poisson(self.average) for x in bounds])
+        constants = _nested([x.constants() for x in bounds])
+        cuts = [
+            ImageCut(x, Enclosure(*young[k]), Enclosure(*poisson[k]), constants[k])
+            for k, x in enumerate(bounds)
+        ]
         return cuts[::-1]
 
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
@@ -240,6 +234,13 @@ class ImageModel:
                 _require_overlap("ν", poisson, cut.poisson)
 
 
+def _nested(intervals: Sequence[Enclosure] | Sequence[Array]) -> Array:
+    """Return intervals that each contain all before, shape (levels, …, 2)."""
+    lower, upper = np.moveaxis(np.array(intervals), -1, 0)
+    ends = np.minimum.accumulate(lower), np.maximum.accumulate(upper)
+    return np.stack(ends, axis=-1)
+
+
 def _require_overlap(name: str, inside: Enclosure, cut: Enclosure) -> None:
     """Refuse a cut that has no number in common with the bounds of an image inside it."""
     if inside.lower > cut.upper or cut.lower > inside.upper:
@@ -254,9 +255,9 @@ def usual_division(images: ModuliImages) -> int:
     It is 2 for images of up to 2¹⁹ pixels and contrasts of up to 10. Of a voxel it is 1, since two
     elements take eight times as long and narrow the bounds by half.
     """
-    pairs = images.bulk, images.shear
+    pairs = zip(images.lower, images.upper, strict=True)  # of bulk, and of shear moduli
     is_mild = all(upper.max() <= 10.0 * lower.min() for lower, upper in pairs)
-    is_small = images.bulk[0].ndim == 2 and images.bulk[0].size <= 1 << 19
+    is_small = len(images.shape) == 2 and images.lower[0].size <= 1 << 19
     return 2 if is_mild and is_small else 1
 
 
@@ -290,14 +291,14 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
     Raises:
         RefusedError: The arrays are not alike, or hold negative numbers or none but 0 and infinity.
     """
-    moduli = np.asarray(bulk, float), np.asarray(shear, float)  # the proof is of doubles
-    shapes = [values.shape for values in moduli]
-    is_grid = shapes[0] == shapes[1] and len(shapes[0]) in (2, 3)
+    shape = np.shape(bulk)
+    is_grid = shape == np.shape(shear) and len(shape) in (2, 3)
     allowed = "two arrays of one shape (y, x) or (z, y, x)"
-    require(is_grid, "moduli", f"of shapes {shapes[0]}, {shapes[1]}", allowed)
+    require(is_grid, "moduli", f"of shapes {shape}, {np.shape(shear)}", allowed)
+    moduli = np.array([bulk, shear], float)  # the proof is of doubles
     for values in moduli:
         require(bool((values >= 0).all()), "moduli", "negative or nan", "numbers from 0")
         is_solid = bool(((values > 0) & np.isfinite(values)).any())
         require(is_solid, "moduli", "0 or infinite throughout", "a material with both bounds")
-    settings = {"sides": (1.0,) * len(shapes[0]), **settings}
-    return ImageModel(**settings).solve(ModuliImages.crisp(*moduli))
+    settings = {"sides": (1.0,) * len(shape), **settings}
+    return ImageModel(**settings).solve(ModuliImages(moduli, moduli))

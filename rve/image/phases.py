@@ -77,44 +77,49 @@ class ModuliInterval:
         """
         # At a fixed E the modulus G falls and K rises with ν. K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is
         # convex in ν and smallest at ν = −1/4; so this ν, moved into the interval, counts as well.
-        nearest = min(max(poisson[0], -0.25), poisson[1])
-        lower_young, upper_young = modulus
-        softest = [PhaseModuli.of_young(lower_young, nu, dimension) for nu in (*poisson, nearest)]
-        stiffest = [PhaseModuli.of_young(upper_young, nu, dimension) for nu in (*poisson, nearest)]
+        lowest, highest = poisson
+        ratios = lowest, highest, min(max(lowest, -0.25), highest)
+        softest, stiffest = (
+            [PhaseModuli.of_young(young, nu, dimension) for nu in ratios] for young in modulus
+        )
         return cls(
             PhaseModuli(min(x.bulk for x in softest), min(x.shear for x in softest)),
             PhaseModuli(max(x.bulk for x in stiffest), max(x.shear for x in stiffest)),
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModuliImages:
-    """Lower and upper moduli of each cell of a grid, arrays of its shape, in Pa.
+    """Lower and upper moduli of each cell of a grid, in Pa.
 
     Args:
-        bulk: Lower and upper bulk modulus; of pixels that of plane strain, K + G/3.
-        shear: Lower and upper shear modulus.
+        lower: Lower bulk and shear modulus, shape (2, *grid); the bulk modulus of pixels is that of
+            plane strain, K + G/3.
+        upper: Upper bulk and shear modulus, of the same shape.
     """
 
-    bulk: tuple[Array, Array]
-    shear: tuple[Array, Array]
+    lower: Array
+    upper: Array
 
     @classmethod
     def crisp(cls, bulk: Array, shear: Array) -> ModuliImages:
         """Return images whose lower and upper moduli are the same."""
-        return cls((bulk, bulk), (shear, shear))
+        moduli = np.stack([bulk, shear])
+        return cls(moduli, moduli)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the grid."""
+        return self.lower.shape[1:]
 
     @property
     def geometric_mean(self) -> ModuliImages:
         """Image of the geometric means of the lower and the upper moduli."""
         with np.errstate(invalid="ignore"):  # 0 times infinity, which is taken as 0
-            means = [
-                np.where(lower > 0, np.sqrt(lower * upper), 0)
-                for lower, upper in (self.bulk, self.shear)
-            ]
-        return ModuliImages.crisp(*means)
+            means = np.where(self.lower > 0, np.sqrt(self.lower * self.upper), 0)
+        return ModuliImages(means, means)
 
-    def moduli_of_fields(self, end: int) -> tuple[Array, Array] | None:
+    def moduli_of_fields(self, *, stress: bool) -> Array | None:
         """Return the moduli that fields of one side of the bounds are computed with.
 
         Stiffer phases make a stiffer cell. So the lower bound holds with a rigid phase that is too
@@ -123,28 +128,28 @@ class ModuliImages:
         of the smallest one: with a smaller factor iterations grow by its logarithm.
 
         Args:
-            end: 0 for stresses with the lower moduli, where pores keep the modulus 0; 1 for
-                displacements with the upper moduli.
+            stress: Whether the fields are stresses with the lower moduli, where pores keep the
+                modulus 0; else they are displacements with the upper moduli.
 
         Returns:
-            Bulk and shear moduli; None where a rigid phase leaves no displacements to bound from
-            above.
+            Bulk and shear moduli, shape (2, *grid); None where a rigid phase leaves no
+            displacements to bound from above.
         """
-        moduli = self.bulk[end], self.shear[end]
-        is_upper = end == 1
-        if is_upper and any(np.isinf(x).any() for x in moduli):
+        moduli = self.lower if stress else self.upper
+        if not stress and np.isinf(moduli).any():
             return None
-        clipped = []
-        for values in moduli:
+        clipped = np.empty_like(moduli)
+        for k in range(len(moduli)):
+            values = moduli[k]
             finite = values[(values > 0) & np.isfinite(values)]
-            min_modulus = 1e-6 * finite.min() if is_upper else 0.0
-            clipped.append(np.clip(values, min_modulus, 1e4 * finite.max()))
-        return clipped[0], clipped[1]
+            min_modulus = 0.0 if stress else 1e-6 * finite.min()
+            clipped[k] = np.clip(values, min_modulus, 1e4 * finite.max())
+        return clipped
 
     def equals(self, images: ModuliImages) -> bool:
         """Return whether both are the same moduli everywhere."""
-        pairs = zip((*self.bulk, *self.shear), (*images.bulk, *images.shear), strict=True)
-        return all(np.array_equal(a, b) for a, b in pairs)
+        is_lower_same = np.array_equal(self.lower, images.lower)
+        return is_lower_same and np.array_equal(self.upper, images.upper)
 
 
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Ints, Ints]:
@@ -177,9 +182,7 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
     for a, b in combinations_with_replacement(range(len(phases)), 2):
         lowest[:, a, b] = lower[a : b + 1].min(axis=0)
         highest[:, a, b] = upper[a : b + 1].max(axis=0)
-    min_bulk, min_shear = lowest[:, first, last]
-    max_bulk, max_shear = highest[:, first, last]
-    return ModuliImages(bulk=(min_bulk, max_bulk), shear=(min_shear, max_shear))
+    return ModuliImages(lowest[:, first, last], highest[:, first, last])
 
 
 def require_phases(grey: Array, thresholds: Sequence[tuple[float, float]]) -> None:

@@ -173,7 +173,7 @@ class ImageStudy:
     def extent(self) -> str:
         """Number of pixels or voxels along each axis, and memory of their solution, in words."""
         nominal = self.images(None, None)
-        shape = nominal.bulk[0].shape
+        shape = nominal.shape
         sizes = " × ".join(map(str, shape))
         gigabytes = needed_memory(shape, usual_division(nominal)) / 1e9
         axes = "pixels (y, x)" if len(shape) == 2 else "voxels (z, y, x)"
@@ -444,7 +444,7 @@ def solve_study(
     start = perf_counter()
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     division = usual_division(nominal)
-    require_memory(nominal.bulk[0].shape, division)
+    require_memory(nominal.shape, division)
     solver = ConjugateGradient(accuracy=1e-5)
     model = ImageModel(study.image.sides, division, solver, average, device)
     solution = model.solve(nominal)

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, reduce
-from itertools import permutations, product
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -305,24 +305,49 @@ def strain_derivatives(dimension: int) -> Derivatives:
 
 
 def stress_derivatives(dimension: int) -> Derivatives:
-    """Return the terms of Beltrami's σ_ij = Σ ε_ikm ε_jqr ∂k ∂q Φ_mr.
+    """Return the terms of Beltrami's stresses.
+
+    With i, j and k all different they are
+
+        σ_ii = ∂j² Φ_kk + ∂k² Φ_jj − 2 ∂j ∂k Φ_jk,
+        σ_ij = ∂i ∂k Φ_jk + ∂j ∂k Φ_ik − ∂i ∂j Φ_kk − ∂k² Φ_ij.
 
     In the plane Φ_33 is left alone, which varies with x and y.
     """
-    signs = {(0, 1, 2): 1, (1, 2, 0): 1, (2, 0, 1): 1, (2, 1, 0): -1, (1, 0, 2): -1, (0, 2, 1): -1}
+    axes = {0, 1, 2}
     by_component = []
-    for i, j in [*((i, i) for i in range(dimension)), *SHEARS[dimension]]:
-        factors: dict[tuple[tuple[int, int], tuple[int, ...]], int] = {}
-        for (a, k, m), (b, q, r) in product(permutations(range(3)), repeat=2):
-            is_of_plane = dimension == 3 or (m, r) == (2, 2)
-            if (a, b) != (i, j) or max(k, q) >= dimension or not is_of_plane:
-                continue
-            orders = tuple((k == axis) + (q == axis) for axis in range(dimension))
-            term = (min(m, r), max(m, r)), orders
-            factors[term] = factors.get(term, 0) + signs[a, k, m] * signs[b, q, r]
-        terms = [Derivative(f, function, orders) for (function, orders), f in factors.items() if f]
+    for i in range(3):
+        j, k = sorted(axes - {i})
+        terms = [
+            _second_derivative(1, (k, k), (j, j)),
+            _second_derivative(1, (j, j), (k, k)),
+            _second_derivative(-2, (j, k), (j, k)),
+        ]
         by_component.append(terms)
-    return by_component
+    for i, j in SHEARS[3]:
+        (k,) = axes - {i, j}
+        terms = [
+            _second_derivative(1, (j, k), (i, k)),
+            _second_derivative(1, (i, k), (j, k)),
+            _second_derivative(-1, (k, k), (i, j)),
+            _second_derivative(-1, (i, j), (k, k)),
+        ]
+        by_component.append(terms)
+    if dimension == 3:
+        return by_component
+    plane = []
+    for component in (0, 1, 5):  # 11, 22 and 12
+        for factor, function, (x, y, z) in by_component[component]:
+            if function == (2, 2) and z == 0:
+                plane.append([Derivative(factor, function, (x, y))])
+    return plane
+
+
+def _second_derivative(factor: int, function: tuple[int, int], axes: tuple[int, int]) -> Derivative:
+    """Return a term with derivatives along two axes."""
+    first, last = sorted(function)
+    x, y, z = (axes.count(axis) for axis in range(3))
+    return Derivative(factor, (first, last), (x, y, z))
 
 
 def _derivative_modes(basis: Polynomials, side: float) -> Array:

@@ -75,7 +75,7 @@ def test_samples_never_leave_the_cut(ordered):
     assert (np.diff(moduli[:, 0]) >= 0).all()
     assert (np.diff(moduli[:, 1]) <= 0).all()
     if ordered:
-        corner = model.solve(ModuliImages((pairs[0].bulk[0],) * 2, (pairs[0].shear[0],) * 2))
+        corner = model.solve(ModuliImages(pairs[0].lower, pairs[0].lower))
         assert (
             np.abs(corner.bounds.lower - cuts[0].bounds.lower).max()
             < 1e-3 * corner.bounds.lower[0, 0]
@@ -114,7 +114,7 @@ def test_cuts_that_leave_out_an_image_inside_them_are_refused():
 def test_pixels_are_divided_where_that_is_cheap(contrast, rows, parts):
     image = np.ones((rows, 4))
     image[0] = contrast
-    assert usual_division(ModuliImages((image, image), (image, image))) == parts
+    assert usual_division(ModuliImages.crisp(image, image)) == parts
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])

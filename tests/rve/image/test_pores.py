@@ -187,7 +187,7 @@ def test_cuts_of_pores_of_a_fuzzy_extent_are_nested_and_consistent():
             for x in (K + G / 3, G)
             for ends in [((surely_solid, 1 - spread), (maybe_solid, 1 + spread))]
         ]
-        images.append(ModuliImages(*moduli))
+        images.append(ModuliImages(*np.swapaxes(moduli, 0, 1)))
     model = ImageModel()
     cuts = model.cuts(images, (images[-1], model.solve(images[-1])))
     wide, narrow = (cut.modulus for cut in cuts)

@@ -183,7 +183,7 @@ def test_the_series_of_spheres_is_between_the_voxels_inside_and_those_touched(co
             np.sort([np.where(mask, inside, outside) for mask in masks], axis=0)
             for outside, inside in zip(matrix.bulk_and_shear, sphere.bulk_and_shear, strict=True)
         ]
-        bounds = ImageModel((1.0, 1.0, 1.0)).solve(ModuliImages(*map(tuple, pairs))).bounds
+        bounds = ImageModel((1.0, 1.0, 1.0)).solve(ModuliImages(*np.swapaxes(pairs, 0, 1))).bounds
         assert bounds.contains(exact)
         widths.append(bounds.width)
     assert widths[1] < 0.65 * widths[0]  # of order 1 in the voxel's side
@@ -355,7 +355,7 @@ def test_a_homogeneous_volume_is_exact_and_its_constants_are_its_own():
 def test_losses_of_laminates_and_equal_losses_are_exact(rng):
     phase = np.moveaxis(np.broadcast_to([0, 1, 1, 0, 1, 1], (2, 2, 6)), 2, 2)
     moduli = np.array([[1.0, 9.0], [0.6, 4.0]])
-    images = ModuliImages((moduli[0][phase],) * 2, (moduli[1][phase],) * 2)
+    images = ModuliImages.crisp(*moduli[:, phase])
     model = ImageModel((1.0, 1.0, 1.0), solver=TIGHT)
     shares = energy_fractions(model, model.solve(images), images, phase, 2)
     step = 1e-6
@@ -380,7 +380,7 @@ def test_shares_of_energy_hold_where_bounds_are_wide():
     """Along layers of moduli 1 and 4 the soft third has (1/3)/(1/3 + 8/3) of the energy."""
     phase = np.repeat([[0], [1], [1], [0], [1], [1]], 2, axis=1)
     moduli = np.array([1.0, 4.0])[phase]
-    images = ModuliImages((moduli, moduli), (0.5 * moduli, 0.5 * moduli))
+    images = ModuliImages.crisp(moduli, 0.5 * moduli)
     model = ImageModel(solver=TIGHT)
     solution = model.solve(images)
     sharp = solution.bounds
@@ -394,7 +394,7 @@ def test_shares_of_energy_hold_where_bounds_are_wide():
 
 def test_first_order_losses_of_an_independent_solver_are_inside(rng):
     phase, moduli = voxels(rng, (3, 4, 4), contrast=8.0)
-    images = ModuliImages((moduli[0][phase],) * 2, (moduli[1][phase],) * 2)
+    images = ModuliImages.crisp(*moduli[:, phase])
     model = ImageModel((1.0, 1.0, 1.0))
     shares = energy_fractions(model, model.solve(images), images, phase, 2)
     step, sides = 1e-4, (1.0, 1.0, 1.0)
