@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from itertools import product
 from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
@@ -41,16 +40,20 @@ from alphacut.stochastic.theta.quadrature import between_nodes
 if TYPE_CHECKING:
     import xarray
 
-CURVE_POINTS = 61
-"""Points over θ of a stored stress curve."""
 SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
 """What is added to the name of a constant along x and y, by its definition."""
 FIBRES = ("E_T", "E_L", "nu_LT", "G_T", "G_L")
 """Constants across (T) and along (L) the fibres; see `fibre_constants`."""
-PLANE = tuple(name + suffix for suffix in SUFFIXES.values() for name in NAMES)
-QUANTITIES = ("E", "nu", "s11", "s12", *FIBRES, *PLANE)
+QUANTITIES = (
+    "E",
+    "nu",
+    "s11",
+    "s12",
+    *FIBRES,
+    *NAMES,
+    *(name + SUFFIXES[FREE] for name in NAMES),
+)
 """Outputs with α-cuts: moduli and stresses in Pa; s11 and s12 are mean stresses, eq. 15."""
-CUT = ("alpha", "bound")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -140,27 +143,37 @@ class FuzzyStiffness:
         return float(self._samples("curve_error").max())
 
     def _samples(self, output: str) -> Array:
+        """Return an output of `CellSamples` at all samples, shape (samples, …)."""
         assert self.bounds.samples is not None
         return self.bounds.samples.values.output(output)
 
     def __str__(self) -> str:
         """Return a line for each constant with its lowest and highest α-cut."""
-        first, last = self.bounds.alpha[[0, -1]]
+        error = f"{sum(self.error.values()):.1e}" if self.error else "not declared"
         lines = [
             f"fuzzy stiffness by {self.model}: {self.bounds.evaluations} samples,"
             f" {self.bounds.seconds:.2g} s; E and ν of {self.average}",
-            f"relative error of E: {sum(self.error.values()):.1e}"
-            if self.error
-            else "relative error of E: not declared",
+            f"relative error of E: {error}",
         ]
-        rows = {name: (self.cuts(name), self.bounds.nature_of(name)) for name in self.constants}
-        for name, cut in {} if self.losses is None else self.losses.cuts.items():
-            rows[f"loss factor of {name}"] = cut, Nature.ATTAINED
-        for name, (cut, nature) in rows.items():
-            texts = (" … ".join(f"{end:.6g}" for end in cut[row]) for row in (0, -1))
-            lowest, highest = texts
-            lines.append(f"{name}: α = {first:g}: {lowest}; α = {last:g}: {highest} ({nature})")
+        for name in self.constants:
+            lines.append(self._cut_text(name, self.cuts(name), self.bounds.nature_of(name)))
+        for name, cuts in self._loss_cuts.items():
+            lines.append(self._cut_text(f"loss factor of {name}", cuts, Nature.ATTAINED))
         return "\n".join(lines)
+
+    def _cut_text(self, name: str, cuts: Array, guarantee: Nature) -> str:
+        """Return a constant's cuts on the lowest and the highest level, shape (levels, 2)."""
+        first, last = self.bounds.alpha[[0, -1]]
+        lowest, highest = cuts[0], cuts[-1]
+        return (
+            f"{name}: α = {first:g}: {lowest[0]:.6g} … {lowest[1]:.6g};"
+            f" α = {last:g}: {highest[0]:.6g} … {highest[1]:.6g} ({guarantee})"
+        )
+
+    @property
+    def _loss_cuts(self) -> dict[str, Array]:
+        """α-cuts of the loss factors by name, shape (levels, 2) each; empty for none."""
+        return {} if self.losses is None else self.losses.cuts
 
     __repr__ = __str__
 
@@ -185,21 +198,27 @@ class FuzzyStiffness:
 
         bounds = self.bounds
         assert bounds.samples is not None
+        cut = ("alpha", "bound")
         variables: dict[str, Any] = {}
         for name in self.constants:
             units = {"units": "1" if name.startswith("nu") else "Pa"}
             column = bounds.column(name)
             points = np.stack([bounds.lower_at[:, column], bounds.upper_at[:, column]], axis=1)
-            variables[name] = (CUT, self.cuts(name), units)
-            variables[f"{name}_at"] = ((*CUT, "parameter"), points)
+            variables[name] = (cut, self.cuts(name), units)
+            variables[f"{name}_at"] = ((*cut, "parameter"), points)
             variables[f"{name}_sample"] = ("sample", self._samples(name), units)
-        for name, cut in {} if self.losses is None else self.losses.cuts.items():
-            variables[f"loss_{name}"] = (CUT, cut)
+        for name, loss_cuts in self._loss_cuts.items():
+            variables[f"loss_{name}"] = (cut, loss_cuts)
         variables["point"] = (("sample", "parameter"), bounds.samples.points)
         of_curves = {"units": "Pa", "relative_error": self.curve_error}
         variables["curve11"] = (("sample", "theta"), self._samples("curve11"), of_curves)
-        axes = {"bound": ["lower", "upper"], "parameter": list(bounds.inputs)}
-        return xarray.Dataset(variables, {"theta": self.theta, "alpha": bounds.alpha, **axes})
+        coordinates = {
+            "theta": self.theta,
+            "alpha": bounds.alpha,
+            "bound": ["lower", "upper"],
+            "parameter": list(bounds.inputs),
+        }
+        return xarray.Dataset(variables, coordinates)
 
 
 def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
@@ -207,9 +226,6 @@ def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
     if tuple(alpha) == (1.0,):
         return Crisp(float(cuts.mean()))
     return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
-
-
-PHASE_PARAMETERS = ("modulus", "poisson", "loss")
 
 
 def fuzzy_stiffness(
@@ -311,24 +327,30 @@ class FuzzyCell:
         phases: Phases,
         inputs: Mapping[str, FuzzyNumber | float],
     ) -> FuzzyCell:
-        """Return the cell of arguments of `fuzzy_stiffness`; RefusedError of unknown inputs."""
-        has_particle = not isinstance(phases, Mapping)
+        """Return the cell of arguments of `fuzzy_stiffness`.
+
+        Raises:
+            RefusedError: An input is no parameter of the radius or of a phase.
+        """
         named = _named(phases)
-        numbers = {
-            name: number if isinstance(number, FuzzyNumber) else Crisp(float(number))
-            for name, number in inputs.items()
-        }
         parameters = _parameters(radius, named)
-        for name in numbers:
+        numbers: dict[str, FuzzyNumber] = {}
+        for name, number in inputs.items():
             require_choice("input", name, parameters)
-        # a campaign needs one input at least
-        sampled = {x: number for x, number in numbers.items() if not x.endswith("_loss")}
-        sampled = sampled or {"unchanged": Crisp(1.0)}
-        losses = [
-            numbers.get(f"{name}_loss", Crisp(phase.loss or 0.0)) for name, phase in named.items()
-        ]
-        is_lossy = any(number.support.upper > 0 for number in losses)
-        return cls(radius, named, sampled, tuple(losses) if is_lossy else (), has_particle)
+            numbers[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+
+        # Loss factors are no coordinates of the samples. A campaign needs one input at least.
+        sampled = {name: x for name, x in numbers.items() if not name.endswith("_loss")}
+        if not sampled:
+            sampled = {"unchanged": Crisp(1.0)}
+        losses = []
+        for name, phase in named.items():
+            stated = Crisp(phase.loss or 0.0)
+            losses.append(numbers.get(f"{name}_loss", stated))
+        if not any(number.support.upper > 0 for number in losses):
+            losses = []
+        has_particle = not isinstance(phases, Mapping)
+        return cls(radius, named, sampled, tuple(losses), has_particle)
 
     @property
     def nominal(self) -> dict[str, float]:
@@ -342,27 +364,27 @@ class FuzzyCell:
         return phase_loss_cuts(self.losses, alpha)
 
     def radius_at(self, values: Mapping[str, float]) -> RadiusMap | ThetaDistribution:
-        """Return the radius map, or the law of θ, at values of the inputs."""
+        """Return the radius map, or the distribution of θ, at values of the inputs."""
         names = _field_names(self.radius)
         changes = {name: x for name, x in values.items() if name in names}
-        changed: RadiusMap | ThetaDistribution = replace(cast("Any", self.radius), **changes)
-        return changed if changes else self.radius
+        if not changes:  # such as of a map that is no dataclass
+            return self.radius
+        return cast("RadiusMap", replace(cast("Any", self.radius), **changes))
 
     def phases_at(self, values: Mapping[str, float]) -> dict[str, AnyPhase]:
-        """Return the phases by name at values of the inputs."""
+        """Return the phases by name at values of the inputs.
+
+        An input NAME_FIELD is the field of the phase NAME.
+        """
         found = {}
         for name, phase in self.phases.items():
-            prefix = f"{name}_"
-            changes = {
-                x.removeprefix(prefix): value
-                for x, value in values.items()
-                if x.startswith(prefix) and x.removeprefix(prefix) in _field_names(phase)
-            }
+            inputs = {field: f"{name}_{field}" for field in _field_names(phase)}
+            changes = {field: values[x] for field, x in inputs.items() if x in values}
             found[name] = replace(cast("Any", phase), **changes)
         return found
 
     def support(self, name: str) -> Cut:
-        """Return least and greatest value of a phase's parameter, fuzzy or not."""
+        """Return the smallest and the largest value of a phase's parameter, fuzzy or not."""
         if name in self.inputs:
             return self.inputs[name].support
         phase, _, parameter = name.partition("_")
@@ -371,6 +393,7 @@ class FuzzyCell:
 
 
 def _named(phases: Phases) -> dict[str, AnyPhase]:
+    """Return phases by name, "matrix" and "inclusion" where they have none."""
     if isinstance(phases, Mapping):
         return dict(phases)
     require(len(phases) == 2, "phases", value=len(phases), allowed="matrix and inclusion")
@@ -379,21 +402,19 @@ def _named(phases: Phases) -> dict[str, AnyPhase]:
 
 
 def _field_names(value: object) -> tuple[str, ...]:
+    """Return the names of a dataclass's fields; none of another object."""
     if not is_dataclass(value):
         return ()
     return tuple(field.name for field in fields(value))
 
 
 def _parameters(radius: object, phases: Mapping[str, AnyPhase]) -> tuple[str, ...]:
-    """Return the names that inputs may have."""
-    of_radius = [name for name in _field_names(radius) if isinstance(getattr(radius, name), float)]
-    of_phases = [
-        f"{name}_{parameter}"
-        for name, phase in phases.items()
-        for parameter in PHASE_PARAMETERS
-        if parameter in _field_names(phase)
-    ]
-    return (*of_radius, *of_phases)
+    """Return the names that inputs may have: numbers of the radius, and NAME_FIELD of phases."""
+    names = [name for name in _field_names(radius) if isinstance(getattr(radius, name), float)]
+    for name, phase in phases.items():
+        has = _field_names(phase)
+        names += [f"{name}_{x}" for x in ("modulus", "poisson", "loss") if x in has]
+    return tuple(names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -414,9 +435,9 @@ class CellSamples:
 
     @property
     def theta(self) -> Array:
-        """Values of θ at which stress curves are kept, shape (CURVE_POINTS,)."""
-        law: Any = getattr(self.cell.radius, "distribution", self.cell.radius)
-        return np.asarray(np.linspace(law.lower, law.upper, CURVE_POINTS))
+        """Values of θ at which stress curves are kept, shape (61,)."""
+        distribution: Any = getattr(self.cell.radius, "distribution", self.cell.radius)
+        return np.asarray(np.linspace(distribution.lower, distribution.upper, 61))
 
     def solve(self, points: Sequence[Mapping[str, float]]) -> list[HomogenisedStiffness]:
         """Return the result at each point; points differ in the particle's modulus alone."""
@@ -442,11 +463,16 @@ class CellSamples:
         return [self._outputs(result) for result in self.solve(points)]
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
+        """Return the outputs of one result; see `__call__`."""
         require_isotropic(result)
         curve = result.curve
         s11, s12 = curve.mean
-        outputs: dict[str, float | Array] = {"E": result.modulus, "nu": result.poisson}
-        outputs |= {"s11": s11, "s12": s12}
+        outputs: dict[str, float | Array] = {
+            "E": result.modulus,
+            "nu": result.poisson,
+            "s11": s11,
+            "s12": s12,
+        }
         if result.is_of_fibres:
             constants = fibre_constants(result).values
             outputs |= {name: constants[name] for name in FIBRES}
@@ -454,11 +480,14 @@ class CellSamples:
         outputs["systems"] = len(result.iterations)
         outputs["curve11"] = between_nodes(curve.theta, curve.s11, self.theta)
         outputs["curve_error"] = curve.error
-        outputs |= {f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")}
-        outputs |= {f"check:{name}": value for name, value in result.checks.items()}
+        for source in ("space", "theta"):
+            outputs[f"error:{source}"] = result.error.get(source, 0.0)
+        for name, violation in result.checks.items():
+            outputs[f"check:{name}"] = violation
         if self.loss_cuts is not None:
             bounds, errors = loss_bounds(result, self.loss_cuts)
-            outputs |= {"loss_lower": bounds[:, 0], "loss_upper": bounds[:, 1]}
+            outputs["loss_lower"] = bounds[:, 0]
+            outputs["loss_upper"] = bounds[:, 1]
             outputs["loss_error"] = np.nan_to_num(errors)
         return outputs
 
@@ -471,12 +500,12 @@ def require_isotropic(result: HomogenisedStiffness) -> None:
 
 
 def plane_constants_by_name(result: HomogenisedStiffness) -> dict[str, float]:
-    """Return those of `PLANE` that a result has, moduli in Pa."""
-    return {
-        name + SUFFIXES[definition]: float(value)
-        for definition, constants in engineering_constants(result).items()
-        for name, value in zip(NAMES, constants.values, strict=True)
-    }
+    """Return those constants along x and y that a result has, moduli in Pa."""
+    found: dict[str, float] = {}
+    for definition, constants in engineering_constants(result).items():
+        names = [name + SUFFIXES[definition] for name in NAMES]
+        found |= dict(zip(names, map(float, constants.values), strict=True))
+    return found
 
 
 def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
@@ -491,16 +520,27 @@ def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
     is_isotropic = all(isinstance(phase, Phase) for phase in cell.phases.values())
     if not (model.is_exact and cell.has_particle and is_isotropic):
         return Knowledge()
-    matrix, inclusion = cell.support("matrix_modulus"), cell.support("inclusion_modulus")
     poisson = cell.support("matrix_poisson")
     is_same = poisson == cell.support("inclusion_poisson") and poisson.lower == poisson.upper
-    is_stiffer = inclusion.lower >= matrix.upper
-    is_softer = inclusion.upper <= matrix.lower
-    if not is_same or poisson.lower < 0 or not (is_stiffer or is_softer):
+    if not is_same or poisson.lower < 0:
         return Knowledge()
-    effect = 1 if is_stiffer else -1  # of more inclusion on E
-    signs = {"a1": effect, "a2": effect, "a3": effect, "a4": -effect, "fraction": effect}
-    signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
+    matrix = cell.support("matrix_modulus")
+    inclusion = cell.support("inclusion_modulus")
+    if inclusion.lower >= matrix.upper:
+        effect = 1  # of more inclusion on E
+    elif inclusion.upper <= matrix.lower:
+        effect = -1
+    else:
+        return Knowledge()
+    signs = {
+        "a1": effect,
+        "a2": effect,
+        "a3": effect,
+        "a4": -effect,
+        "fraction": effect,
+        "matrix_modulus": 1,
+        "inclusion_modulus": 1,
+    }
     of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in cell.inputs}
     return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
@@ -508,7 +548,7 @@ def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
 def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> None:
     """Require that a coarser model agrees with guaranteed cuts of E at points inside them.
 
-    The points are the middles of the narrowest and of the widest cut of the inputs.
+    The points are the midpoints of the narrowest and of the widest cut of the inputs.
 
     Args:
         bounds: The cuts.
@@ -519,13 +559,12 @@ def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> 
         FailedError: E at such a point lies outside a cut by more than the errors of both.
     """
     cuts = np.stack(bounds.bounds("E"), axis=1)
-    middles_at = bounds.alpha[[-1, 0]]
-    inputs = bounds.inputs.items()
-    points = [{name: float(np.mean(x.cut(alpha))) for name, x in inputs} for alpha in middles_at]
-    for alpha, point in zip(middles_at, points, strict=True):
-        result = coarse.solve([point])[0]
+    for alpha in bounds.alpha[[-1, 0]]:
+        midpoint = {name: float(np.mean(x.cut(alpha))) for name, x in bounds.inputs.items()}
+        result = coarse.solve([midpoint])[0]
         value = result.modulus
         slack = value * (error + sum(result.error.values()))
+        # The point lies in the cuts of the inputs on this level and on all lower ones.
         for low, high in cuts[bounds.alpha <= alpha]:
             if not low - slack <= value <= high + slack:
                 what = f"E of a cell inside a cut is {value / 1e9:.9g} GPa, the cut"
@@ -557,42 +596,42 @@ def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Ar
     return np.array([np.transpose([loss.cut(level) for loss in losses]) for level in alpha])
 
 
-def loss_corners(cuts: Array, fractions: Array) -> Array:
-    """Return the phases' loss factors where those of E, G and K are extreme, to first order.
-
-    Args:
-        cuts: α-cuts of each phase's loss factor, the same of its K and G, (levels, 2, phases).
-        fractions: ∂ln c/∂ln X of c = E, G, K by X = K, G of each phase, shape (phases, 2, 3).
-
-    Returns:
-        Loss factors of K and G of each phase where that of a constant is least and greatest, shape
-        (levels, 2, 3, phases, 2).
-    """
-    slopes = fractions.sum(axis=1).T  # (constants, phases)
-    lower, upper = cuts[:, 0, None], cuts[:, 1, None]
-    minima = np.where(slopes >= 0, lower, upper)
-    maxima = np.where(slopes >= 0, upper, lower)
-    corners = np.stack([minima, maxima], axis=1)
-    return np.stack([corners, corners], axis=-1)
-
-
 def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:
-    """Return bounds of the loss factors of E, G and K, (levels, 2, 3), and their errors, (3,).
+    """Return bounds of the loss factors of E, G and K over the α-cuts of those of the phases.
 
     Args:
         result: Result of a cell, with the energies of its phases.
-        cuts: Those of `phase_loss_cuts`.
+        cuts: α-cuts of each phase's loss factor, the same of its K and G, shape (levels, 2,
+            phases).
+
+    Returns:
+        Lower and upper bounds, shape (levels, 2, 3), and the declared errors, shape (3,).
     """
     assert result.energies is not None
-    fractions, _ = result.energies.energy_fractions(result.constants_of)
-    corners = loss_corners(cuts, fractions)
-    errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
-    if corners.max() <= MAX_FIRST_ORDER:  # level l, end e, constant c, phase p, K or G x
-        return np.einsum("lecpx,pxc->lec", corners, fractions), np.array(errors)
+    fractions, _ = result.energies.energy_fractions(result.constants_of)  # (phases, 2, 3)
+
+    # To first order the loss factor of a constant is the sum of those of the phases times their
+    # energy fractions. So it is extreme where each phase has the end of its cut that the sign of
+    # its fraction says.
+    slopes = fractions.sum(axis=1).T  # (constants, phases)
+    lower = cuts[:, 0, np.newaxis]
+    upper = cuts[:, 1, np.newaxis]
+    minima = np.where(slopes >= 0, lower, upper)
+    maxima = np.where(slopes >= 0, upper, lower)
+    phase_losses = np.stack([minima, maxima], axis=1)  # (levels, 2, constants, phases)
+    corners = np.stack([phase_losses, phase_losses], axis=-1)  # of K and of G
+    errors = np.empty(len(CONSTANTS))
+    for constant, name in enumerate(CONSTANTS):
+        errors[constant] = loss_factors(result, corners[0, 1, constant]).errors[name]
+    if corners.max() <= MAX_FIRST_ORDER:
+        return np.einsum("lecpx,pxc->lec", corners, fractions), errors
+
+    # Large loss factors are taken at the same corners, by complex moduli where the model has them.
     bounds = np.empty(corners.shape[:3])
-    for corner in product(*map(range, bounds.shape)):
-        bounds[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
-    return bounds, np.array(errors)
+    for level, end, constant in np.ndindex(bounds.shape):
+        found = loss_factors(result, corners[level, end, constant])
+        bounds[level, end, constant] = found.values[CONSTANTS[constant]]
+    return bounds, errors
 
 
 def _cuts_of_losses(

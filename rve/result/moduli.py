@@ -27,18 +27,23 @@ from alphacut.rve.cell.cell import AnyPhase, Phase
 
 
 def voigt(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Stiffness at uniform strain, shape (…, k, k), of phases (k, k) with fractions (phases, …)."""
+    """Return the stiffness at uniform strain: the mean of those of the phases, shape (…, k, k).
+
+    Args:
+        fractions: Fractions of the phases, shape (phases, …).
+        stiffness: Stiffness of each phase, shape (k, k).
+    """
     return np.asarray(np.tensordot(fractions, np.stack(stiffness), axes=([0], [0])))
 
 
 def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Stiffness at uniform stress, as `voigt`."""
+    """Return the stiffness at uniform stress, the inverse of the mean compliance; as `voigt`."""
     compliance = [np.asarray(np.linalg.inv(phase), float) for phase in stiffness]
     return np.asarray(np.linalg.inv(voigt(fractions, compliance)), float)
 
 
 def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: bool = False) -> Array:
-    """Lower and upper bound of K, then of G, in Pa, shape (2, 2, …): of the plane or of space.
+    """Return the bounds of K and of G of a composite of the plane or of space.
 
     In the plane of fibres by Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119,
     1965), of space by Hashin and Shtrikman (ibid. 11, 127, 1963); of any number of phases and with
@@ -46,34 +51,42 @@ def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: boo
     strain of any arrangement of fibres, and of any cubic one; those of G for isotropic ones.
 
     Args:
-        fractions: Of the phases, shape (phases, …).
+        fractions: Fractions of the phases, shape (phases, …).
         phases: The materials, isotropic in the plane or in space.
         space: Whether K is that of three dimensions, else of plane strain.
+
+    Returns:
+        Lower and upper bound of K, then of G, in Pa, shape (2, 2, …).
     """
     bulk, shear = _bulk_and_shear(phases, space)
     bounds = []
     for extreme in (np.min, np.max):
-        terms = _reference_terms(extreme(bulk), extreme(shear), space)
-        bounds.append(
-            [_mean_with(bulk, fractions, terms[0]), _mean_with(shear, fractions, terms[1])]
-        )
+        bulk_term, shear_term = _reference_terms(extreme(bulk), extreme(shear), space)
+        mean_bulk = _mean_with(bulk, fractions, bulk_term)
+        bounds.append([mean_bulk, _mean_with(shear, fractions, shear_term)])
     return np.swapaxes(np.array(bounds), 0, 1)
 
 
 def mori_tanaka(fraction: Array, phases: Sequence[AnyPhase], *, space: bool = False) -> Array:
-    """K and G in Pa, (2, …), of round fibres or spheres by Mori and Tanaka (1973).
+    """Return K and G of round fibres or spheres by Mori and Tanaka (1973), in Pa, shape (2, …).
 
-    `phases` are matrix and particle, of which a `fraction` of shape (…) is taken. These are the
-    bounds of Hashin and Shtrikman with the matrix as reference, exact for few particles.
+    These are the bounds of Hashin and Shtrikman with the matrix as reference, exact for few
+    particles.
+
+    Args:
+        fraction: Fraction of the particles, of any shape.
+        phases: Matrix and particle.
+        space: Whether the particles are spheres, else fibres.
     """
-    (bulk, shear), fractions = _bulk_and_shear(phases, space), np.stack([1 - fraction, fraction])
+    bulk, shear = _bulk_and_shear(phases, space)
+    fractions = np.stack([1 - fraction, fraction])
     bulk_term, shear_term = _reference_terms(bulk[0], shear[0], space)
-    estimates = _mean_with(bulk, fractions, bulk_term), _mean_with(shear, fractions, shear_term)
-    return np.array(estimates)
+    mean_bulk = _mean_with(bulk, fractions, bulk_term)
+    return np.array([mean_bulk, _mean_with(shear, fractions, shear_term)])
 
 
 def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
-    """K of space or of plane strain, and G, of each phase, shape (2, phases), in Pa."""
+    """Return K of space or of plane strain, and G, of each phase, shape (2, phases), in Pa."""
     if space:
         return np.array([phase.bulk_and_shear for phase in phases if isinstance(phase, Phase)]).T
     moduli = square_moduli(np.array([phase.stiffness for phase in phases]))
@@ -81,19 +94,27 @@ def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
 
 
 def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, float]:
-    """What a reference material adds to the bulk and the shear modulus of each phase, in Pa."""
+    """Return what a reference material adds to K and to G of each phase, in Pa."""
     if space:
         return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
     return shear, shear * bulk / (bulk + 2 * shear)
 
 
 def _mean_with(moduli: Array, fractions: Array, term: float) -> Array:
-    """X of 1/(X + term) = Σ fraction/(modulus + term), from (phases,) and (phases, …)."""
+    """Return X of 1/(X + term) = Σ fraction/(modulus + term), in Pa, shape (…).
+
+    Args:
+        moduli: Modulus of each phase, shape (phases,), in Pa.
+        fractions: Fractions of the phases, shape (phases, …).
+        term: Term of the reference material, in Pa.
+    """
     return np.asarray(1 / np.tensordot(1 / (moduli + term), fractions, axes=1) - term)
 
 
-AXES, ISOTROPIC = "axes", "isotropic"
+AXES = "axes"
+ISOTROPIC = "isotropic"
 AVERAGES = {AXES: "eq. 16", ISOTROPIC: "the isotropic average of the plane stiffness"}
+"""Averages of a plane stiffness by their names in Python and cases, in words."""
 
 
 def require_average(average: str) -> None:
@@ -103,48 +124,65 @@ def require_average(average: str) -> None:
 
 
 def shear_modulus(moduli: Array, average: str) -> Array:
-    """In-plane shear modulus G_T, shape (…), of C11 + C12, C11 − C12 and C33, shape (…, 3).
+    """Return the in-plane shear modulus G_T, shape (…), in Pa.
 
-    C33 alone for `average` "axes", Hill's mean over all directions for "isotropic".
+    Args:
+        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3), in Pa.
+        average: "axes" for C33 alone, "isotropic" for Hill's mean over all directions.
     """
-    along_axes, along_diagonals = moduli[..., 2], moduli[..., 1] / 2
+    along_axes = moduli[..., 2]
     if average == AXES:
         return np.asarray(along_axes)
-    voigt = (along_axes + along_diagonals) / 2
-    reuss = 2 / (1 / along_axes + 1 / along_diagonals)
-    return np.asarray((voigt + reuss) / 2)
+    along_diagonals = moduli[..., 1] / 2
+    voigt_mean = (along_axes + along_diagonals) / 2
+    reuss_mean = 2 / (1 / along_axes + 1 / along_diagonals)
+    return np.asarray((voigt_mean + reuss_mean) / 2)
 
 
 def plane_constants(moduli: Array, average: str) -> Array:
-    """E and ν, (…, 2), by an average of `AVERAGES`, from C11 + C12, C11 − C12 and C33, (…, 3)."""
-    hydrostatic, shear = moduli[..., 0], shear_modulus(moduli, average)
+    """Return E in Pa and ν by an average of `AVERAGES`, shape (…, 2).
+
+    Args:
+        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3), in Pa.
+        average: Name of the average.
+    """
+    hydrostatic = moduli[..., 0]
+    shear = shear_modulus(moduli, average)
     poisson = (1 - 2 * shear / hydrostatic) / 2  # eq. 16 with A = 2 G and B = C11 + C12
     young = 2 * shear * (1 + poisson)
     return np.stack([young, poisson], axis=-1)
 
 
 def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33."""
-    voigt = np.zeros((*bulk.shape, 3, 3))
-    voigt[..., 0, 0] = voigt[..., 1, 1] = (bulk + deviator) / 2
-    voigt[..., 0, 1] = voigt[..., 1, 0] = (bulk - deviator) / 2
-    voigt[..., 2, 2] = shear
-    return voigt
+    """Return Voigt matrices of square symmetry, (…, 3, 3), from C11 + C12, C11 − C12 and C33."""
+    stiffness = np.zeros((*bulk.shape, 3, 3))
+    stiffness[..., 0, 0] = stiffness[..., 1, 1] = (bulk + deviator) / 2
+    stiffness[..., 0, 1] = stiffness[..., 1, 0] = (bulk - deviator) / 2
+    stiffness[..., 2, 2] = shear
+    return stiffness
 
 
 def square_moduli(stiffness: Array) -> Array:
-    """C11 + C12, C11 − C12 and C33 of the square-symmetric part, shape (…, 3)."""
-    mean, lateral = (stiffness[..., 0, 0] + stiffness[..., 1, 1]) / 2, stiffness[..., 0, 1]
+    """Return C11 + C12, C11 − C12 and C33 of the square-symmetric part, shape (…, 3)."""
+    mean = (stiffness[..., 0, 0] + stiffness[..., 1, 1]) / 2
+    lateral = stiffness[..., 0, 1]
     return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, 1 or 3, 3).
+    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, shape (…, 1 or 3, 3).
 
     First with the mean of C11 and C22; if not `square`, then also with C11 and with C22 alone.
+
+    Args:
+        stiffness: Plane stiffnesses, shape (…, 3, 3).
+        square: Whether C11 and C22 are equal but for the mesh.
     """
     moduli = [square_moduli(stiffness)]
-    for k in () if square else (0, 1):
-        axial, lateral = stiffness[..., k, k], stiffness[..., 0, 1]
-        moduli.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
+    if not square:
+        lateral = stiffness[..., 0, 1]
+        shear = stiffness[..., 2, 2]
+        for axis in (0, 1):
+            axial = stiffness[..., axis, axis]
+            moduli.append(np.stack([axial + lateral, axial - lateral, shear], axis=-1))
     return np.stack(moduli, axis=-2)

@@ -76,16 +76,21 @@ class DeclaredConstants:
 
     @classmethod
     def from_arrays(cls, names: Sequence[str], values: Array, errors: Array) -> DeclaredConstants:
-        """The constants from arrays in the order of their names."""
-        by_name = [dict(zip(names, map(float, x), strict=True)) for x in (values, errors)]
-        return cls(*by_name)
+        """Return the constants from arrays in the order of their names."""
+        values_by_name = dict(zip(names, map(float, values), strict=True))
+        return cls(values_by_name, dict(zip(names, map(float, errors), strict=True)))
 
 
-STEP = 1e-30  # of complex-step derivatives, which have no cancellation
+STEP = 1e-30
+"""Step h of complex-step derivatives f'(x) = Im f(x + i h) / h. They have no difference of equal
+numbers, so that h may be far below round-off."""
 
 
 def young_shear_bulk(moduli: Array, constants_of: Callable[[Array], Array]) -> Array:
-    """E, G and first modulus (2 K_T of the plane, K of space), (3,), from the three moduli."""
+    """Return E, G and the first modulus from the three moduli, shape (3,), in Pa.
+
+    The first modulus is 2 K_T of the plane, and K of space.
+    """
     young, poisson = constants_of(moduli)
     return np.array([young, young / (2 * (1 + poisson)), moduli[0]])
 
@@ -98,8 +103,8 @@ class PhaseEnergies:
         values: For X = K and G of each phase, shape (phases, 2, 3), in Pa; their sum is the three
             moduli (nan where not computed).
         errors: Declared absolute errors, same shape; nan where unknown.
-        moduli_at: The three moduli, (3,), from complex K and G of all phases, (phases,) each; None
-            where the model takes real ones alone.
+        moduli_at: Function that returns the three moduli, shape (3,), for complex K and G of all
+            phases, shape (phases,) each; None where the model takes real ones alone.
     """
 
     values: Array
@@ -107,24 +112,31 @@ class PhaseEnergies:
     moduli_at: Callable[[Array, Array], Array] | None = None
 
     def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """Fractions ∂ln c/∂ln X of X = K, G of each phase in c = E, G, K, (phases, 2, 3); errors.
+        """Return the fractions ∂ln c/∂ln X of X = K, G of each phase in c = E, G, K.
 
-        By the chain rule with `constants_of`, which makes E and ν from the three moduli.
+        They follow by the chain rule from ∂ln c of the three moduli.
+
+        Args:
+            constants_of: Function that returns E and ν for the three moduli, also complex ones.
+
+        Returns:
+            The fractions and their declared absolute errors, shape (phases, 2, 3) each.
         """
         moduli = self.values.sum(axis=(0, 1))
 
-        def logarithmic_slopes(change: Array) -> Array:
-            """Relative changes of E, G, K per change of the three moduli, by a complex step."""
+        def logarithmic_change(change: Array) -> Array:
+            """Return the relative change of E, G, K for a small change of the three moduli."""
             constants = young_shear_bulk(moduli + 1j * STEP * change, constants_of)
             return np.asarray(constants.imag / (STEP * constants.real))
 
-        fractions = np.apply_along_axis(logarithmic_slopes, -1, self.values)
-        unknown = np.isnan(moduli)
-        slopes = abs(np.array([logarithmic_slopes(unit) for unit in np.eye(3)]))
-        errors, parts = (np.where(unknown, 0, abs(x)) for x in (self.errors, self.values))
-        # the slopes themselves are off by as much as the moduli are
-        moduli_error = (errors.sum(axis=(0, 1)) / np.where(unknown, 1, moduli)).max()
-        return fractions, np.asarray((errors + moduli_error * parts) @ slopes)
+        fractions = np.apply_along_axis(logarithmic_change, -1, self.values)
+        slopes = abs(np.array([logarithmic_change(unit) for unit in np.eye(3)]))
+        is_unknown = np.isnan(moduli)
+        errors = np.where(is_unknown, 0, abs(self.errors))
+        parts = np.where(is_unknown, 0, abs(self.values))
+        # The slopes have the relative error of the moduli, the largest of which is added.
+        modulus_errors = errors.sum(axis=(0, 1)) / np.where(is_unknown, 1, moduli)
+        return fractions, np.asarray((errors + modulus_errors.max() * parts) @ slopes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -259,25 +271,35 @@ class HomogenisedStiffness:
     def stiffness_errors(self) -> Array | None:
         """Declared absolute errors of the entries of the mean plane stiffness, (3, 3), in Pa.
 
-        Approximate fields can only have more energy: the error is a positive semidefinite matrix,
-        whose entries are at most √(δC_ii δC_jj). None without a plane stiffness.
+        None without a plane stiffness.
         """
-        C, (sum_error, difference_error, shear_error) = self.stiffness, self.modulus_errors
+        C = self.stiffness
         if C is None or C.shape != (3, 3):
             return None
-        diagonal = [shear_error * C[2, 2]]
-        for axis in (1, 0):  # C_kk is half of (C_kk + C12) + (C_kk − C12)
-            by_sum = sum_error * abs(C[axis, axis] + C[0, 1])
-            by_difference = difference_error * abs(C[axis, axis] - C[0, 1])
-            diagonal.insert(0, (by_sum + by_difference) / 2)
+        sum_error, difference_error, shear_error = self.modulus_errors
+        # C_kk is half of (C_kk + C12) + (C_kk − C12).
+        axial = np.diag(C)[:2]
+        by_sum = sum_error * abs(axial + C[0, 1])
+        by_difference = difference_error * abs(axial - C[0, 1])
+        diagonal = np.append((by_sum + by_difference) / 2, shear_error * C[2, 2])
+        # Approximate fields can only have more energy, so that the error δC of the matrix is
+        # positive semidefinite: |δC_ij| ≤ √(δC_ii δC_jj).
         return np.asarray(np.sqrt(np.outer(diagonal, diagonal)))
 
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
-        """Declared absolute error of a function of the three moduli, shaped like its value."""
-        return largest_change(function, self.moduli, self._known_errors(self.modulus_errors))
+        """Return the declared absolute error of a function of the three moduli, in its shape.
 
-    def _known_errors(self, errors: Array) -> Array:
-        return np.where(np.isnan(self.moduli), 0.0, errors)
+        The function is to be monotone in each modulus within the errors.
+        """
+        return self._largest_change(function, self.modulus_errors)
+
+    def _largest_change(self, function: Callable[[Array], Array | float], errors: Array) -> Array:
+        """Return the largest change of a function of the moduli by their relative errors.
+
+        Moduli that were not computed do not change.
+        """
+        known_errors = np.where(np.isnan(self.moduli), 0.0, errors)
+        return largest_change(function, self.moduli, known_errors)
 
     @property
     def estimated_error(self) -> float:
@@ -288,8 +310,10 @@ class HomogenisedStiffness:
     def error(self) -> dict[str, float]:
         """Declared relative error of E by source; their sum is `estimated_error`."""
         errors = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
-        scale = self.estimated_error / (sum(errors.values()) or 1.0)
-        return {name: scale * error for name, error in errors.items()}
+        total = sum(errors.values())
+        if total == 0:
+            return errors
+        return {name: self.estimated_error * error / total for name, error in errors.items()}
 
     @property
     def poisson_error(self) -> float:
@@ -304,29 +328,35 @@ class HomogenisedStiffness:
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     def _error_of_modulus(self, errors: Array) -> float:
-        """Larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre."""
+        """Return the relative error of E for relative errors of the three moduli, shape (3,).
+
+        It is the larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre.
+        """
         modulus = self.modulus
 
         def ratios(moduli: Array) -> Array:
             changed = float(self.constants_of(moduli)[0])
-            return np.array([changed / modulus, modulus / changed if changed > 0 else np.inf])
+            inverse = modulus / changed if changed > 0 else np.inf
+            return np.array([changed / modulus, inverse])
 
-        return float(largest_change(ratios, self.moduli, self._known_errors(errors)).max())
+        return float(self._largest_change(ratios, errors).max())
 
 
 def largest_change(
     function: Callable[[Array], Array | float], values: Array, errors: Array
 ) -> Array:
-    """Largest absolute change of a function at the corners of a box around its arguments.
+    """Return the largest change of a function at the corners of a box around its arguments.
 
     Args:
-        function: Monotone in each of its n values over the box.
+        function: Monotone in each of its n arguments over the box.
         values: Arguments, positive, shape (n,).
-        errors: Each value runs from value/(1 + error) to value·(1 + error); nan gives nan.
+        errors: Each argument runs from value/(1 + error) to value·(1 + error); nan gives nan.
     """
     value = np.asarray(function(values))
     if not np.isfinite(errors).all():
         return np.full(value.shape, np.nan)
-    corners = product(*((1 / (1 + error), 1 + error) for error in errors))
-    changes = [abs(np.asarray(function(values * factors)) - value) for factors in corners]
+    changes = []
+    for signs in product((-1, 1), repeat=len(values)):
+        changed = np.asarray(function(values * (1 + errors) ** np.array(signs)))
+        changes.append(abs(changed - value))
     return np.asarray(np.max(changes, axis=0))

@@ -49,7 +49,7 @@ def test_the_first_order_misses_complex_moduli_by_the_square_of_the_losses():
     gaps = []
     for scale in (1, 0.5, 0.25):
         exact = loss_factors(result, losses * scale)  # above a tenth, by complex moduli
-        values, _ = first_order(result.energies, losses * scale, result.constants_of)
+        values, _ = first_order(result.energies, losses * scale, constants_of=result.constants_of)
         gaps.append(abs(values / [*exact.values.values()] - 1))
     slopes = np.log2(np.array(gaps[:-1]) / gaps[1:])
     assert (abs(slopes - 2) < 0.1).all()
