@@ -9,7 +9,7 @@ from dataclasses import replace
 from inspect import signature
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.result import Bounds, Ends, Nature
+from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
@@ -51,8 +51,6 @@ def propagate(
     alpha: Sequence[float] | None = None,
     knowledge: Knowledge | None = None,
     budget: int = BUDGET,
-    units: Mapping[str, str] | None = None,
-    on_failure: Literal["raise", "skip"] = "raise",
     shared: Sequence[str] = (),
     vectorised: bool = False,
     workers: int = 1,
@@ -73,9 +71,6 @@ def propagate(
         knowledge: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
         budget: Evaluations that the call may take, stored ones among them. Methods that know their
             samples beforehand refuse to begin; a search ends, and says so.
-        units: Unit of each output by name, for texts, tables and drawings.
-        on_failure: "raise" ends the call where a sample failed, after all others have been run;
-            "skip" leaves such samples out: the bounds are then attained only.
         shared: Inputs whose equality lets samples share one call. The function then takes a list of
             mappings of names to numbers that agree in them, and returns a list of outputs.
         vectorised: Whether the function takes arrays, shape (n,), and returns arrays whose first
@@ -96,7 +91,7 @@ def propagate(
     Raises:
         RefusedError: An argument is wrong, or the budget does not carry the method.
         CampaignError: Samples failed; the others were run first, and are in the store.
-        FailedError: The store cannot be written, a worker died, or a cut has no sample.
+        FailedError: The store cannot be written, or a worker died.
 
     Example:
         >>> from alphacut.fuzzy import Interval, Triangular
@@ -109,7 +104,6 @@ def propagate(
     domain = Domain(joined_inputs(inputs), alpha_levels)
     method = method or Automatic()
     _require_method(method)
-    require_choice("on_failure", on_failure, ("raise", "skip"))
     is_allowed = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(is_allowed, "executor", value=executor, allowed=allowed)
@@ -128,15 +122,13 @@ def propagate(
             progress=report,
             store=sample_store,
             model=model,
-            skip=on_failure == "skip",
         )
-        bounds = _note_failures(method.run(campaign, domain), campaign.failed)
+        bounds = method.run(campaign, domain)
         campaign.report(1.0)
     if bounds.encloses:
         bounds = bounds.without_attained()
     return replace(
         bounds,
-        units=_units(units or {}, bounds.outputs),
         evaluations=len(campaign),
         samples=campaign.samples,
         budget=budget,
@@ -151,40 +143,6 @@ def _require_method(method: Plan) -> None:
     allowed = "an object such as General() or Signed()"
     cure = "demos/random_inputs.py shows random inputs beside fuzzy ones"
     require(is_plan, "method", value=repr(method), allowed=allowed, cure=cure)
-
-
-def _note_failures(bounds: Bounds, failed: int) -> Bounds:
-    """Return the bounds; if samples failed, as attained ones with a note on their number."""
-    if not failed:
-        return bounds
-    note = f"{failed} samples failed and were left out: the true range may reach further there"
-    return replace(
-        bounds,
-        nature=Nature.ATTAINED,
-        natures=(),
-        error=np.zeros_like(bounds.lower),
-        basis=(),
-        inner=None,
-        notes=(*bounds.notes, note),
-    )
-
-
-def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the unit of each output, "" if none is given, or nothing if there are no units.
-
-    Args:
-        units: Unit by the name of an output. The unit of "s11" is that of "s11[0]", too.
-        outputs: Names of the outputs.
-
-    Raises:
-        RefusedError: A name is no output.
-    """
-    if not units:
-        return ()
-    array_of = {name: name.partition("[")[0] for name in outputs}
-    for name in units:
-        require_choice("unit of", name, sorted(set(array_of) | set(array_of.values())))
-    return tuple(units.get(name, units.get(array, "")) for name, array in array_of.items())
 
 
 class Shares(NamedTuple):

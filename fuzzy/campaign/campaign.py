@@ -27,7 +27,7 @@ from alphacut.fuzzy.campaign.call import (
 from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import completed
 from alphacut.fuzzy.knowledge.known import Knowledge
-from alphacut.fuzzy.sets.boxes import Domain, quasi_random_points
+from alphacut.fuzzy.sets.boxes import Domain
 
 LOG = logging.getLogger(__name__)
 
@@ -44,10 +44,8 @@ class Campaign:
         progress: Called with the completed fraction, 0 … 1.
         store: Where samples are kept; None keeps none.
         model: Key of the model in the store.
-        skip: Whether samples that fail are left out (NaN) instead of ending the campaign.
 
     Attributes:
-        failed: Samples left out.
         layout: Names and shapes of the outputs, as the first sample has them.
 
     Raises:
@@ -61,8 +59,6 @@ class Campaign:
     progress: Callable[[float], None] | None = None
     store: Store | None = None
     model: bytes = b""
-    skip: bool = False
-    failed: int = 0
     layout: Layout = ()
     _rows: dict[bytes, Array] = field(default_factory=dict)  # outputs by the bytes of the point
     _samples: Samples | None = None
@@ -91,38 +87,15 @@ class Campaign:
         return self._samples
 
     def output_names(self, domain: Domain) -> tuple[str, ...]:
-        """Return the names of all outputs, columns of every sample.
-
-        The nominal point is evaluated; if it fails and may, other points of the widest box.
+        """Evaluate the nominal point, and return the names of all outputs, columns of every sample.
 
         Raises:
-            CampaignError: No sample succeeds.
+            CampaignError: The sample failed.
         """
-        # 16 points of the widest box are tried where samples may fail.
-        unit = quasi_random_points(len(domain.names), 16)
-        lower, upper = domain.boxes
-        others = lower[0] + unit * (upper[0] - lower[0])
-        failures: list[tuple[dict[str, float], str]] = []
-        failed_points = []
-        for point in np.vstack([domain.nominal, others]):
-            try:
-                columns = self(point[None]).columns
-            except CampaignError as error:
-                if not self.skip:
-                    raise
-                failures += error.failures
-                failed_points.append(point + 0.0)
-                continue
-            # Only now it is known how many columns the failed points have.
-            without_value = np.full(len(columns), np.nan)
-            self._rows |= {failed.tobytes(): without_value for failed in failed_points}
-            self._samples = None
-            self.failed += len(failed_points)
-            return columns
-        raise CampaignError(failures, len(failures), "mend the function, or narrow its inputs")
+        return self(domain.nominal[None]).columns
 
     def __call__(self, points: Array) -> Values:
-        """Return the outputs at the points (n, inputs), in their order; NaN where one failed.
+        """Return the outputs at the points (n, inputs), in their order.
 
         Only points that were not evaluated before cost evaluations.
 
@@ -141,21 +114,25 @@ class Campaign:
             self._samples = None
         return Values(self.layout, np.array([self._rows[key] for key in keys]))
 
-    def _run(self, points: Array) -> Array:
-        """Evaluate new points (n, inputs) and return their outputs (n, columns), NaN if failed."""
+    def _run(self, points: Array) -> list[Array]:
+        """Evaluate new points (n, inputs), and return the outputs of each, shape (columns,).
+
+        Raises:
+            CampaignError: Samples failed; raised after all others have been evaluated.
+        """
         outcomes = _evaluate(self, points)
         LOG.debug("%d samples, %d before", len(points), len(self))
-        failures = {row: x.error for row, x in outcomes.items() if isinstance(x, Failure)}
-        if failures and not (self.skip and self.layout):
-            names = self.call.names
-            pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
-            raise CampaignError(pairs, len(points), 'on_failure="skip" leaves them out')
-        self.failed += len(failures)
-        width = len(Values(self.layout, np.zeros((0, 0))).columns)
-        outputs = np.full((len(points), width), np.nan)
-        for row, outcome in outcomes.items():
-            if isinstance(outcome, Sample):
-                outputs[row] = outcome.row
+        failures = []
+        outputs = []
+        for row in range(len(points)):
+            outcome = outcomes[row]
+            if isinstance(outcome, Failure):
+                failures.append((named_point(self.call.names, points[row]), outcome.error))
+            else:
+                outputs.append(outcome.row)
+        if failures:
+            cure = "mend the function, or narrow its inputs"
+            raise CampaignError(failures, len(points), cure)
         return outputs
 
     def checked(self, outcome: Outcome) -> Outcome:

@@ -80,11 +80,9 @@ def negligible(values: Array) -> Array:
     rounding errors of 1e-16.
 
     Args:
-        values: Values of samples, shape (n, outputs); NaN for none.
+        values: Values of samples, shape (n, outputs).
     """
-    magnitude = np.nanmax(np.abs(values), axis=0)
-    output_range = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
-    return np.asarray(1e-11 * (output_range + magnitude))
+    return np.asarray(1e-11 * (np.ptp(values, axis=0) + np.abs(values).max(axis=0)))
 
 
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
@@ -94,13 +92,13 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
 
     Args:
         points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
-        values: Output at the samples, shape (n,); NaN for none.
+        values: Output at the samples, shape (n,).
         signs: +1, −1, or 0 where nothing is stated, shape (inputs,); inputs without a sign must be
             equal in both samples.
     """
     # All pairs of 400 samples are 160,000 rows of inputs; more samples would take much memory.
     max_samples = 400
-    rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]  # NaN are sorted last
+    rows = np.argsort(values)
     evenly = np.linspace(0, len(rows) - 1, min(len(rows), max_samples)).astype(int)
     rows = rows[np.unique(evenly)]
 

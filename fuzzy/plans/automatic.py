@@ -220,10 +220,10 @@ def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
     differences = np.diff(values, axis=0) * directions[:, None]
     by_input = differences.reshape(SEARCH.walk_points, inputs, -1)  # (steps, inputs, outputs)
 
-    # A sign is known where all differences have it, and none is without a value.
+    # A sign is known where all differences have it.
     falls = (by_input < -tolerance).any(axis=0)
     rises = (by_input > tolerance).any(axis=0)
-    is_unknown = (falls & rises) | np.isnan(by_input).any(axis=0)
+    is_unknown = falls & rises
     # An input that has an effect here and none there moves the output off a plateau, of which
     # corners tell nothing.
     is_tied = np.abs(by_input) <= SEARCH.tie * np.abs(values).max(axis=0)
@@ -329,7 +329,7 @@ def _climb_staircases(
         tolerance = negligible(campaign.samples.values.array)[columns]
         # By the signs the output falls from its upper corner on, and rises from its lower one.
         changes = side * first_signs * np.diff(values, axis=0)
-        contradicts = ~(changes <= tolerance)  # True also where a sample failed
+        contradicts = changes > tolerance
         keeps_signs &= ~contradicts.any(axis=0)
         by_input = contradicts.reshape(count, inputs, -1)
         n_turns = (by_input[1:] != by_input[:-1]).sum(axis=0)

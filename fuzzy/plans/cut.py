@@ -89,7 +89,7 @@ class CutSearch:
             bound: Output, and sign by which it is multiplied.
 
         Returns:
-            Values of shape (n,), infinite where the sample failed.
+            Values of shape (n,).
 
         Raises:
             SpentError: The budget does not carry the evaluations.
@@ -97,14 +97,13 @@ class CutSearch:
         if not len(unit):
             return np.empty(0)
         outputs = self.campaign(self.points(unit))
-        values = bound.sign * outputs.array[:, outputs.column(bound.output)]
-        return np.where(np.isnan(values), np.inf, values)
+        return bound.sign * outputs.array[:, outputs.column(bound.output)]
 
     def output_range(self, output: str) -> float:
         """Return the range of an output over all samples, the unit of its slopes; 1 if it is 0."""
         values = self.campaign.samples.values
         column = values.array[:, values.column(output)]
-        span = float(np.nanmax(column) - np.nanmin(column))
+        span = float(np.ptp(column))
         return span if span >= np.finfo(float).tiny else 1.0
 
     def largest_slope(self, point: Array, output: str) -> float:
@@ -118,7 +117,7 @@ class CutSearch:
 
         Returns:
             The slope, in ranges of the output over the width of the cut; 0 if all inputs are at an
-            end, or no sample beside the point has a value.
+            end.
         """
         step = SEARCH.large_difference
         unit = self.unit(point[None])[0]
@@ -127,9 +126,7 @@ class CutSearch:
         # At a kink the slopes to both sides differ, so that one of them is not small.
         probes = np.concatenate([unit[None], unit + steps, unit - steps])
         values = self.values(probes, Bound(output, 1.0))
-        around = values[1:]
-        differences = np.abs(around[np.isfinite(around)] - values[0])
-        slopes = differences / step / self.output_range(output)
+        slopes = np.abs(values[1:] - values[0]) / step / self.output_range(output)
         return float(slopes.max(initial=0.0))
 
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
@@ -153,11 +150,8 @@ class CutSearch:
             """Return the change of sign · output from the start, in ranges, and its gradient."""
             difference = SEARCH.difference
             steps = np.where(unit + difference > 1, -difference, difference)
-            points = self.points(np.concatenate([unit[None], unit + np.diag(steps)]))
-            outputs = self.campaign(points)
-            values = bound.sign * outputs.array[:, outputs.column(bound.output)]
-            # A sample without a value counts as very bad, so that the line search turns back.
-            changes = np.nan_to_num((values - start_value) / output_range, nan=1e6)
+            values = self.values(np.concatenate([unit[None], unit + np.diag(steps)]), bound)
+            changes = (values - start_value) / output_range
             return float(changes[0]), (changes[1:] - changes[0]) / steps
 
         # The first step of L-BFGS-B is the gradient itself. The objective is multiplied by a factor

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut.base.arrays import Array, Mask
+from alphacut.base.errors import RefusedError
 from alphacut.fuzzy.campaign.call import Samples
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
@@ -40,16 +39,13 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
 
     Args:
         domain: Inputs and levels.
-        samples: Points, and values that are NaN where a sample failed and was skipped.
+        samples: Points and values, one or more in each cut.
         method: Name of the method.
-
-    Raises:
-        FailedError: A cut has no sample with a value of some output.
     """
     values = samples.values.array
-    inside = domain.inside(samples.points)
-    min_rows = _rows_of_minima(values, inside, domain.alpha)  # (levels, outputs)
-    max_rows = _rows_of_minima(-values, inside, domain.alpha)
+    rows_by_level = [np.flatnonzero(is_inside) for is_inside in domain.inside(samples.points)]
+    min_rows = np.array([rows[values[rows].argmin(axis=0)] for rows in rows_by_level])
+    max_rows = np.array([rows[values[rows].argmax(axis=0)] for rows in rows_by_level])
     columns = np.arange(values.shape[1])
     return Bounds(
         alpha=np.array(domain.alpha),
@@ -63,27 +59,6 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
         inputs=domain.inputs,
         method=method,
     )
-
-
-def _rows_of_minima(values: Array, inside: Mask, alpha: Sequence[float]) -> Ints:
-    """Return the row of the smallest value of each output on each level, shape (levels, outputs).
-
-    Args:
-        values: Values of the samples, shape (samples, outputs); NaN for none.
-        inside: Whether each sample lies in the cut of each level, shape (levels, samples).
-        alpha: Levels, for the message.
-
-    Raises:
-        FailedError: A cut has no sample with a value of some output.
-    """
-    usable = np.where(np.isnan(values), np.inf, values)
-    rows_by_level = []
-    for level, is_inside in zip(alpha, inside, strict=True):
-        rows = np.flatnonzero(is_inside)
-        if not len(rows) or np.isinf(usable[rows].min(axis=0)).any():
-            raise FailedError(f"no sample of the cut at α = {level:g} has a value")
-        rows_by_level.append(rows[usable[rows].argmin(axis=0)])
-    return np.array(rows_by_level)
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:

@@ -72,8 +72,7 @@ def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -
 
     Args:
         unit: Samples in unit coordinates, shape (n, inputs).
-        values: Their values, shape (n,); the smaller of two is the better. Samples with an infinite
-            value are not returned.
+        values: Their values, shape (n,); the smaller of two is the better.
         distance: The distance in unit coordinates.
     """
     from scipy.spatial import cKDTree
@@ -87,7 +86,7 @@ def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -
             second_rows[values[second_rows] > values[first_rows]],
         ]
     )
-    return np.setdiff1d(np.flatnonzero(np.isfinite(values)), worse_rows)
+    return np.setdiff1d(np.arange(len(values)), worse_rows)
 
 
 def with_farthest_points(unit: Array, known: Array, rng: np.random.Generator) -> Array:
@@ -126,9 +125,7 @@ def with_farthest_points(unit: Array, known: Array, rng: np.random.Generator) ->
 def samples_on_plateaus(values: Array) -> Mask:
     """Return which samples have the value of another sample, to rounding, shape (n,)."""
     order = np.argsort(values)
-    with np.errstate(invalid="ignore"):  # ∞ − ∞ of two failed samples is NaN, which is not equal
-        differences = np.diff(values[order])
-    is_equal_to_next = differences <= _tie_tolerance(values)
+    is_equal_to_next = np.diff(values[order]) <= _tie_tolerance(values)
     is_tied = np.zeros(len(values), bool)
     is_tied[order] = np.append(is_equal_to_next, False) | np.append(False, is_equal_to_next)
     return is_tied
@@ -136,8 +133,7 @@ def samples_on_plateaus(values: Array) -> Mask:
 
 def _tie_tolerance(values: Array) -> float:
     """Return the difference below which two of the values count as equal."""
-    magnitudes = np.abs(values[np.isfinite(values)])
-    return float(SEARCH.tie * magnitudes.max(initial=0.0))
+    return float(SEARCH.tie * np.abs(values).max(initial=0.0))
 
 
 @dataclass
@@ -392,7 +388,7 @@ class SingleLinkage:
             samples = self.campaign.samples
             inside = cut.contains(samples.points)
             values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
-            best = int(np.nanargmin(values))
+            best = int(values.argmin())
             if values[best] < state.best.value - self._tolerance(bound):
                 start = cut.unit(samples.points[inside][best][None])[0]
                 self._descend_from(cut, bound, start)
@@ -516,7 +512,7 @@ class SingleLinkage:
 
     def _tolerance(self, bound: Bound) -> float:
         """Return the difference below which two values of the output count as one."""
-        values = self._values[bound][np.isfinite(self._values[bound])]
+        values = self._values[bound]
         return value_tolerance(float(np.ptp(values)), float(np.abs(values).max()))
 
     def _rows(self, cut: CutSearch) -> Ints:
@@ -548,7 +544,6 @@ class SingleLinkage:
         outputs = self.campaign(points)
         for bound, values in self._values.items():
             added = bound.sign * outputs.array[:, outputs.column(bound.output)]
-            added[np.isnan(added)] = inf
             self._values[bound] = np.concatenate([values, added])
         self._points = np.concatenate([self._points, points])
         self._levels = np.concatenate([self._levels, np.full(len(points), cut.level)])

@@ -336,7 +336,7 @@ def _observed_signs(
     """
     free = np.flatnonzero((stated == 0).any(axis=0))
     nominal_slopes = _slopes(model, lower, upper, points=nominal[None], inputs=free)[0]
-    first = np.nan_to_num(np.sign(nominal_slopes)).astype(np.int8)
+    first = np.sign(nominal_slopes).astype(np.int8)
     corners = _extreme_corners(np.where(stated != 0, stated, first), lower, upper)
     inside = lower + quasi_random_points(len(lower), 4) * (upper - lower)
     probes = np.concatenate([nominal[None], corners, inside])
