@@ -36,7 +36,7 @@ from alphacut.figures.envelope import time_axes
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, PURPLE, Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.methods.graph_follower import Followed, GraphFollower
+from alphacut.frame.methods.graph_follower import FollowedSteps, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal
 from alphacut.io.provenance import NESTED
@@ -564,6 +564,7 @@ def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
     upper) the follower guesses the best stored graph, and may compute a new one.
     """
     run, column = followed_run(results, task)
+    assert run.storage is not None
     flow, points = run.storage.flow, run.storage.points
     time, graphs = flow.time, flow.values(points)[..., column]  # (T,), (graphs, T)
     guess, new = run.guess[0, :, column], run.new[0, :, column]  # graphs by (node, side); −1: none
@@ -608,8 +609,8 @@ def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
     return figure
 
 
-def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
-    """Bounds and graphs of a Graph Follower at α = 0; the column of the highest displacement."""
+def followed_run(results: Results, task: EnvelopeTask) -> tuple[FollowedSteps, int]:
+    """Return the steps of a Graph Follower at α = 0, and the column of the highest displacement."""
     structure, step = results.structure, task.section.step
     assert structure is not None
     cuts, tolerance = boxes(structure.inputs(task.fuzzy), (0.0,)), task.tolerance(structure)
@@ -619,7 +620,8 @@ def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
     column = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for refinement in (1.0, 1e-2, 1e-4, 1e-8):  # until a new graph is computed, to have one to show
         gain = refinement * task.section.gain * tolerance.value
-        run = GraphFollower(tolerance=gain).follow(flow)
+        run = FollowedSteps()
+        GraphFollower(tolerance=gain).run(flow, steps=run)
         if (run.new[0, :, column] >= 0).any():
             break
     return run, column

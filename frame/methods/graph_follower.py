@@ -12,7 +12,7 @@ trajectory of the outputs over time a graph. The implementation differs from it 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -140,6 +140,24 @@ class Storage:
         return ModelMaxima(self.top[places] + gain(g, H, x), np.clip(center + x, lower, upper))
 
 
+@dataclass
+class FollowedSteps:
+    """What the Graph Follower did at each place, for drawings of its steps (Figs. 21 to 23).
+
+    `GraphFollower.run` fills these fields.
+
+    Attributes:
+        storage: All graphs.
+        guess: Index of the best stored graph when a node was reached, shape (levels, times,
+            outputs, 2).
+        new: Index of the better graph that was computed there, or -1, same shape.
+    """
+
+    storage: Storage | None = None
+    guess: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    new: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+
+
 @dataclass(frozen=True)
 class GraphFollower:
     """Graph Follower: envelopes of any structure from few trajectories ("graphs").
@@ -166,12 +184,23 @@ class GraphFollower:
         require(self.order in (1, 2), "order", value=self.order, allowed=allowed)
         checked_number("tolerance", self.tolerance, positive=True)
 
-    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+    def run(
+        self,
+        flow: UnitFlow,
+        progress: Progress | None = None,
+        *,
+        steps: FollowedSteps | None = None,
+    ) -> Envelope:
         """Return the envelope of all outputs on all levels.
 
         The error is estimated: it is the gain that the models still predict, and twice the amount
         by which an independent sample exceeds the bounds. If neighbouring trajectories diverge
         there is no estimate, and the bounds are attained only.
+
+        Args:
+            flow: Response as a function of unit coordinates.
+            progress: Reports the completed fraction.
+            steps: If given, it is filled with what was done at each place.
         """
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis])
@@ -179,6 +208,11 @@ class GraphFollower:
         bounds = np.zeros(shape)
         predicted_gain = np.zeros(shape)
         best = np.full(shape, -1)
+        if steps is None:
+            steps = FollowedSteps()
+        steps.storage = storage
+        steps.guess = np.full(shape, -1)
+        steps.new = np.full(shape, -1)
         limit = self.tolerance * flow.scale[:, np.newaxis]  # gain worth a graph, (outputs, 1)
         bend = float(self.order > 1)
         for level, tick in flow.boxes.inside_out(subprogress(progress, 0.0, 0.8)):
@@ -188,6 +222,7 @@ class GraphFollower:
             target = maxima.point.reshape(*storage.top.shape, -1)
             for node in range(len(flow.time)):
                 tick(node / len(flow.time))
+                steps.guess[level, node] = storage.best[node]
                 is_worth_a_graph = predicted[node] > storage.top[node] + limit
                 points: list[Array] = []
                 for point in target[node][is_worth_a_graph]:
@@ -195,8 +230,11 @@ class GraphFollower:
                     if is_new and not storage.holds(point):
                         points.append(point)
                 if points:
-                    # Predictions at later nodes change where one of the new graphs is the best.
+                    first_new = len(storage)
                     improved = storage.add(np.array(points))
+                    is_from_new = storage.best[node] >= first_new
+                    steps.new[level, node] = np.where(is_from_new, storage.best[node], -1)
+                    # Predictions at later nodes change where one of the new graphs is the best.
                     is_later = improved[0] > node
                     later = tuple(indices[is_later] for indices in improved)
                     maxima = storage.predicted(later, box, local_maximum, bend=bend)
