@@ -190,7 +190,7 @@ def test_a_mutated_case_is_read_or_refused_in_lines(tmp_path, capfd, text):
         draw = random.Random(seed + trial)
         case = written(tmp_path, "")
         case.write_bytes(mutated(text, draw).encode("utf-8", "surrogatepass"))
-        status = main(["check", str(case)])
+        status = main(["check", str(case), "--quiet"])
         _, err = capfd.readouterr()
         label = f"seed {seed + trial}: {err[:300]}"
         assert status in (0, 2), label

@@ -1,0 +1,321 @@
+"""What a run of a case will take: its pieces are counted, and small parts of the work are timed.
+
+No speed of a machine is assumed. A motion is computed for parts of its duration, an image on parts
+of its pixels, particles are packed into some of their windows, and one record of a suite stands for
+all. Work that reports its progress evenly is begun and interrupted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from alphacut.base.arrays import Ints
+from alphacut.case.content import Content
+from alphacut.case.material import ImageCell, RadiusMapSection
+from alphacut.case.microstructure import MicrostructureSection
+from alphacut.case.motion import EnvelopeSection
+from alphacut.case.structure import Structure
+from alphacut.frame import Probability
+from alphacut.frame import envelope as frame_envelope
+from alphacut.frame.analyses.peaks import PEAK_ERROR
+from alphacut.frame.analyses.tolerances import scale_supports
+from alphacut.frame.methods.auto import Auto
+from alphacut.fuzzy import Triangular, propagate
+from alphacut.rve.fuzzy_cell import FuzzyCell, proved_signs
+from alphacut.rve.image.study import (
+    AlphaLevel,
+    FuzzyImageStiffness,
+    GreyImage,
+    ImageStudy,
+    solve_study,
+)
+from alphacut.stages import answers, envelope, identify, microstructure, modulus, suite
+from alphacut.stages.answers import Response
+from alphacut.stages.cell import CellProblem
+from alphacut.stages.envelope import FOLLOWERS, EnvelopeTask
+from alphacut.stages.foreseen import Material, possible_materials
+from alphacut.stages.image import study_of
+from alphacut.stages.store import Stage, StageContext, no_progress
+
+PARTS = (1 / 64, 1 / 64, 1 / 32, 1 / 16)
+"""Fractions of a work that are timed, one after the other; the first part compiles as well."""
+LONG_ENOUGH = 2.0
+"""Seconds of parts, or of work that was begun, after which no more is timed: more of it would tell
+more, but let the user of `check` wait."""
+FEWEST = 5
+"""Packings that tell how far their statistics vary, the fewest that a case may have."""
+FOLLOWED = 1.7
+"""Power of the nodes done to which the time of a Graph Follower grows, as measured: 1.2 where few
+trajectories are computed, 2 where their number grows with the nodes."""
+
+
+class Foreseen(NamedTuple):
+    """What a stage of a run will take by one process.
+
+    Args:
+        stage: Name of the stage.
+        number: Number of its pieces.
+        pieces: What its pieces are.
+        seconds: Time of all of them, in s.
+    """
+
+    stage: str
+    number: int
+    pieces: str
+    seconds: float
+
+
+def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
+    """Yield what the stages of a run of a case will take, but the shares of inputs and figures.
+
+    Raises:
+        FailedError: A part of the work fails, as the whole may.
+        RefusedError: A part of the work is refused, as the whole may be.
+    """
+    material = None
+    if "microstructure" in content.stages and content.microstructure is not None:
+        found, radius = _particles(content.microstructure, spheres=content.has_spheres)
+        content = content.model_copy(update={"radius": radius})
+        yield found
+    if "modulus" in content.stages:
+        if content.image_cell is not None:
+            found, material = _image(content.image_cell, content)
+            yield found
+        else:
+            problem = CellProblem.of(content, petsc)
+            seconds = begun_seconds(modulus.stage(problem), has_setup=True)
+            yield Foreseen("modulus", sample_count(problem), "samples", seconds)
+    if "envelope" in content.stages and content.envelope is not None:
+        yield from _motion(content, content.envelope, material)
+
+
+def whole_seconds(run: Callable[[float], float]) -> float:
+    """Return about how many seconds a work takes, from the times of small parts of it.
+
+    The time of a part x of the work is taken as a + b x, where a is what every part takes once.
+    Both are fitted to the times of parts by least squares of the relative errors.
+
+    Args:
+        run: Function that does about a fraction of the work, and returns the fraction done.
+    """
+    parts, seconds = list[float](), list[float]()
+    for fraction in PARTS:
+        start = perf_counter()
+        parts.append(run(fraction))
+        seconds.append(perf_counter() - start)
+        if sum(seconds[1:]) > LONG_ENOUGH or seconds[0] > 2 * LONG_ENOUGH:
+            break
+    compiling = max(0.0, seconds[0] - seconds[:2][-1])  # of the same part, done once more
+    if len(parts) < 3:  # parts so long consist of what every part takes once
+        return compiling + seconds[-1]
+    if len(set(parts)) == 1:  # a work so small has no smaller parts
+        return compiling + seconds[-1] / parts[-1]
+    timed = np.array(seconds[1:])
+    slope, constant = np.polyfit(parts[1:], timed, 1, w=1 / timed)
+    return compiling + float(max(slope + constant, timed.max()))
+
+
+class InterruptedWorkError(Exception):
+    """Work that was only begun; its argument is the time that all of it would take, in s."""
+
+
+def begun_seconds(stage: Stage[Any], *, has_setup: bool = False, power: float = 1.0) -> float:
+    """Return about how many seconds a stage takes: it is begun, and interrupted by its progress.
+
+    Args:
+        stage: A stage that reports its progress evenly.
+        has_setup: Whether the first piece builds what all share. The time of others is then
+            reckoned from its end on.
+        power: Power of the progress to which the time grows.
+    """
+    start = perf_counter()
+    setup_end = list[tuple[float, float]]()
+
+    def tick(done: float) -> None:
+        seconds = perf_counter() - start
+        if not done:
+            return
+        if has_setup and not setup_end:
+            setup_end.append((seconds, done))
+        first_seconds, first_done = setup_end[0] if has_setup else (0.0, 0.0)
+        if seconds - first_seconds > LONG_ENOUGH and done > first_done:
+            fraction = ((done - first_done) / (1 - first_done)) ** power
+            raise InterruptedWorkError(first_seconds + (seconds - first_seconds) / fraction)
+
+    try:
+        stage.compute(StageContext(tick=tick))
+    except InterruptedWorkError as interrupted:
+        return float(interrupted.args[0])
+    return perf_counter() - start
+
+
+def _particles(
+    section: MicrostructureSection, *, spheres: bool
+) -> tuple[Foreseen, RadiusMapSection]:
+    """Return what the radius map of particles takes, and the one of the fewest packings allowed."""
+    part, number, fewest, pieces = section, 1, 1, "sections"
+    if (packing := section.packing) is not None:
+        number, fewest, pieces = packing.packings, min(packing.packings, FEWEST), "packings"
+        fewer = packing.model_copy(update={"packings": fewest})
+        part = section.model_copy(update={"packing": fewer})
+    start = perf_counter()
+    numbers = microstructure.stage(part, spheres=spheres).compute(StageContext()).numbers
+    seconds = (perf_counter() - start) * number / fewest
+    radius = RadiusMapSection.model_validate(numbers["radius"])
+    return Foreseen("microstructure", number, pieces, seconds), radius
+
+
+def sample_count(problem: CellProblem) -> int:
+    """Return how many samples the plan of a cell takes, where no results lead to further ones."""
+    cell = FuzzyCell.of(problem.nominal_radius, problem.nominal_phases, problem.inputs)
+    bounds = propagate(
+        lambda **_: dict.fromkeys(modulus.OUTPUTS, 1.0),
+        cell.inputs,
+        modulus.PLANS[problem.modulus.plan],
+        alpha=problem.modulus.alpha,
+        knowledge=proved_signs(problem.model(), cell),
+        progress=False,
+    )
+    return bounds.evaluations
+
+
+def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
+    """Return what the bounds of an image or a volume take, and the material of a part of it."""
+    study, section, solved = study_of(cell), content.modulus, list[FuzzyImageStiffness]()
+    alpha, average = section.alpha, section.average
+
+    def run(fraction: float) -> float:
+        part = cropped(study, fraction)
+        solved.append(
+            solve_study(part, alpha=alpha, average=average, device="cpu", tick=no_progress)
+        )
+        return float(part.image.values.size / study.image.values.size)
+
+    found = Foreseen("image", len(alpha), "levels", whole_seconds(run))
+    if content.has_stated_modulus and not content.has_material_damping:
+        return found, Material()
+    largest = solved[-1]
+    return found, Material(largest.modulus, largest.loss_factor)
+
+
+def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
+    """Return the study of about a fraction of the pixels, around the middle of the image."""
+    values = study.image.values
+    window = []
+    for length in values.shape:
+        size = max(min(length, 4), round(length * fraction ** (1 / values.ndim)))
+        first = (length - size) // 2
+        window.append(slice(first, first + size))
+    place = tuple(window)
+
+    def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
+        least, greatest = study.phase_ranges(level)
+        return least[place], greatest[place]
+
+    image = GreyImage(values[place], study.image.lengths)
+    return replace(study, image=image, phase_ranges=phase_ranges)
+
+
+def _motion(
+    content: Content, section: EnvelopeSection, material: Material | None
+) -> Iterator[Foreseen]:
+    """Yield what motions take, of a structure of the material of its cell, if that is known."""
+    structure = _structure(content, material)
+    if content.identify is not None:
+        start = perf_counter()
+        _, structure = identify.identify_inputs(content.identify, structure, section.alpha)
+        yield Foreseen("identify", 1, "campaigns", perf_counter() - start)
+    (own_task,) = envelope.tasks(section, ())
+    if content.records is not None:
+        yield from _records(content, structure, own_task)
+        return
+    tasks = envelope.tasks(section, content.study, content.limited_outputs)
+    seconds = sum(_envelope_seconds(structure, task) for task in tasks)
+    yield Foreseen("envelopes", len(tasks), "studies", seconds)
+    yield from _answers(content, structure, own_task)
+
+
+def _structure(content: Content, material: Material | None) -> Structure:
+    """Return the structure with a fuzzy modulus where stage modulus will give one.
+
+    Where neither the case nor a part of stage modulus says how fuzzy it is, it is taken a tenth to
+    either side.
+    """
+    structure = content.structure_of(*(material or possible_materials(content)[0]))
+    if "modulus" not in content.stages or content.modulus.alpha == (1.0,):
+        return structure
+    numbers = dict(structure.numbers)
+    for name, number in numbers.items():
+        is_computed = name == "E" or (content.has_material_damping and name.startswith("zeta"))
+        if is_computed and number.support.width == 0:
+            middle = number.nominal
+            numbers[name] = Triangular(0.9 * middle, middle, 1.1 * middle)
+    return replace(structure, numbers=numbers)
+
+
+def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]:
+    """Return a task of about a fraction of the duration of a motion, and that fraction."""
+    steps = round(task.duration / task.section.step)
+    count = min(steps, max(8, round(fraction * steps)))
+    return replace(task, duration=count * task.section.step), count / steps
+
+
+def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
+    """Return what the envelope of a study takes, in s."""
+    if task.section.method in FOLLOWERS:
+        return begun_seconds(envelope.stage(structure, task), power=FOLLOWED)
+
+    def run(fraction: float) -> float:
+        part, done = shortened(task, fraction)
+        envelope.stage(structure, part).compute(StageContext())
+        return done
+
+    return whole_seconds(run)
+
+
+def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
+    """Yield what the peaks under the records of a suite take, from those under one of them."""
+    assert content.records is not None
+    records = suite.suite_records(content.records, task.section, structure)
+    limited = tuple(dict.fromkeys((*structure.outputs, *content.limited_outputs)))
+    task = replace(task, limited=limited)
+    durations = [record.duration for record in records]
+    typical = records[int(np.argsort(durations)[len(records) // 2])]
+    start = perf_counter()
+    suite.stage(structure, task, typical).compute(StageContext())
+    seconds = (perf_counter() - start) * sum(durations) / typical.duration
+    yield Foreseen("records", len(records), "records", seconds)
+    question = content.incremental_question
+    if question is not None:
+        analyses = suite.analyses_of(question, structure, task, records)
+        foreseen = [analysis.foresee() for analysis in analyses.values()]
+        motions = round(sum(count for count, _ in foreseen))
+        yield Foreseen("fragility", motions, "motions", sum(time for _, time in foreseen))
+
+
+def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
+    """Yield what the questions take that compute motions of their own."""
+    if (section := content.questions.get("probability")) is not None:
+        stage = answers.stage(Probability, section, Response(structure, task))
+        yield Foreseen("probability", 1, "campaigns", begun_seconds(stage))
+    if (section := content.questions.get("tolerances")) is not None:
+        assert content.tolerances is not None
+        inputs = scale_supports(structure.inputs(task.fuzzy), content.tolerances.most)
+        names = [limit.output for limit in section.limits_of(structure)]
+        model, method = structure.model.with_outputs(names), Auto(PEAK_ERROR, peaks=True)
+
+        def run(fraction: float) -> float:
+            part, done = shortened(task, fraction)
+            times: dict[str, Any] = {"duration": part.duration, "step": part.section.step}
+            frame_envelope(model, inputs, method, **times, alpha=[0.0], progress=False)
+            return done
+
+        # Two scales are tried first, then the interval between them is halved to a hundredth.
+        count = 2 + math.ceil(math.log2(100))
+        yield Foreseen("tolerances", count, "envelopes", count * whole_seconds(run))
