@@ -82,6 +82,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     section = content.structure_section
     if section is not None:
         text += "".join(f"warning: {line}\n" for line in section.warnings(structure))
+    if structure is not None:
         text += motion_text(content, structure)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
