@@ -47,12 +47,16 @@ class CellContent(Section, defer_build=True):
     @property
     def image_cell(self) -> ImageCell | None:
         """The cell if it is an image."""
-        return self.cell if isinstance(self.cell, ImageCell) else None
+        if isinstance(self.cell, ImageCell):
+            return self.cell
+        return None
 
     @property
     def particle_cell(self) -> RoundCell | None:
         """The cell if it has one particle."""
-        return self.cell if isinstance(self.cell, RoundCell) else None
+        if isinstance(self.cell, RoundCell):
+            return self.cell
+        return None
 
     @property
     def has_spheres(self) -> bool:
@@ -69,12 +73,16 @@ class CellContent(Section, defer_build=True):
     @property
     def mesh_cell(self) -> MeshedCell | None:
         """The cell if its mesh comes from a file."""
-        return self.cell if isinstance(self.cell, MeshedCell) else None
+        if isinstance(self.cell, MeshedCell):
+            return self.cell
+        return None
 
     @property
     def radius_map(self) -> RadiusMapSection | None:
         """The radius map of [radius], if there is one."""
-        return self.radius if isinstance(self.radius, RadiusMapSection) else None
+        if isinstance(self.radius, RadiusMapSection):
+            return self.radius
+        return None
 
     @property
     def random_cell(
@@ -129,12 +137,15 @@ class CellContent(Section, defer_build=True):
         is_computed = "microstructure" in self.stages
         has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell
         for stage in self.stages:
-            if stage == "modulus" and not has_map:
+            if stage != "modulus":
+                self._require_section(stage, stage)
+                continue
+            if not has_map:
                 self._require_section(stage, "radius")
-            self._require_section(stage, "cell" if stage == "modulus" else stage)
-        source = "stage microstructure" if is_computed else "cell.fraction"
-        is_repeated = self.radius is not None and (is_computed or has_fraction)
-        require_alone("radius", is_repeated, source)
+            self._require_section(stage, "cell")
+        has_radius = self.radius is not None
+        require_alone("radius", has_radius and is_computed, "stage microstructure")
+        require_alone("radius", has_radius and has_fraction, "cell.fraction")
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
         if self.cell is not None:
             method, methods = self.modulus.method, self.cell.methods

@@ -65,9 +65,11 @@ class Content(CellContent):
         """Peaks that questions compare with limits, each once, such as q3 and max q3."""
         peaks: dict[str, None] = {}
         for section in self.questions.values():
-            for limit in section.limits if section.reads_peaks else ():
-                # the mean over records follows from the peaks under each
-                peaks[limit.output if limit.side == "mean" else limit.peak] = None
+            if not section.reads_peaks:
+                continue
+            for limit in section.limits:
+                is_mean = limit.side == "mean"  # over records; it follows from the peaks under each
+                peaks[limit.output if is_mean else limit.peak] = None
         return tuple(peaks)
 
     @property
@@ -98,7 +100,9 @@ class Content(CellContent):
     def structure(self) -> Structure | None:
         """The structure, with stand-ins for what is yet to be computed; built once."""
         section = self.structure_section
-        return None if section is None else with_forces(section.nominal, self.force, section.places)
+        if section is None:
+            return None
+        return with_forces(section.nominal, self.force, section.places)
 
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -171,7 +175,9 @@ class Content(CellContent):
         """Return the structure; refuse a case with none or several."""
         structure, n_sections = self.structure, len(self.structure_sections)
         if structure is None or n_sections > 1:
-            value = f"beside {n_sections - 1} more" if n_sections else None
+            value = None
+            if n_sections:
+                value = f"beside {n_sections - 1} more"
             *names, last = (f"[{name}]" for name in sorted(STRUCTURES))
             raise RefusedError("frame", value, f"one of {', '.join(names)} and {last}")
         return structure
@@ -212,9 +218,11 @@ class Content(CellContent):
             envelope: What holds for all studies.
             structure: The structure. What a stage will make fuzzy may be crisp in it.
         """
-        computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
+        computed = "(?!)"  # which matches no name
         if self.has_material_damping:
             computed = r"E|zeta\d*"
+        elif "modulus" in self.stages:
+            computed = "E"
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")
         for output in study.figures:
@@ -222,9 +230,9 @@ class Content(CellContent):
         envelope.require_steps(f"{key}.duration", study.duration)
         for number, force in enumerate(self.force, start=1):
             history, allowed = force.history.history, f"a start below {key}.duration"
-            start = 0.0 if history is None else history.start
-            key_of_start = f"force[{number}].history"
-            require(start < study.duration, key_of_start, f"from {start:g} s", allowed)
+            if history is not None:
+                key_of_start, value = f"force[{number}].history", f"from {history.start:g} s"
+                require(history.start < study.duration, key_of_start, value, allowed)
 
 
 Case = ParsedCase[Content]

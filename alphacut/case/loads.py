@@ -46,18 +46,22 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     numbers = [word for word in words if word != "static" and not word.startswith("from ")]
     is_static = "static" in words
     n_options = len(words) - len(numbers)
-    is_harmonic = kind == "harmonic"
-    has_its_numbers = len(numbers) in (1, 2) if is_harmonic else not numbers
-    has_its_options = n_options <= (0 if kind == "impulse" else 1)
-    fits = has_its_numbers and has_its_options and not (is_static and is_harmonic)
-    require(fits, "", value, HISTORY)
     if kind == "impulse":
+        require(not words, "", value, HISTORY)
         return ForceHistory(None, "N*s")
+    if kind == "harmonic":
+        fits = len(numbers) in (1, 2) and n_options <= 1 and not is_static
+    else:
+        fits = not numbers and n_options <= 1
+    require(fits, "", value, HISTORY)
     try:
-        start = quantity.parse_number(starts[0], "s") if starts else 0.0
-        if is_harmonic:
-            frequency = quantity.parse_number(numbers[0], "Hz")
-            phase = quantity.parse_number(numbers[1], "rad") if len(numbers) == 2 else 0.0
+        start = 0.0
+        if starts:
+            start = quantity.parse_number(starts[0], "s")
+        if kind == "harmonic":
+            frequency, phase = quantity.parse_number(numbers[0], "Hz"), 0.0
+            if len(numbers) == 2:
+                phase = quantity.parse_number(numbers[1], "rad")
             return ForceHistory(History.harmonic(frequency, phase, start))
         if kind == "step":
             return ForceHistory(History.constant(start, is_static=is_static))
@@ -177,17 +181,16 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     """Return the scale that a factor such as 1.2 or a text such as "PGA = 0.3 g" states."""
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = [part.strip() for part in str(value).partition("=")]
-    has_measure = bool(equals)
     try:
-        if has_measure:
+        if equals:
             number = quantity.parse_number(size, "m/s^2")
         else:
-            number = quantity.parse_number(value, "")
+            number, measure = quantity.parse_number(value, ""), ""
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    is_known = measure in ("PGA", "Sa(T1)") or not has_measure
+    is_known = measure in ("PGA", "Sa(T1)") or not equals
     require(number > 0 and is_known, "", value, allowed)
-    return Scale(number, measure if has_measure else "")
+    return Scale(number, measure)
 
 
 Files = Annotated[tuple[Recording, ...], text(_read_recordings)]

@@ -104,9 +104,9 @@ class PhaseSection(Section):
     def require_consistent(self) -> None:
         """Refuse a Poisson's ratio beside a stiffness, and Young's modulus without one."""
         is_isotropic, has_ratio = isinstance(self.modulus, FuzzyNumber), self.poisson is not None
-        value = "with poisson" if has_ratio else "without poisson"
         allowed = "poisson beside Young's modulus, none beside a stiffness"
-        require(is_isotropic == has_ratio, "", value, allowed)
+        require(has_ratio or not is_isotropic, "", "without poisson", allowed)
+        require(is_isotropic or not has_ratio, "", "with poisson", allowed)
 
     @property
     def nominal(self) -> Phase | VoigtPhase:
@@ -223,7 +223,9 @@ class RoundCell(Section):
     def stiffness(self) -> VoigtPhase | None:
         """The particle where it is not isotropic."""
         modulus = self.inclusion_modulus
-        return modulus if isinstance(modulus, VoigtPhase) else None
+        if isinstance(modulus, VoigtPhase):
+            return modulus
+        return None
 
     @property
     def particle_kind(self) -> str:
@@ -266,15 +268,16 @@ class RoundCell(Section):
     @property
     def loss_names(self) -> tuple[str, ...]:
         """Names of the loss factors as inputs, in the order of `losses`."""
-        return LOSSES if self.losses else ()
+        return LOSSES[: len(self.losses)]
 
     def require_consistent(self) -> None:
         """Refuse unknown shapes, keys too few or too many, and touching particles."""
         outline = self.outline or circle  # refuses unknown shapes
         has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
-        value = "there" if has_ratio else "missing"
+        key = "cell.inclusion_poisson"
         allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(is_isotropic == has_ratio, "cell.inclusion_poisson", value, allowed)
+        require(has_ratio or not is_isotropic, key, "missing", allowed)
+        require(is_isotropic or not has_ratio, key, "there", allowed)
         is_solved = is_isotropic or self.particles != "spheres"
         key, allowed = "cell.inclusion_modulus", "Young's modulus of spheres"
         require(is_solved, key, "a plane stiffness", allowed)
@@ -327,7 +330,9 @@ class ImageCell(Section):
 
     def _of_phases(self, values: tuple[FuzzyNumber, ...]) -> tuple[FuzzyNumber, ...]:
         """Return one value for each phase; a single one holds for all of them."""
-        return values * len(self.modulus) if len(values) == 1 else values
+        if len(values) == 1:
+            return values * len(self.modulus)
+        return values
 
     @property
     def is_solid(self) -> list[bool]:
@@ -342,7 +347,9 @@ class ImageCell(Section):
     def require_consistent(self) -> None:
         """Refuse two keys for the same thing or neither, and numbers of values that do not fit."""
         self._require_one("threshold", "labels")
-        n_phases = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
+        n_phases = len(self.labels or ())
+        if self.threshold:
+            n_phases = len(self.threshold) + 1
         counts = {"modulus": (n_phases,), "poisson": (1, n_phases), "loss": (0, 1, n_phases)}
         for key, fitting in counts.items():
             n_values, allowed = len(getattr(self, key) or ()), f"one for each of {n_phases} phases"
@@ -361,8 +368,9 @@ class ImageCell(Section):
     def _require_one(self, key: str, other: str) -> None:
         """Refuse both of two keys, and neither."""
         is_there, has_other = bool(getattr(self, key)), bool(getattr(self, other))
-        value = f"beside cell.{other}" if is_there else None
-        require(is_there != has_other, f"cell.{key}", value, f"one of cell.{key} and cell.{other}")
+        allowed = f"one of cell.{key} and cell.{other}"
+        require(is_there or has_other, f"cell.{key}", None, allowed)
+        require(not (is_there and has_other), f"cell.{key}", f"beside cell.{other}", allowed)
 
     @property
     def dimension(self) -> int:

@@ -43,8 +43,11 @@ class PackingSection(Section):
     @property
     def radii(self) -> RadiusDistribution:
         """The law of the radii."""
-        ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both are there, or a file
-        return MeasuredRadii.read(self.file) if self.file else LogNormalRadii(*ends)
+        if self.file is not None:
+            return MeasuredRadii.read(self.file)
+        assert self.smallest_radius is not None
+        assert self.largest_radius is not None
+        return LogNormalRadii(self.smallest_radius, self.largest_radius)
 
     def require_readable(self, *, spheres: bool) -> None:
         """Refuse a fraction that does not pack, and radii that are none."""
@@ -74,7 +77,9 @@ class PackingSection(Section):
     def require_consistent(self) -> None:
         """Refuse a file of radii beside their ends, and one end alone or none without a file."""
         ends = (self.smallest_radius, self.largest_radius)
-        fits = None not in ends if self.file is None else ends == (None, None)
+        fits = None not in ends
+        if self.file is not None:
+            fits = ends == (None, None)
         key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
         require(fits, key, "beside or without ends", allowed)
 
@@ -137,5 +142,5 @@ class MicrostructureSection(Section):
     def require_consistent(self) -> None:
         """Refuse several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
-        value = f"with {count} of them" if count else None
-        require(count == 1, "microstructure", value, allowed)
+        require(count > 0, "microstructure", None, allowed)
+        require(count == 1, "microstructure", f"with {count} of them", allowed)

@@ -68,7 +68,9 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
     if isinstance(value, str):
         word, plus, joints = value.partition("+")
         if word.strip() == "material":
-            return MaterialDamping(_ratio(joints.strip())) if plus else MaterialDamping()
+            if plus:
+                return MaterialDamping(_ratio(joints.strip()))
+            return MaterialDamping()
     if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
         return tuple(_ratio(entry) for entry in value)
     return (_ratio(value),)
@@ -103,13 +105,16 @@ class Structure:
     @property
     def floor_masses(self) -> tuple[FuzzyNumber, ...]:
         """Masses of a frame's floors in kg; none of other structures."""
-        names = self.model.group("m") if self.model.floors else ()
-        return tuple(self.numbers[name] for name in names)
+        if not self.model.floors:
+            return ()
+        return tuple(self.numbers[name] for name in self.model.group("m"))
 
     @property
     def linear(self) -> LinearSystem | None:
         """The model if it is linear, at least until columns yield; else None."""
-        return self.model if has_matrices(self.model) else None
+        if has_matrices(self.model):
+            return self.model
+        return None
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -312,7 +317,9 @@ class Frame(StructureSection):
         """Return one value for each floor; a single one holds for all of them."""
         if not values:
             return ()
-        return values * self.floors if len(values) == 1 else values
+        if len(values) == 1:
+            return values * self.floors
+        return values
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -354,7 +361,7 @@ class Frame(StructureSection):
 
         stated: dict[str, FuzzyNumber | None] = {
             "E": young,
-            "I": self.second_moment[0] if self.second_moment else None,
+            "I": next(iter(self.second_moment or ()), None),
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
             **ratios,

@@ -123,12 +123,16 @@ class CellProblem:
     @property
     def average(self) -> str | None:
         """Average of a plane stiffness that the case asks for; None of spheres."""
-        return None if self.cell.particles == "spheres" else self.modulus.average
+        if self.cell.particles == "spheres":
+            return None
+        return self.modulus.average
 
     @property
     def average_name(self) -> str:
         """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
-        return "spheres" if self.average is None else AVERAGES[self.average]
+        if self.average is None:
+            return "spheres"
+        return AVERAGES[self.average]
 
     def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
         """Return the model that the sections name.
@@ -179,7 +183,9 @@ class CellProblem:
         else:
             cell = self.nominal
             result = model.solve(cell.radius_map, cell.matrix, [cell.inclusion])[0]
-        return result if self.average is None else result.with_average(self.average)
+        if self.average is None:
+            return result
+        return result.with_average(self.average)
 
     def references(self) -> References:
         """Return the particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
@@ -236,7 +242,9 @@ def key_and_unit(name: str) -> tuple[str, float]:
 
     They are E_x_GPa and 1e9 of E_x, nu_xy and 1 of nu_xy.
     """
-    return (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
+    if name.startswith("nu"):
+        return name, 1.0
+    return f"{name}_GPa", GPA
 
 
 def constant_label(key: str) -> str:

@@ -55,14 +55,19 @@ def foreseen_material(content: Content) -> Material | None:
         # the loss factor of a phase's Young's modulus is that of its K and of its G
         losses = np.array([[number.nominal] * 2 for number in cell.losses])
         loss = Crisp(loss_factors(result, losses).values["E"])
-    modulus = None if content.has_stated_modulus else Crisp(result.modulus)
-    return Material(modulus, loss)
+    if content.has_stated_modulus:
+        return Material(loss=loss)
+    return Material(Crisp(result.modulus), loss)
 
 
 def foreseen_structure(content: Content) -> Structure | None:
     """Return the structure at the cell's nominal values; None where these, or it, are not known."""
-    material = None if content.structure is None else foreseen_material(content)
-    return None if material is None else content.structure_of(*material)
+    if content.structure is None:
+        return None
+    material = foreseen_material(content)
+    if material is None:
+        return None
+    return content.structure_of(material.modulus, material.loss)
 
 
 def possible_materials(content: Content) -> tuple[Material, ...]:
@@ -84,7 +89,7 @@ def structure_as_computed(content: Content, material: Material) -> Structure:
     Raises:
         RefusedError: There is no such structure.
     """
-    structure = content.structure_of(*material)
+    structure = content.structure_of(material.modulus, material.loss)
     if "modulus" not in content.stages:
         return structure
     has_cuts = content.modulus.alpha != (1.0,)

@@ -204,7 +204,9 @@ def require_levels(alpha: tuple[float, ...], key: str) -> None:
 
 def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
     """Return the fuzzy loss factor of E; None where the phases have none."""
-    return _number(data, "loss_E") if "loss_E" in data else None
+    if "loss_E" not in data:
+        return None
+    return _number(data, "loss_E")
 
 
 def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:

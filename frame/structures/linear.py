@@ -71,7 +71,9 @@ class Assembly(Generic[Number]):
     @property
     def stiffness(self) -> Number:
         """K, shape (…, n, n), in N/m."""
-        return self.springs if self.weights is None else self.springs - self.weights
+        if self.weights is None:
+            return self.springs
+        return self.springs - self.weights
 
     @property
     def forces(self) -> Number | None:
@@ -178,7 +180,9 @@ def histories(system: LinearSystem) -> dict[str, History]:
 
     Their order is that of the columns of `Matrices.pushes`.
     """
-    named: dict[str, History] = {} if system.ground is None else {"load": system.ground}
+    named: dict[str, History] = {}
+    if system.ground is not None:
+        named["load"] = system.ground
     for number, history in enumerate(distinct_histories(system.loads), start=1):
         named[f"force{number}"] = history
     return named
@@ -308,7 +312,6 @@ def evaluate(
     if full.ratios and by_ratios:
         damping = damping + modal_damping(mass, stiffness, full.ratios)
 
-    forces, static, impulse = full.forces, full.static, full.impulse
     matrices = Matrices(
         mass=mass,
         damping=damping,
@@ -317,9 +320,9 @@ def evaluate(
         v0=full.v0[:, a, None],
         rigid=full.pattern[a, None],
         accelerated=full.accelerated[:, a],
-        forces=None if forces is None else forces[:, a],
-        static=None if static is None else static[:, a],
-        impulse=None if impulse is None else impulse[:, a],
+        forces=_rows_of(full.forces, a),
+        static=_rows_of(full.static, a),
+        impulse=_rows_of(full.impulse, a),
     )
     if full.accelerated.any():
         # the absolute acceleration is q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f, whose last term
@@ -327,6 +330,13 @@ def evaluate(
         on_forces = matrices.accelerated @ matrices.inverse_mass
         rows = rows - on_forces @ concatenate([stiffness, damping], -1)
     return matrices, full.row_factors[..., None] * rows
+
+
+def _rows_of(forces: Jet | None, unknowns: Ints) -> Jet | None:
+    """Return the rows of some unknowns, of forces (S, n, k); None where there are none."""
+    if forces is None:
+        return None
+    return forces[:, unknowns]
 
 
 def undamped_modes(mass: Array, stiffness: Array) -> tuple[Array, Array]:

@@ -131,7 +131,10 @@ class MatrixStructure(LinearSystem):
         """Refuse damping ratios outside [0, 1), and a number of them that is not that of modes."""
         is_allowed = len(self.ratios) in (0, 1, len(self.massive))
         for ratio in self.ratios:
-            value = self.parameters.get(ratio, np.nan) if isinstance(ratio, str) else ratio
+            if isinstance(ratio, str):
+                value = self.parameters.get(ratio, np.nan)
+            else:
+                value = ratio
             is_allowed = is_allowed and Parameter("", range=RATIO).admits(value, value)
         allowed = f"one number or parameter, or one a mode, {RATIO}"
         require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
@@ -215,7 +218,9 @@ class MatrixStructure(LinearSystem):
 
     def parameter(self, name: str) -> Parameter:
         """Return a parameter, whose range is known where it is a damping ratio."""
-        return Parameter(name, range=RATIO if name in self.ratios else "")
+        if name in self.ratios:
+            return Parameter(name, range=RATIO)
+        return Parameter(name)
 
     def with_outputs(self, names: Sequence[str]) -> Self:
         """Return the structure, observed at some of its outputs alone."""
@@ -274,7 +279,9 @@ class MatrixStructure(LinearSystem):
         self._require_factor(kind, factor)
         if isinstance(factor, Monomial):
             factor = factor.simplest
-        array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
+        if hasattr(value, "toarray"):
+            value = value.toarray()
+        array = np.asarray(value)
         size, key = np.shape(self.mass[0][1])[0], f"array of {kind}"
         what, allowed = f"of shape {array.shape}", f"({size}, {size})"
         cure = "all matrices have as many rows and columns as there are unknowns"
@@ -358,7 +365,9 @@ class MatrixStructure(LinearSystem):
 
     def _start(self, values: Array | None, zero: Number) -> Number:
         """Return initial values as a number of the type of `zero`; 0 where none are given."""
-        given = np.zeros(self.size) if values is None else values
+        given: Array = np.zeros(self.size)
+        if values is not None:
+            given = np.asarray(values)
         return zero.like(np.broadcast_to(given, (*zero.value.shape, self.size)))
 
     @cached_property
@@ -392,7 +401,9 @@ def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     """Return the value of a factor: a number, the name of a parameter, or a function of them."""
     if isinstance(factor, str):
         return p[factor]
-    return factor(p) if callable(factor) else factor
+    if callable(factor):
+        return factor(p)
+    return factor
 
 
 def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
@@ -475,7 +486,9 @@ class Monomial:
         if not self.powers:
             return self.coefficient
         is_name = self.powers == ((str(self), 1),)
-        return str(self) if is_name else self
+        if is_name:
+            return str(self)
+        return self
 
     def __call__(self, p: Mapping[str, Any]) -> Any:
         """Return the value at parameters, numbers, arrays or anything with × and powers."""

@@ -49,11 +49,10 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     _require_numbers_alone(name, body)
 
     sizes = _numbers(name, body[0]) if body else np.empty(0)
-    n_sizes = 3 if is_sparse else 2
+    n_sizes, cure = 2, "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
+    if is_sparse:
+        n_sizes, cure = 3, "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
-    cure = "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
-    if not is_sparse:
-        cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
     shape = int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))
     require_size(name, shape, max_rows)
@@ -148,7 +147,9 @@ def _by_columns(name: str, entries: Array, shape: tuple[int, int], *, is_symmetr
         RefusedError: There are more or fewer entries than the shape has.
     """
     n_rows, n_columns = shape
-    expected = n_rows * (n_rows + 1) // 2 if is_symmetric else n_rows * n_columns
+    expected = n_rows * n_columns
+    if is_symmetric:
+        expected = n_rows * (n_rows + 1) // 2
     require(len(entries) == expected, name, f"{len(entries)} numbers", f"{expected}")
     if not is_symmetric:
         return entries.reshape(n_columns, n_rows).T.copy()

@@ -17,6 +17,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import (
+    RefusedError,
     checked_number,
     require,
     require_choice,
@@ -211,7 +212,9 @@ class StoreyFrame(LinearSystem):
             beside = ", ".join(name for name in given if name != "lengths")
             allowed = "either stiffness or what makes it"
             require(not beside, beside, value="there", allowed=allowed)
-            needed, alternative = ["lengths"] if self.gravity else [], ""
+            needed, alternative = [], ""
+            if self.gravity:
+                needed = ["lengths"]
         for name in needed:
             cure = f"give {name}, as {examples[name]} in SI{alternative}"
             require(name in given, name, value=None, allowed=SPRING_KEYS, cure=cure)
@@ -236,7 +239,9 @@ class StoreyFrame(LinearSystem):
     @property
     def moments(self) -> tuple[float, ...]:
         """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
-        return () if self.second_moment is None else tuple(np.atleast_1d(self.second_moment))
+        if self.second_moment is None:
+            return ()
+        return tuple(np.atleast_1d(self.second_moment))
 
     @property
     def entry_roundings(self) -> int:
@@ -246,12 +251,16 @@ class StoreyFrame(LinearSystem):
     @property
     def ratios(self) -> dict[str, float]:
         """Damping ratios by the names of their parameters; empty where there are none."""
-        return {} if self.damping_ratio is None else _named("zeta{}", self.damping_ratio)
+        if self.damping_ratio is None:
+            return {}
+        return _named("zeta{}", self.damping_ratio)
 
     @cached_property
     def parameters(self) -> dict[str, float]:
         """Nominal values of all parameters by name, in SI units; of lists, one for each floor."""
-        named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
+        named: dict[str, float] = {}
+        if self.modulus is not None:
+            named["E"] = self.modulus
         named |= _named("I{}", self.moments)
         lists = ["stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"]
         for name in (*lists, "yield_force", "yield_drift", "hardening"):
@@ -267,16 +276,21 @@ class StoreyFrame(LinearSystem):
         """Names of the loads' amplitudes in their order: "F3", "F3_2" of a second one; "J3"."""
         names: list[str] = []
         for force in self.loads:
-            symbol = "J" if force.history is None else "F"  # J of an impulse
-            name = f"{symbol}{force.at}"
+            name = f"F{force.at}"
+            if force.history is None:
+                name = f"J{force.at}"  # of an impulse
             n_before = sum(other.partition("_")[0] == name for other in names)
-            names.append(f"{name}_{n_before + 1}" if n_before else name)
+            if n_before:
+                name += f"_{n_before + 1}"
+            names.append(name)
         return tuple(names)
 
     @property
     def dynamics(self) -> Dynamics:
         """Linear, unless columns yield."""
-        return Dynamics.YIELDING if self.hardening else Dynamics.LINEAR
+        if self.hardening:
+            return Dynamics.YIELDING
+        return Dynamics.LINEAR
 
     def parameter(self, name: str) -> Parameter:
         """Return a parameter with its unit and range."""
@@ -327,7 +341,10 @@ class StoreyFrame(LinearSystem):
         """
         if self.stiffness:
             return self._of_floors("k{}", p)
-        inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
+        if len(self.moments) > 1:
+            inertia = self._of_floors("I{}", p)
+        else:
+            inertia = p["I"][..., None]
         rigidity = 12.0 * p["E"][..., None] * inertia  # 24 E I / l³ of two columns in section 6.1
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
@@ -429,12 +446,14 @@ class StoreyFrame(LinearSystem):
         if self.hardening:
             kinds += ["residual", "ductility", "dissipated"]
         pattern = rf"({'|'.join(kinds)})([1-9]\d*)"
-        match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
-        kind, floor = (match[1], int(match[2])) if match else ("", 0)
+        if name == "base_shear":
+            return "shear", 0
+        match = re.fullmatch(pattern, name)
         words = f"{', '.join(kinds[:-1])} or {kinds[-1]}"
         allowed = f"{words} with a floor from 1 to {self.floors}, base_shear, {MOMENT}"
-        require(0 < floor <= self.floors, "output", value=name, allowed=allowed)
-        return kind, floor - 1
+        if match is None or int(match[2]) > self.floors:
+            raise RefusedError("output", name, allowed)
+        return match[1], int(match[2]) - 1
 
     def stability_coefficients(self, ends: Mapping[str, tuple[float, float]]) -> Array:
         """Return the largest P_z / (k_z l_z) of each storey in a box, P_z the weight above.
@@ -479,7 +498,9 @@ class StoreyFrame(LinearSystem):
         p: dict[str, Jet] = {}
         for name, nominal in self.parameters.items():
             low, high = ends.get(name, (nominal, nominal))
-            worst = high if name[0] in worst_when_high else low
+            worst = low
+            if name[0] in worst_when_high:
+                worst = high
             p[name] = Jet.constant(np.array([worst]), 0)
         return _Storeys(
             stiffness=self.springs(p).value[0],
