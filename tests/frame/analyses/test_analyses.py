@@ -268,3 +268,12 @@ def test_random_inputs_have_the_shape_of_their_membership(rng):
     six_deviations = 6 / np.sqrt(20_000)
     assert abs(draws.mean() - 4 / 3) < np.sqrt(7 / 18) * six_deviations
     assert abs((draws < 1).mean() - 1 / 3) < np.sqrt(2 / 9) * six_deviations
+
+
+def test_the_table_of_a_decision_has_a_row_for_each_limit_and_one_for_any_of_them(proved):
+    limits = [Limit(name, 1.1 * float(peak.upper[0])) for name, peak in proved.items()]
+    head, rows = decide(proved, limits).table()
+    gaps = [row[head.index("gap")] for row in rows]
+    assert all(text.endswith("%") for text in gaps[:-1])  # of single peaks
+    assert (rows[-1][0], gaps[-1], rows[-1][head.index("bound of peak")]) == (ANY, "", "")
+    assert all(row[head.index("verdict")] == "not exceeded" for row in rows)
