@@ -97,8 +97,8 @@ def enclosing_box_words(encloses: str) -> str:
     """Return sentences on bounds that belong to the box around a set with a name."""
     return (
         f"All bounds are those {of_enclosing_box(encloses)}. What is guaranteed holds for"
-        f" {encloses} too, but no point of the box is known to belong to it: nothing is known to be"
-        " reached."
+        f" {encloses} as well, but no point of the box is known to belong to it: nothing is known"
+        " to be reached."
     )
 
 

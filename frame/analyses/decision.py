@@ -176,14 +176,14 @@ class Decision(Answer):
     def words(self) -> str:
         """Return sentences that explain the verdicts."""
         text = (
-            "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
-            " and can be exceeded where a motion is known that does."
-            " Attained bounds show what is possible and exclude nothing."
+            "A limit is not exceeded if no response exceeds it, it is exceeded if every response"
+            " does, and it can be exceeded if a response is known that does. Attained bounds show"
+            " what is possible and exclude nothing."
         )
         if any(part.side == "mean" for part in self.limits.values()):
             text += (
-                " Of a mean over records the proved end is the mean of each record's greatest peak;"
-                " what is reached is the mean of one structure."
+                " The guaranteed bound of a mean over records is the mean of the largest peaks of"
+                " the records; the attained value is the mean of one structure."
             )
         return text
 

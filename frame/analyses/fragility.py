@@ -452,17 +452,18 @@ class Fragility(Answer):
         text = (
             f"Measure: {measure} (T1 = {self.period_s:.4g} s, ζ = {self.damping_ratio:.3g}, at"
             " the most plausible inputs). α is a level of possibility, no probability."
-            " The median is that of the sample of records; a lognormal fit has the geometric mean"
-            " of their measures, and is drawn dotted."
+            " The median is that of the sample of records; the median of the lognormal fit, which"
+            " is drawn dotted, is the geometric mean of their measures."
         )
         if self.increments:
             text += (
-                f" Motions at measures {GRID_RATIO - 1:.0%} apart, and {RESOLUTION:.0%} where the"
-                " answer changes: an exceedance between them may be missed. Upper ends of bands"
-                " count the records under which a structure is known to exceed the limit, lower"
-                " ends those under which all structures found do. Medians reach from those of"
-                " first crossings to those of last non-exceedances. Sets end with the largest"
-                " measure tried; fragility.most tries more."
+                f" Structures were moved at measures {GRID_RATIO - 1:.0%} apart, and"
+                f" {RESOLUTION:.0%} where the result changes; an exceedance between these measures"
+                " may be missed. The upper end of a band counts the records under which a structure"
+                " is known to exceed the limit, the lower end those under which all structures"
+                " found do. Medians range from that of the first crossings to that of the last"
+                " non-exceedances. Sets end with the largest measure that was tried;"
+                " fragility.most tries more."
             )
             collapses = [
                 record
@@ -473,12 +474,12 @@ class Fragility(Answer):
                 text += f" A collapse exceeds every limit: under {', '.join(collapses)}."
         else:
             text += (
-                " No structure within the α-cut exceeds the limit for a share of this suite's"
-                " records outside the band."
+                " For each structure within the α-cut, the fraction of this suite's records under"
+                " which it exceeds the limit lies in the band."
                 " This is damage limitation of a linear structure, not collapse."
             )
         if any(part.confidence for part in self.limits.values()):
-            text += " Dashed: pointwise 95 % limits if the records were independent draws."
+            text += " Dashed: pointwise 95 % limits, if the records are independent draws."
         return text
 
 

@@ -364,8 +364,8 @@ class ScaledPeaks(Answer):
     def words(self) -> str:
         """Return a sentence on what the peaks belong to."""
         return (
-            "Peaks of the structures that were moved; others of the cut may have smaller or greater"
-            " ones. A collapse has an infinite peak."
+            "These are peaks of the structures that were computed; others of the cut may have"
+            " smaller or larger ones. A collapse has an infinite peak."
         )
 
 

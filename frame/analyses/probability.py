@@ -145,11 +145,12 @@ class Probability(Answer):
         """Return sentences on how the probability was computed, and on its interval."""
         random = ", ".join(self.random) or "no input"
         return (
-            f"Random: {random}, with {self.samples} independent draws at each fuzzy point."
-            " The bounds are those of the fuzzy points tried; other points may have more or less."
-            f" With a probability of {CONFIDENCE:.0%} the interval holds the probabilities of all"
-            " fuzzy points at once (Clopper and Pearson, Bonferroni over the points). Peaks are"
-            f" those at nodes every {self.step:g} s; the last column says what lies between them."
+            f"Random: {random}, with {self.samples} independent draws at each fuzzy point. The"
+            " bounds are those of the fuzzy points that were tried; other points may have larger or"
+            f" smaller probabilities. With a probability of {CONFIDENCE:.0%} the interval contains"
+            " the probabilities of all these points at once (Clopper and Pearson, Bonferroni over"
+            f" the points). Peaks are read every {self.step:g} s; the last column says what may be"
+            " added between the nodes."
         )
 
 

@@ -62,8 +62,8 @@ class Sensitivity(Answer):
     def words(self) -> str:
         """Return a sentence that defines the fractions."""
         return (
-            "Share of the width, of peaks between those that motions reach, that is lost when an"
-            " input is fixed at its nominal value."
+            "The fraction of the width that is lost if an input is fixed at its nominal value. The"
+            " width of a peak is the distance between its largest and smallest attained values."
         )
 
 

@@ -282,8 +282,8 @@ class SuitePeaks(Answer):
         """Return sentences on what the peaks and the means belong to."""
         return (
             f"Peaks under {len(self.by_record)} records (T1 = {self.period_s:.4g} s,"
-            f" ζ = {self.damping_ratio:.3g}, at the most plausible inputs). A mean is that of one"
-            " structure's peaks; its bounds are means of the records' bounds."
+            f" ζ = {self.damping_ratio:.3g}, at the most plausible inputs). A mean is the mean of"
+            " the peaks of one structure; its bounds are the means of the bounds under the records."
         )
 
 

@@ -148,8 +148,8 @@ class Tolerances(Answer):
     def words(self) -> str:
         """Return sentences on how to read the scale."""
         return (
-            "All supports are scaled together about nominal values; 1 is the case as it stands."
-            f" Scales up to {self.most:g} were tried, each with an envelope of its own."
+            "All supports are scaled together about the nominal values; 1 is the scale of the case"
+            f" itself. Scales up to {self.most:g} were tried, each with an envelope of its own."
         )
 
 
