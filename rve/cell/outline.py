@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,14 +14,13 @@ from alphacut.base.errors import RefusedError, array_of_call
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
 _ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
-_BENDS = 720
 CLOSEST = 0.9995
-"""Largest reach of what slices mesh: between particles that are nearer elements have no end."""
-_ROUND = 1e-12
+"""Largest reach of what slices mesh, in halves of the cell's side: between particles that are
+nearer elements have no end."""
 
 
 def circle(angle: Array) -> Array:
-    """The default, s = 1."""
+    """Return the outline of a circle, s = 1, which is the default."""
     return np.ones_like(angle)
 
 
@@ -42,11 +42,11 @@ class Ellipse:
             raise RefusedError("aspect of the ellipse", value, "values in [0.25, 4]")
 
     def __call__(self, angle: Array) -> Array:
-        """Distances over ρ at angles."""
+        """Return the distances over ρ at angles."""
         turned = angle - np.radians(self.turn)
-        return np.asarray(
-            1 / np.sqrt(np.cos(turned) ** 2 / self.aspect + np.sin(turned) ** 2 * self.aspect)
-        )
+        along = np.cos(turned) ** 2 / self.aspect
+        across = np.sin(turned) ** 2 * self.aspect
+        return np.asarray(1 / np.sqrt(along + across))
 
 
 def require_outline(outline: object) -> None:
@@ -56,26 +56,37 @@ def require_outline(outline: object) -> None:
 
 
 def is_round(outline: Outline) -> bool:
-    """True for the circle."""
-    return bool(np.ptp(outline(_ANGLES)) < _ROUND)
+    """Return whether an outline is a circle, but for round-off."""
+    return bool(np.ptp(outline(_ANGLES)) < 1e-12)
 
 
 def area(outline: Outline) -> float:
-    """Area for ρ = 1: ∮ s²/2 dφ; π for a circle."""
+    """Return the area for ρ = 1, ∮ s²/2 dφ: π for a circle."""
     return float(np.mean(outline(_ANGLES[:-1]) ** 2) * np.pi)
 
 
+class Extents(NamedTuple):
+    """Extents of an outline for ρ = 1: the largest |x1| and |x2|, and the smallest distance."""
+
+    half_width: float
+    half_height: float
+    min_distance: float
+
+
+def extents(outline: Outline) -> Extents:
+    """Return the extents of an outline."""
+    distances = outline(_ANGLES)
+    return Extents(
+        half_width=float((distances * abs(np.cos(_ANGLES))).max()),
+        half_height=float((distances * abs(np.sin(_ANGLES))).max()),
+        min_distance=float(distances.min()),
+    )
+
+
 def reach(outline: Outline) -> float:
-    """Greatest coordinate on the outline for ρ = 1, below 1/ρ where the particle fits."""
-    wide, high, _ = extents(outline)
-    return max(wide, high)
-
-
-def extents(outline: Outline) -> tuple[float, float, float]:
-    """Greatest |x1| and |x2|, and least distance from the centre, for ρ = 1."""
-    s = outline(_ANGLES)
-    wide, high = (float((s * abs(direction(_ANGLES))).max()) for direction in (np.cos, np.sin))
-    return wide, high, float(s.min())
+    """Return the largest coordinate on the outline for ρ = 1: below 1/ρ the particle fits."""
+    found = extents(outline)
+    return max(found.half_width, found.half_height)
 
 
 def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
@@ -90,15 +101,21 @@ def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
 
 
 def bend_radii(outline: Outline) -> tuple[Array, Array]:
-    """Points x(φ) of an outline of mean radius 1, (n, 2), and bend radii |x'|²/|x''|, (n,).
+    """Return points of an outline with their bend radii, for ρ = 1.
 
-    Derivatives are in the polar angle φ. The bend radius is that of curvature where φ runs evenly
-    along the outline, and less elsewhere.
+    The bend radius is |x'|²/|x''| with derivatives in the polar angle φ. It is that of curvature
+    where φ runs evenly along the outline, and less elsewhere.
+
+    Returns:
+        Points x(φ) at 720 even steps of φ, shape (720, 2), and their bend radii, shape (720,).
     """
-    step = 2 * np.pi / _BENDS
-    angles: Array = np.asarray(np.arange(_BENDS) * step, float)
-    points = outline(angles)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+    count = 720
+    step = 2 * np.pi / count
+    angles: Array = np.asarray(np.arange(count) * step, float)
+    directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = outline(angles)[:, np.newaxis] * directions
+    before = np.roll(points, 1, axis=0)
+    after = np.roll(points, -1, axis=0)
     first = (after - before) / (2 * step)
     second = (after - 2 * points + before) / step**2
     second_norm = np.maximum(np.hypot(*second.T), 1e-12)  # never 0, also where x'' vanishes
