@@ -29,12 +29,6 @@ PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, orde
 EXTRUDE = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"
 COMMENTS, END_OF_COMMENTS = b"$Comments", b"$EndComments"
 FILLED = 1e-6  # of the cell that prisms may leave or take twice
-UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
-MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
-"""Orders of a prism's nodes that put its upper triangle first, and that exchange two vertices."""
-_A, _B, _C = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)  # vertices of the reference triangle
-_AB, _BC, _CA = (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)  # middles of its edges
-_PLANE_PARTS = (_A, _AB, _CA), (_AB, _B, _BC), (_CA, _BC, _C), (_BC, _CA, _AB)
 
 
 def read_grid(path: Path | str) -> PrismGrid:
@@ -134,34 +128,56 @@ def refined(grid: PrismGrid) -> PrismGrid:
         MeshError: Middles of vertical edges lie at θ of their own, so that there is no mid-level.
     """
     assert grid.fixed is not None
-    parts = np.array([part for part in _PLANE_PARTS for _ in range(2)])  # (8, 3, 2)
-    starts = np.tile([0.0, 0.5], len(_PLANE_PARTS))
+    # Nodes of the eight in the reference prism: those of four triangles, each at two heights.
+    parts = np.repeat(_quarters(), 2, axis=0)  # (8, 3, 2)
+    starts = np.tile([0.0, 0.5], len(parts) // 2)
     x, y, z = vertices_and_midpoints().T
     barycentric = np.stack([1 - x - y, x, y], axis=1)
     planar = barycentric @ parts  # (8, 15, 2)
-    heights = starts[:, None] + z / 2
-    at = np.concatenate([planar, heights[..., None]], axis=-1).reshape(-1, 3)
+    heights = starts[:, np.newaxis] + z / 2
+    at = np.concatenate([planar, heights[..., np.newaxis]], axis=-1).reshape(-1, 3)
     shapes = np.asarray(wedge(1).tabulate(0, at)[0]).reshape(len(at), -1)
-    # a node that prisms share has the same weights of the vertices that they share, in sixteenths
+
+    # A node that prisms share has the same weights of the vertices that they share. They are
+    # sixteenths, so that vertex and weight make one whole number.
     across = np.stack([1 - at[:, 0] - at[:, 1], at[:, 0], at[:, 1]], axis=1)
     weights = np.hstack([across * (1 - at[:, 2:]), across * at[:, 2:]])
     sixteenths = np.rint(16 * weights).astype(int)
-    keys = np.where(sixteenths > 0, grid.cells[:, None, :6] * 17 + sixteenths, -1)
+    keys = np.where(sixteenths > 0, grid.cells[:, np.newaxis, :6] * 17 + sixteenths, -1)
     keys = np.sort(keys.reshape(-1, 6), axis=1)
     _, first, nodes = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     points = (shapes @ grid.fixed[grid.cells]).reshape(-1, 3)[first]
     phase = np.repeat(grid.phase, len(parts))
-    prisms = Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names)
-    return grid_of(prisms)
+    return grid_of(Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names))
+
+
+def _quarters() -> Array:
+    """Return the vertices of the four triangles that halve the edges of the reference triangle.
+
+    Shape (4, 3, 2).
+    """
+    a, b, c = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    ab = (a + b) / 2
+    bc = (b + c) / 2
+    ca = (c + a) / 2
+    return np.array([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]])
+
+
+UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
+"""Order of a prism's nodes that puts its upper triangle first."""
+MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
+"""Order of a prism's nodes that exchanges two vertices of its triangles."""
 
 
 def orient(prisms: Prisms) -> Prisms:
     """Reorder the nodes of prisms so that the first triangle is the lower one, counterclockwise."""
-    cells, points = prisms.cells.copy(), prisms.points
+    cells = prisms.cells.copy()
+    points = prisms.points
     is_falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
     cells[is_falling] = cells[is_falling][:, UPSIDE_DOWN]
-    first, second, third = (points[cells[:, k], :2] for k in range(3))
-    a, b = second - first, third - first
+    first = points[cells[:, 0], :2]
+    a = points[cells[:, 1], :2] - first
+    b = points[cells[:, 2], :2] - first
     is_clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
     cells[is_clockwise] = cells[is_clockwise][:, MIRRORED]
     return replace(prisms, cells=cells)

@@ -21,7 +21,12 @@ class MeshError(FailedError):
 
 
 def unknowns(points: Array) -> Ints:
-    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,).
+    """Return the number of each node's unknown, the same for periodic partners, shape (n,).
+
+    It is −1 at the corners.
+
+    Args:
+        points: Positions of the nodes in the cell [−1, 1]², shape (n, 2).
 
     Raises:
         MeshError: A node on a side has no partner within `SAME_PLACE`.
@@ -38,17 +43,31 @@ def unknowns(points: Array) -> Ints:
 
 
 def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
-    """Nodes of the side x = −1 and their partners on x = 1, (k,) each, sorted along the side."""
-    tangential = points[:, 1 - axis]
+    """Return the nodes of two opposite sides, sorted along them.
+
+    Args:
+        points: Positions of all nodes, shape (n, 2).
+        on_side: Whether a node lies on one of the two sides, shape (n,).
+        axis: Coordinate that is −1 on the first side and 1 on the second.
+
+    Returns:
+        Nodes of the first side, and their partners on the second, shape (k,) each.
+
+    Raises:
+        MeshError: A node has no partner.
+    """
+    along = points[:, 1 - axis]
     is_first = points[:, axis] < 0
-    first, second = (np.flatnonzero(on_side & mask) for mask in (is_first, ~is_first))
-    first = first[np.argsort(tangential[first])]
-    second = second[np.argsort(tangential[second])]
+    first = np.flatnonzero(on_side & is_first)
+    second = np.flatnonzero(on_side & ~is_first)
+    first = first[np.argsort(along[first])]
+    second = second[np.argsort(along[second])]
     count = min(len(first), len(second))
-    gaps = abs(tangential[first[:count]] - tangential[second[:count]])
-    if len(first) != len(second) or (gaps > SAME_PLACE).any():
-        unpaired = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
-        coordinate = tangential[max(first, second, key=len)[unpaired]]
+    is_apart = abs(along[first[:count]] - along[second[:count]]) > SAME_PLACE
+    if len(first) != len(second) or is_apart.any():
+        # The first node apart, or the first one of the longer side beyond the end of the other.
+        unpaired = int(np.argmax(np.append(is_apart, True)))
+        coordinate = along[max(first, second, key=len)[unpaired]]
         side = f"x{axis + 1} = ±1 at x{2 - axis} = {coordinate:.6g}"
         raise MeshError(
             f"a node of the sides {side} has no partner on the opposite side",

@@ -67,16 +67,17 @@ class Prisms:
 
 
 def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
-    """Radius of the planar mesh that is moved to all radii of a map: the middle of its range.
+    """Return the radius of the planar mesh that is moved to all radii of a map.
 
-    Rounded to 1/20, in [0.1, 0.9 / reach of the outline].
+    It is the midpoint of their range, rounded to 1/20, in [0.1, 0.9 / reach of the outline], so
+    that many maps have one mesh.
     """
     require_map(radius_map)
-    law = radius_map.distribution
-    radii = radius_map(np.linspace(law.lower, law.upper, 65))
+    distribution = radius_map.distribution
+    radii = radius_map(np.linspace(distribution.lower, distribution.upper, 65))
     require_fit(outline, float(radii.max()))
-    middle = np.round((radii.min() + radii.max()) * 10) / 20
-    return float(np.clip(middle, 0.1, 0.9 / reach(outline)))
+    midpoint = np.round((radii.min() + radii.max()) * 10) / 20
+    return float(np.clip(midpoint, 0.1, 0.9 / reach(outline)))
 
 
 @dataclass(frozen=True)
@@ -137,28 +138,42 @@ class LevelSet(FixedCell):
 
 
 def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
-    """Positions of all nodes of a planar mesh at k radii of its particle, shape (k, n, 2).
+    """Return the positions of all nodes of a planar mesh at radii of its particle.
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     outline and the side of the square. Edge midpoints slide too, so that the layers between a large
     particle and the side bend with it; only an edge across a diagonal of the square, where sliding
     has a kink, stays straight.
+
+    Args:
+        mesh: The mesh at its own radius.
+        radii: Radii, shape (k,).
+
+    Returns:
+        Positions, shape (k, nodes, 2).
     """
-    radius, (x, y) = radii[:, None], mesh.points.T
-    distance, outline = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
+    radius = radii[:, np.newaxis]
+    x, y = mesh.points.T
+    distance = np.hypot(x, y)
+    outline = np.asarray(mesh.outline(np.arctan2(y, x)))
     in_particle = np.zeros(len(distance), bool)
     in_particle[mesh.triangles[mesh.inside]] = True
-    old_edge, new_edge = mesh.radius * outline, radius * outline
-    with np.errstate(divide="ignore", invalid="ignore"):  # at the centre
+    old_edge = mesh.radius * outline
+    new_edge = radius * outline
+    with np.errstate(divide="ignore", invalid="ignore"):  # at the centre, which is in the particle
         side = distance / abs(mesh.points).max(axis=1)  # distance of the square's side on the ray
         stretch = (side - new_edge) / (side - old_edge)
         outer_scale = (new_edge + (distance - old_edge) * stretch) / distance
         scale = np.where(in_particle, radius / mesh.radius, outer_scale)
         scale = np.where(mesh.arc, radius * outline / distance, scale)  # z = 0 of eq. 14
-    points = mesh.points * scale[..., None]
+    points = mesh.points * scale[..., np.newaxis]
+
+    # The ends of an edge across the diagonal x = y or x = −y have x − y or x + y of either sign.
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
-    crosses_diagonal = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
-    straight = np.flatnonzero(crosses_diagonal & ~mesh.arc[mesh.vertices :])
+    crosses_first = (x - y).prod(axis=0) < -1e-12
+    crosses_second = (x + y).prod(axis=0) < -1e-12
+    is_straight = (crosses_first | crosses_second) & ~mesh.arc[mesh.vertices :]
+    straight = np.flatnonzero(is_straight)
     points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
     return np.asarray(points)
 
@@ -202,21 +217,24 @@ class PrismGrid:
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
     def positions(self, radius_map: RadiusMap) -> Array:
-        """(x1, x2, θ) of all nodes at a map, shape (nodes, 3)."""
+        """Return (x1, x2, θ) of all nodes at a map, shape (nodes, 3)."""
         if self.fixed is not None:
             return self.fixed
         levels = self.level_thetas(radius_map.distribution)
-        thetas, blocks = (levels, (levels[1:] + levels[:-1]) / 2), []
-        for theta, xy in zip(thetas, self.positions_by_level(radius_map), strict=True):
-            heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
-            blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
-        return np.concatenate(blocks)
+        on_levels, on_mid_levels = self.positions_by_level(radius_map)
+        mid_levels = (levels[1:] + levels[:-1]) / 2
+        return np.concatenate(
+            [_at_heights(on_levels, levels), _at_heights(on_mid_levels, mid_levels)]
+        )
 
     def positions_by_level(self, radius_map: RadiusMap) -> tuple[Array, Array]:
-        """(x1, x2) of the nodes of levels, (layers + 1, n, 2), and of mid-levels, (layers, v, 2).
+        """Return (x1, x2) of the nodes of all levels and of all mid-levels.
 
-        n is the number of nodes of the plane mesh and v that of its vertices. Not of a mesh that a
-        file gives.
+        It is not for a mesh that a file gives.
+
+        Returns:
+            Positions on levels, shape (layers + 1, nodes of the plane mesh, 2), and on mid-levels,
+            shape (layers, vertices of the plane mesh, 2).
         """
         levels = self.level_thetas(radius_map.distribution)
         mid_levels = (levels[1:] + levels[:-1]) / 2
@@ -224,7 +242,13 @@ class PrismGrid:
         return self._plane_at(radius_map, levels), on_mid_levels
 
     def _plane_at(self, radius_map: RadiusMap, theta: Array) -> Array:
-        """Positions of the plane mesh at each θ, shape (θ, n, 2)."""
+        """Return the positions of the plane mesh at each θ, shape (θ, nodes, 2)."""
         if self.conforming:
             return nodes_at_radii(self.plane, radius_map(theta))
         return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
+
+
+def _at_heights(positions: Array, theta: Array) -> Array:
+    """Return positions (x1, x2, θ) from (x1, x2) on levels of θ, shape (levels · nodes, 3)."""
+    heights = np.broadcast_to(theta[:, np.newaxis, np.newaxis], (*positions.shape[:2], 1))
+    return np.concatenate([positions, heights], axis=2).reshape(-1, 3)

@@ -18,24 +18,29 @@ from alphacut.rve.fenicsx import basix
 SLICES_PER_LAYER = 3  # Gauss points along θ
 POINTS_PER_SLICE = 6  # quadrature points of each slice of a wedge
 PRISM = basix.CellType.prism
-TRIANGLE_NODES = [0, 1, 2, 6, 7, 9]
-"""Nodes of a wedge on its base: the vertices, the midpoints of edges (0, 1), (0, 2), (1, 2)."""
 
 
 def _span(points: Array) -> Array:
-    """The 15 spanning functions at `points`, shape (n, 3); returns shape (15, n)."""
+    """Return the 15 spanning functions at points, shape (15, n), for points of shape (n, 3)."""
     x, y, z = points.T
     linear = [np.ones_like(x), x, y]
     quadratic = [*linear, x * x, x * y, y * y]
-    return np.array([*quadratic, *(f * z for f in quadratic), *(f * z * z for f in linear)])
+    times_z = [function * z for function in quadratic]
+    times_z_squared = [function * z * z for function in linear]
+    return np.array(quadratic + times_z + times_z_squared)
 
 
 def _points_by_entity() -> list[list[Array]]:
-    """Evaluation points for every vertex, edge, face and the cell, as Basix wants them."""
-    vertices, none = basix.geometry(PRISM), np.zeros((0, 3))
+    """Return the evaluation points of every vertex, edge, face and the cell, as Basix wants them.
+
+    Vertices and edges have one point each, which is the vertex or the midpoint.
+    """
+    vertices = basix.geometry(PRISM)
     topology = basix.topology(PRISM)
+    none = np.zeros((0, 3))
+    corners = [vertex[np.newaxis, :] for vertex in vertices]
     midpoints = [vertices[edge].mean(axis=0, keepdims=True) for edge in topology[1]]
-    return [[v[None, :] for v in vertices], midpoints, [none] * len(topology[2]), [none]]
+    return [corners, midpoints, [none] * len(topology[2]), [none]]
 
 
 @cache
@@ -69,20 +74,29 @@ def wedge(components: int) -> Any:
 
 @cache
 def prism_rule() -> tuple[Array, Array]:
-    """Points (18, 3), by ζ first, and weights, sum 1/2: six of a triangle times three of Gauss."""
+    """Return the quadrature of a prism: six points of a triangle times three of Gauss along ζ.
+
+    Returns:
+        Points, by ζ first, shape (18, 3), and weights, whose sum is the volume 1/2, shape (18,).
+    """
     triangle, planar_weights = basix.make_quadrature(basix.CellType.triangle, 4)
     z, line_weights = basix.make_quadrature(basix.CellType.interval, 5)
     order = np.argsort(z[:, 0])
-    points = np.array([[*xy, z[k, 0]] for k in order for xy in triangle])
+    heights = np.repeat(z[order, 0], len(triangle))
+    points = np.column_stack([np.tile(triangle, (len(order), 1)), heights])
     return points, np.outer(line_weights[order], planar_weights).ravel()
 
 
 def slice_weights() -> Array:
-    """Weights of the points of each slice of the reference prism, shape (3, 6), their sums 1/2."""
+    """Return the weights of the points of each slice of the reference prism, shape (3, 6).
+
+    Their sum over a slice is the area 1/2.
+    """
     weights = prism_rule()[1].reshape(SLICES_PER_LAYER, -1)
     return np.asarray(weights / (2 * weights.sum(axis=1, keepdims=True)))
 
 
 def vertices_and_midpoints() -> Array:
-    """The 15 nodes of the reference prism, shape (15, 3)."""
-    return np.concatenate([point for entity in _points_by_entity()[:2] for point in entity])
+    """Return the 15 nodes of the reference prism, shape (15, 3)."""
+    vertices, midpoints, *_ = _points_by_entity()
+    return np.concatenate(vertices + midpoints)
