@@ -94,17 +94,17 @@ class StiffnessBounds:
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
-        top = float(np.clip(1.5 * max_bulk, min_shear, max_shear))
-        is_space = self.dimension == 3
-        low, high = -np.inf, np.inf
-        if is_space:
-            low = 0.0
+        softest = [min_shear]
+        stiffest = [max_shear]
+        low, high = 0.0, np.inf  # where there is no bound
+        if self.dimension == 2:
+            top = float(np.clip(1.5 * max_bulk, min_shear, max_shear))
+            softest = stiffest = [min_shear, top, max_shear]
+            low = -np.inf
         if self.has_lower:
-            shears = [min_shear] if is_space else [min_shear, top, max_shear]
-            low = min(self._young(shear, min_bulk, side=-1) for shear in shears)
+            low = min(self._young(shear, min_bulk, side=-1) for shear in softest)
         if self.has_upper:
-            shears = [max_shear] if is_space else [min_shear, top, max_shear]
-            high = max(self._young(shear, max_bulk, side=1) for shear in shears)
+            high = max(self._young(shear, max_bulk, side=1) for shear in stiffest)
         return Enclosure(low, high)
 
     def _young(self, shear: float, bulk: float, *, side: int) -> float:
@@ -141,13 +141,17 @@ class StiffnessBounds:
         with np.errstate(divide="ignore"):
             moduli = outwards / np.diagonal([high, low], 0, 1, 2).T
         ratios = [self._lateral_ratio(i, j) for i, j in SHEARS[n]]
-        return np.array([*moduli[:n], *ratios, *moduli[n:]])
+        return np.concatenate([moduli[:n], ratios, moduli[n:]])
 
     @property
     def _compliance(self) -> tuple[Array, Array]:
         """Lower and upper bound of the compliance: 0 and infinite where there is none."""
-        low = inverse_below(self.upper) if self.has_upper else np.zeros_like(self.upper)
-        high = inverse_above(self.lower) if self.has_lower else np.full_like(self.lower, np.inf)
+        low = np.zeros_like(self.upper)
+        high = np.full_like(self.lower, np.inf)
+        if self.has_upper:
+            low = inverse_below(self.upper)
+        if self.has_lower:
+            high = inverse_above(self.lower)
         return low, high
 
     def _lateral_ratio(self, i: int, j: int) -> Enclosure:

@@ -128,8 +128,9 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
     first = _read_picture(by_number[lowest], has_square_pixels=has_square_pixels)
-    require_memory((count, *first.shape))
-    values = np.empty((count, *first.shape), first.dtype)
+    shape = (count, *first.shape)
+    require_memory(shape)
+    values = np.empty(shape, first.dtype)
     for number, file in by_number.items():
         page = _read_picture(file, has_square_pixels=has_square_pixels)
         is_alike = page.shape == first.shape and page.dtype == first.dtype

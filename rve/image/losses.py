@@ -64,10 +64,9 @@ def energy_fractions(
             # c′(0) is between these slopes, and c(0) between low and high
             min_slope = (stiffer[name] - high) / t
             max_slope = (high - softer[name]) / t
-            lower = min_slope / (high if min_slope > 0 else low)
-            upper = max_slope / (low if max_slope > 0 else high)
-            ends = lower - ROUNDING / t, upper + ROUNDING / t
-            fractions[name][k] = np.clip(ends, 0, 1)
+            lower = min(min_slope / low, min_slope / high)
+            upper = max(max_slope / low, max_slope / high)
+            fractions[name][k] = np.clip((lower - ROUNDING / t, upper + ROUNDING / t), 0, 1)
     return fractions
 
 

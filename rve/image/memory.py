@@ -39,7 +39,8 @@ def require_memory(shape: Sequence[int], division: int = 1) -> None:
     if needed > available:
         n = len(shape)
         side = int((available / BYTES_PER_ELEMENT[n]) ** (1 / n) / division)
-        what = f"{' × '.join(map(str, shape))} {'pixels' if n == 2 else 'voxels'}"
+        cells = {2: "pixels", 3: "voxels"}[n]
+        what = f"{' × '.join(map(str, shape))} {cells}"
         allowed = f"up to {available / 1e9:.0f} GB of memory"
         cure = f"crop a piece of {' × '.join([str(side)] * n)}"
         raise RefusedError("image", f"{what}, about {needed / 1e9:.0f} GB", allowed, cure)

@@ -121,11 +121,12 @@ class ImageModel:
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
         elements = [element_of(self.sides, stress=stress) for stress in (True, False)]
-        has_kernels = dimension == 3 and self.device == "cpu"
-        with KernelThreads(
-            workers=2 if self.device == "cpu" else 1,
-            call_kernels=partial(call_kernels, elements if has_kernels else []),
-        ) as pool:
+        workers = 2
+        if self.device != "cpu":
+            workers = 1
+        if dimension == 2 or self.device != "cpu":
+            elements = []  # without kernels
+        with KernelThreads(workers, partial(call_kernels, elements)) as pool:
             try:
                 lower, upper = pool.map(solve, (True, False), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
@@ -162,13 +163,16 @@ class ImageModel:
             them.
         """
         to_device = device_array(self.device)
+        first_guess = None
+        if start is not None:
+            first_guess = start.fields
         return solve_side(
             element_of(self.sides, stress=stress),
             bulk=to_device(moduli[0]),
             shear=to_device(moduli[1]),
             solver=replace(self.solver, watch=watch or self.solver.watch),
             division=self.division,
-            start=None if start is None else start.fields,
+            start=first_guess,
         )
 
     def cuts(
@@ -199,7 +203,7 @@ class ImageModel:
         poisson = _nested([x.poisson(self.average) for x in bounds])
         constants = _nested([x.constants() for x in bounds])
         cuts = [
-            ImageCut(x, Enclosure(*young[k]), Enclosure(*poisson[k]), constants[k])
+            ImageCut(x, Enclosure._make(young[k]), Enclosure._make(poisson[k]), constants[k])
             for k, x in enumerate(bounds)
         ]
         return cuts[::-1]

@@ -51,10 +51,13 @@ class PhaseModuli:
         """
         is_stable = -1 < poisson < 0.5
         require(is_stable, "Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
-        modulus = math.inf if modulus >= RIGID else modulus
+        if modulus >= RIGID:
+            modulus = math.inf
         shear = modulus / (2 * (1 + poisson))
         bulk = modulus / (3 * (1 - 2 * poisson))
-        return cls(bulk + shear / 3 if dimension == 2 else bulk, shear)
+        if dimension == 2:
+            bulk += shear / 3
+        return cls(bulk, shear)
 
 
 @dataclass(frozen=True)
@@ -142,8 +145,9 @@ class ModuliImages:
         for k in range(len(moduli)):
             values = moduli[k]
             finite = values[(values > 0) & np.isfinite(values)]
-            min_modulus = 0.0 if stress else 1e-6 * finite.min()
-            clipped[k] = np.clip(values, min_modulus, 1e4 * finite.max())
+            clipped[k] = np.minimum(values, 1e4 * finite.max())
+            if not stress:
+                clipped[k] = np.maximum(clipped[k], 1e-6 * finite.min())
         return clipped
 
     def equals(self, images: ModuliImages) -> bool:

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -73,8 +73,11 @@ class RawHead:
             require(len(content) == expected, name, f"{len(content)} bytes unpacked", allowed)
             values = np.frombuffer(content, self.dtype)
         else:
-            offset = found - expected if self.offset < 0 else self.offset
-            allowed = f"{offset} + {allowed}" if offset > 0 else allowed
+            offset = self.offset
+            if offset < 0:
+                offset = found - expected
+            if offset > 0:
+                allowed = f"{offset} + {allowed}"
             is_whole = offset >= 0 and found == offset + expected
             require(is_whole, name, f"{found} bytes", allowed)
             values = np.fromfile(self.data, self.dtype, offset=offset)
@@ -133,13 +136,14 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     require_spacing(name, [float(length) for length in lengths], sides)
     keys = "binarydatabyteordermsb", "elementbyteordermsb", "endian"
     is_big = entries.value(*keys).lower() in (*YES, "big")
+    byte_order: Literal[">", "<"] = ">" if is_big else "<"
     offset = entries.size
     if data != path:
         offset = _skipped(name, entries, is_packed=is_packed)
     return RawHead(
         data=data,
         offset=offset,
-        dtype=np.dtype(f"{'>' if is_big else '<'}{kind}"),
+        dtype=np.dtype(kind).newbyteorder(byte_order),
         stored_shape=tuple(int(size) for size in reversed(sizes)),
         order=np.argsort(2 - layout.axes[::-1]),
         reversed_axes=tuple(k for k in range(3) if layout.signs[2 - k] < 0),
@@ -256,7 +260,9 @@ def _layout(name: str, entries: _Entries) -> _Layout:
     allowed = "directions along x, y and z, each once"
     cure = "resample the volume along the axes"
     require(is_along and is_each_once, name, f"directions {vectors.tolist()}", allowed, cure)
-    return _Layout(axes, np.sign(along), lengths if spacing else norms)
+    if not spacing:
+        lengths = norms
+    return _Layout(axes, np.sign(along), lengths)
 
 
 def _numbers(name: str, text: str) -> list[float]:

@@ -48,17 +48,17 @@ def ome_spacing(head: str) -> tuple[float, float, float]:
     for axis in "XYZ":
         size = re.search(rf'\bPhysicalSize{axis}\s*=\s*"([^"]*)"', head)
         unit = re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head)
-        lengths.append(_length(size[1] if size else ""))
-        factors.append(micrometres.get(unit[1] if unit else "µm", math.nan))
+        lengths.append(_length(size))
+        factors.append(1.0 if unit is None else micrometres.get(unit[1], math.nan))
     if any(math.isnan(factor) for factor in factors):
         factors = [1.0] * 3
     x, y, z = (length * factor for length, factor in zip(lengths, factors, strict=True))
     return x, y, z
 
 
-def _length(text: str) -> float:
-    """Return the number in a text, nan where it is none."""
+def _length(match: re.Match[str] | None) -> float:
+    """Return the number in the first group of a match, nan where there is none."""
     try:
-        return float(text)
+        return math.nan if match is None else float(match[1])
     except ValueError:
         return math.nan

@@ -125,7 +125,7 @@ def _spacing(file: TiffFile) -> tuple[float, float, float]:
         return ome_spacing(file.ome_metadata)
     x = _pixel_side(file, "XResolution")
     y = _pixel_side(file, "YResolution")
-    head = (file.imagej_metadata or {}) if file.is_imagej else {}
+    head = file.imagej_metadata or {}
     if "spacing" not in head:
         return x, y, math.nan
     # Without a unit of length ImageJ's spacing is in pixels.
@@ -138,5 +138,7 @@ def _spacing(file: TiffFile) -> tuple[float, float, float]:
 def _pixel_side(file: TiffFile, tag: str) -> float:
     """Return the side of a pixel by a tag of resolution, in any unit; nan where there is none."""
     entry = file.pages.first.tags.get(tag)
-    count, length = entry.value if entry is not None else (0, 0)
-    return length / count if count > 0 and length > 0 else math.nan
+    if entry is None or min(entry.value) <= 0:
+        return math.nan
+    count, length = entry.value
+    return float(length / count)

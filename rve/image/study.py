@@ -331,13 +331,6 @@ class FuzzyImageStiffness:
         values = np.moveaxis(np.array([cut.constants for cut in self.cuts]), 1, 0)
         return dict(zip(CONSTANT_NAMES[len(self.lengths)], values, strict=True))
 
-    def widths_by_cause(self) -> str:
-        """Return the width of E at the lowest level by its cause, in words."""
-        if not self.widths:
-            return "no width of E: one of its bounds is not known beside pores or rigid phases"
-        texts = (f"{cause} {width / 1e9:.3g} GPa" for cause, width in self.widths.items())
-        return f"width of E from {', '.join(texts)}"
-
     def __str__(self) -> str:
         """Return the guarantee, a line for each constant, and the fractions."""
         kind = "image" if len(self.lengths) == 2 else "volume"
@@ -518,14 +511,13 @@ def _proved_losses(
     if not losses:
         return {}
     require(len(losses) == len(phases), "loss", f"of {len(losses)} phases", "each, 0 for none")
-    cuts = phase_loss_cuts(losses, alpha)
     fractions = energy_fractions(
         model, solution, study.images(None, None), study.nominal_phase, len(phases)
     )
-    proved = {
-        name: np.array([mean_loss(of_constant, lowest, highest) for lowest, highest in cuts])
-        for name, of_constant in fractions.items()
-    }
+    proved = {}
+    for name, of_constant in fractions.items():
+        ends = [mean_loss(of_constant, *cut) for cut in phase_loss_cuts(losses, alpha)]
+        proved[name] = np.array(ends)
     return {"E": loss_of_young(solution.bounds, proved, model.average), **proved}
 
 

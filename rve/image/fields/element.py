@@ -223,28 +223,29 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     modes = np.tensordot(parts, by_unknown, axes=1)  # (part, mode, local unknown)
     magnitude = np.tensordot(abs(parts), abs(by_unknown), axes=1)
     is_kept = (magnitude.max(axis=-1) > 0) | (n == 3)
-    of_voigt = np.zeros((*is_kept.shape, len(parts)))
+    of_voigt = np.zeros((len(parts), len(functions), len(parts)))
     of_voigt[:, 0] = parts  # a uniform field has the mode 1 alone
 
     # A function of the element is a product of functions of one coordinate, and so is its unknown.
     numbers = list(product(range(len(basis.places)), repeat=n))
+    coordinates = np.array([place.coordinate for place in basis.places])[np.array(numbers)]
+    signs = np.array([place.is_odd for place in basis.places])[np.array(numbers)].sum(axis=1)
     local = []
     for name, function in product(range(len(names)), functions):
         owners = [basis.owners[f] for f in function]
         number = numbers.index(tuple(owner[0] for owner in owners))
         offset = tuple(owner[1] for owner in owners)
         local.append(LocalUnknown(name * len(numbers) + number, offset))
-    places = [[basis.places[k] for k in number] for number in numbers] * len(names)
     return Element(
         sides=sides,
-        unknowns=len(places),
+        unknowns=len(names) * len(numbers),
         local=tuple(local),
         modes=np.ascontiguousarray(modes[is_kept]),
         magnitude=magnitude[is_kept],
         bulk_rows=int(is_kept[0].sum()),
         of_voigt=of_voigt[is_kept],
-        places=np.array([[along.coordinate for along in place] for place in places]),
-        is_odd=np.array([sum(along.is_odd for along in place) % 2 == 1 for place in places]),
+        places=np.tile(coordinates, (len(names), 1)),
+        is_odd=np.tile(signs % 2 == 1, len(names)),
         stress=stress,
         products=spline_products,
     )
@@ -263,7 +264,7 @@ def _spline_products(
     table: Ints = np.array(rows)
     terms = table[:, :-1].copy()
     is_first = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
-    ends = np.array([0, *(1 + np.flatnonzero(is_first)), len(rows)])
+    ends = np.concatenate([[0], 1 + np.flatnonzero(is_first), [len(rows)]])
     groups = np.stack([ends[:-1], ends[1:]], axis=1)
     return SplineProducts(tables, terms, groups, table[:, -1].astype(float))
 
@@ -294,14 +295,11 @@ def unknown_functions(derivatives: Derivatives) -> list[tuple[int, int]]:
 
 def strain_derivatives(dimension: int) -> Derivatives:
     """Return the terms of ε_ii = ∂i u_i and of 2 ε_ij = ∂i u_j + ∂j u_i."""
-    axes = range(dimension)
-    first = [tuple(int(i == j) for j in axes) for i in axes]  # orders of ∂i
-    normal = [[Derivative(1, (i, 0), first[i])] for i in axes]
-    shear = [
-        [Derivative(1, (j, 0), first[i]), Derivative(1, (i, 0), first[j])]
-        for i, j in SHEARS[dimension]
-    ]
-    return [*normal, *shear]
+    by_component = [[_derivative(1, (i, 0), [i], dimension)] for i in range(dimension)]
+    for i, j in SHEARS[dimension]:
+        terms = [_derivative(1, (j, 0), [i], dimension), _derivative(1, (i, 0), [j], dimension)]
+        by_component.append(terms)
+    return by_component
 
 
 def stress_derivatives(dimension: int) -> Derivatives:
@@ -319,18 +317,18 @@ def stress_derivatives(dimension: int) -> Derivatives:
     for i in range(3):
         j, k = sorted(axes - {i})
         terms = [
-            _second_derivative(1, (k, k), (j, j)),
-            _second_derivative(1, (j, j), (k, k)),
-            _second_derivative(-2, (j, k), (j, k)),
+            _derivative(1, (k, k), [j, j]),
+            _derivative(1, (j, j), [k, k]),
+            _derivative(-2, (j, k), [j, k]),
         ]
         by_component.append(terms)
     for i, j in SHEARS[3]:
         (k,) = axes - {i, j}
         terms = [
-            _second_derivative(1, (j, k), (i, k)),
-            _second_derivative(1, (i, k), (j, k)),
-            _second_derivative(-1, (k, k), (i, j)),
-            _second_derivative(-1, (i, j), (k, k)),
+            _derivative(1, (min(j, k), max(j, k)), [i, k]),
+            _derivative(1, (min(i, k), max(i, k)), [j, k]),
+            _derivative(-1, (k, k), [i, j]),
+            _derivative(-1, (i, j), [k, k]),
         ]
         by_component.append(terms)
     if dimension == 3:
@@ -343,11 +341,11 @@ def stress_derivatives(dimension: int) -> Derivatives:
     return plane
 
 
-def _second_derivative(factor: int, function: tuple[int, int], axes: tuple[int, int]) -> Derivative:
-    """Return a term with derivatives along two axes."""
-    first, last = sorted(function)
-    x, y, z = (axes.count(axis) for axis in range(3))
-    return Derivative(factor, (first, last), (x, y, z))
+def _derivative(
+    factor: int, function: tuple[int, int], axes: Sequence[int], dimension: int = 3
+) -> Derivative:
+    """Return a term with a derivative along each of some axes."""
+    return Derivative(factor, function, tuple(axes.count(axis) for axis in range(dimension)))
 
 
 def _derivative_modes(basis: Polynomials, side: float) -> Array:
@@ -367,10 +365,16 @@ def _derivative_modes(basis: Polynomials, side: float) -> Array:
     norms = np.sqrt(2 * np.arange(float(count)) + 1)
     matrices = []
     for order in range(3):
-        exact = [[_integral(polynomial, f) for f in functions] for polynomial in legendre[:count]]
-        matrices.append(np.array(exact, dtype=float) * norms[:, None] / side**order)
-        functions = [tuple(n * c for n, c in enumerate(f))[1:] for f in functions]
+        exact = [_integral(*pair) for pair in product(legendre[:count], functions)]
+        matrix = np.array(exact, dtype=float).reshape(count, len(functions))
+        matrices.append(matrix * norms[:, None] / side**order)
+        functions = [_differentiated(f) for f in functions]
     return np.array(matrices)
+
+
+def _differentiated(polynomial: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the coefficients of the derivative of a polynomial."""
+    return tuple(power * c for power, c in enumerate(polynomial))[1:]
 
 
 def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:

@@ -258,7 +258,7 @@ def solve_side(
         start: Fields to start from, in the shape of the result.
     """
     xp = namespace(bulk)
-    for axis in range(element.dimension if division > 1 else 0):
+    for axis in range(element.dimension):
         bulk = xp.repeat(bulk, division, axis=axis)
         shear = xp.repeat(shear, division, axis=axis)
     is_pore = (bulk == 0) | (shear == 0)
@@ -318,8 +318,10 @@ def _least_energy_fields(
             load=operator.load(modes[:, this]),
             scale=float(scale[k]),
             min_energy_ratio=constant.min_energy_ratio(trace, deviator),
-            start=None if start is None else xp.tensordot(xp.asarray(loads[this]), start, axes=1),
         )
+        if start is not None:
+            guess = xp.tensordot(xp.asarray(loads[this]), start, axes=1)
+            system = replace(system, start=guess)
         if potentials is None:
             fields[this] = solver.solve(system)
         else:
@@ -340,7 +342,9 @@ def _solve_beside_pores(
     A. The energy of a difference is that of A, so that `min_energy_ratio` holds.
     """
     particular = potentials.particular_fields(load, system.load)
-    start = None if system.start is None else potentials.project(system.start - particular)
+    start = system.start
+    if start is not None:
+        start = potentials.project(start - particular)
     projected = replace(
         system,
         operator=lambda x: potentials.project(system.operator(x)),

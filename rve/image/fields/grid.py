@@ -125,20 +125,20 @@ class Operator:
 
 def slabs(fields: Fields) -> Iterator[slice]:
     """Yield slices of the first axis of the grid, each of about `SLAB_CELLS` cells times fields."""
-    first, *last_axes = fields.shape[2:]
+    layers = fields.shape[2]
     size = SLAB_CELLS if isinstance(fields, np.ndarray) else DEVICE_SLAB_CELLS
-    count = max(1, size // (fields.shape[0] * math.prod(last_axes)))
-    for start in range(0, first, count):
-        yield slice(start, min(first, start + count))
+    cells_of_layer = fields.shape[0] * math.prod(fields.shape[3:])
+    count = max(1, size // cells_of_layer)
+    for start in range(0, layers, count):
+        yield slice(start, min(layers, start + count))
 
 
 def gather(element: Element, fields: Fields, slab: slice) -> Fields:
     """Return the local unknowns of the cells of a slab, shape (local unknowns, fields, *slab)."""
     xp = namespace(fields)
-    first, *last_axes = fields.shape[2:]
-    local = xp.empty((len(element.local), fields.shape[0], slab.stop - slab.start, *last_axes))
+    local = xp.empty((len(element.local), *fields[:, 0, slab].shape))
     for k, (unknown, offset) in enumerate(element.local):
-        layers = fields[:, unknown, _layers(slab, offset[0], first)]
+        layers = fields[:, unknown, _layers(slab, offset[0], fields.shape[2])]
         local[k] = _roll(xp, layers, [-shift for shift in offset[1:]])
     return local
 

@@ -230,13 +230,13 @@ class PorePotentials:
     times the K nodes.
 
     Args:
-        places: Indices of the nodes along each axis of the grid, shape (K,) each.
+        index: Index of the nodes in an array of shape (fields, unknowns, *grid).
         particular: Matrix from mean stresses, shape (unknowns × K, components).
         gauge: Matrix from the parameters of all pores, shape (unknowns × K, P × J).
         inverse: Pseudo-inverses of the Gram matrices of `gauge` in each pore, shape (P, J, J).
     """
 
-    places: tuple[Ints, ...]
+    index: tuple[slice | Ints, ...]
     particular: csr_array
     gauge: csr_array
     inverse: Array
@@ -270,7 +270,8 @@ class PorePotentials:
         # pore. A larger limit would take freedom from the stress, a smaller one keep rounding.
         gram = (gauge.T @ gauge).tobsr(blocksize=(n_gauge, n_gauge)).data
         inverse = np.linalg.pinv(gram, rcond=1e-11, hermitian=True)
-        return cls(tuple(nodes.node.T), particular, gauge, inverse)
+        index = slice(None), slice(None), *nodes.node.T
+        return cls(index, particular, gauge, inverse)
 
     def project(self, fields: Fields) -> Fields:
         """Project fields orthogonally on differences of fields of the space, in place.
@@ -314,7 +315,7 @@ class PorePotentials:
 
     def _at_nodes(self, fields: Fields) -> Array:
         """Return the unknowns at the pores' nodes, shape (unknowns × K, fields)."""
-        found = on_host(fields[(slice(None), slice(None), *self.places)])
+        found = on_host(fields[self.index])
         return np.asarray(found.reshape(len(found), -1).T)
 
     def _put(self, fields: Fields, at_nodes: Array) -> Fields:
@@ -323,7 +324,7 @@ class PorePotentials:
         Returns the changed array.
         """
         values = at_nodes.T.reshape(len(fields), fields.shape[1], -1)
-        fields[(slice(None), slice(None), *self.places)] = namespace(fields).asarray(values)
+        fields[self.index] = namespace(fields).asarray(values)
         return fields
 
     def _parameters(self, at_nodes: Array) -> Array:

@@ -104,8 +104,9 @@ class FourierPreconditioner:
             scale = float(2.0 ** np.round(np.log2(constant.deviator)))
         first_block = _block_of_uniform_fields(element, constant, waves)
         n = element.unknowns
-        inverse = xp.empty((n, n, *(k.size for k in waves)), dtype=real_type)
-        phases = xp.empty((n, *(k.size for k in waves)), dtype=complex_type)
+        half = *shape[:-1], waves[-1].size
+        inverse = xp.empty((n, n, *half), dtype=real_type)
+        phases = xp.empty((n, *half), dtype=complex_type)
         # pixels' blocks span many orders of energy at long waves, and have no gauge
         has_gauge = element.stress and element.dimension == 3
         for slab in slabs(inverse):
