@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         fuzzy_image_stiffness,
         read_image,
     )
+    from alphacut.rve.image.vti import ImageFields, image_fields
     from alphacut.rve.prism.cell_fields import CellFields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import LevelSetModel, MeshModel
@@ -36,16 +37,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyImageStiffness", "FuzzyStiffness",
-    "GreyImage", "HomogenisedStiffness", "LevelSetModel", "MeshModel", "Phase", "PrismModel",
-    "ProductSpace", "ReferenceBounds", "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve",
-    "VoigtPhase", "constants", "effective_modulus", "fuzzy_image_stiffness", "fuzzy_stiffness",
-    "loss_factors", "read_image", "reference_bounds",
+    "GreyImage", "HomogenisedStiffness", "ImageFields", "LevelSetModel", "MeshModel", "Phase",
+    "PrismModel", "ProductSpace", "ReferenceBounds", "SeriesModel", "SlicesModel", "SpheresModel",
+    "StressCurve", "VoigtPhase", "constants", "effective_modulus", "fuzzy_image_stiffness",
+    "fuzzy_stiffness", "image_fields", "loss_factors", "read_image", "reference_bounds",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
     "FuzzyImageStiffness": "image.study",
     "FuzzyStiffness": "fuzzy_cell",
     "GreyImage": "image.study",
+    "ImageFields": "image.vti",
     "LevelSetModel": "prism.own_mesh",
     "MeshModel": "prism.own_mesh",
     "PrismModel": "prism.model",
@@ -57,6 +59,7 @@ AT_FIRST_USE = {
     "constants": "engineering",
     "fuzzy_image_stiffness": "image.study",
     "fuzzy_stiffness": "fuzzy_cell",
+    "image_fields": "image.vti",
     "loss_factors": "result.loss_factors",
     "read_image": "image.study",
     "reference_bounds": "result.reference_bounds",

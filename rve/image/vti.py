@@ -1,0 +1,161 @@
+"""Fields of an image or volume in its pixels, and their file in VTK's format of images, .vti."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from alphacut.base.arrays import Array, Ints
+from alphacut.base.errors import require
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.element import Element, element_of
+from alphacut.rve.image.fields.energy import SideSolution, modes_of
+from alphacut.rve.image.fields.grid import on_host
+from alphacut.rve.image.memory import require_memory
+from alphacut.rve.image.model import ImageModel, usual_division
+from alphacut.rve.image.study import GreyImage, ImagePhase, image_study
+
+
+@dataclass(frozen=True, eq=False)
+class ImageFields:
+    """Means over each pixel or voxel of the strains and stresses of an image at nominal values.
+
+    Components and loads are in Voigt's order: 11, 22, 12 of the plane, and 11, 22, 33, 23, 13, 12
+    of space. Shear components of strains are twice those of the tensor.
+
+    Args:
+        lengths: Sides of a pixel or voxel in m, along the axes of `phase`.
+        phase: Number of the phase of each pixel, dark first, shape (y, x) or (z, y, x).
+        strain: Strains under each unit mean strain, of displacements that bound the stiffness from
+            above, shape (loads, components, *grid); None where a phase is rigid.
+        stress: Stresses under each unit mean stress, in equilibrium exactly, which bound the
+            stiffness from below, shape (loads, components, *grid); None where pores percolate.
+    """
+
+    lengths: tuple[float, ...]
+    phase: Ints
+    strain: Array | None
+    stress: Array | None
+
+    def write(self, path: Path | str) -> None:
+        """Write phases, strains and stresses as values of cells into a file NAME.vti.
+
+        Arrays are named as strain_22_under_12: the component 22 under the mean strain 12.
+
+        Raises:
+            RefusedError: The name has another ending.
+        """
+        named: dict[str, Array | Ints] = {"phase": self.phase}
+        axes = {2: ("11", "22", "12"), 3: ("11", "22", "33", "23", "13", "12")}[self.phase.ndim]
+        for quantity, fields in (("strain", self.strain), ("stress", self.stress)):
+            if fields is None:
+                continue
+            for row, load in enumerate(axes):
+                for column, component in enumerate(axes):
+                    named[f"{quantity}_{component}_under_{load}"] = fields[row, column]
+        write_vti(path, named, lengths=self.lengths)
+
+
+def image_fields(
+    image: GreyImage,
+    phases: Sequence[Mapping[str, FuzzyNumber | float]],
+    *,
+    thresholds: Sequence[FuzzyNumber | float] = (),
+    labels: Sequence[float] = (),
+) -> ImageFields:
+    """Return the strains and stresses in each pixel or voxel of an image at nominal values.
+
+    Args:
+        image: The periodic cell; see `read_image`.
+        phases: Of each phase, dark first, its modulus (Pa) and poisson.
+        thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
+        labels: Value of each phase in a labelled image, in place of thresholds.
+
+    Raises:
+        RefusedError: A value is not allowed, or the image does not fit into memory.
+    """
+    numbers = [x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for x in thresholds]
+    listed = [ImagePhase.of(values) for values in phases]
+    study = image_study(image, listed, thresholds=numbers, labels=labels)
+    moduli = study.images(None, None)  # at nominal thresholds and moduli
+    division = usual_division(moduli)
+    require_memory(study.image.values.shape, division)
+    model = ImageModel(image.sides, division, ConjugateGradient(accuracy=1e-5))
+    solution = model.solve(moduli)
+    phase, _ = study.phase_ranges(None)
+    return ImageFields(
+        lengths=image.lengths,
+        phase=phase,
+        strain=_pixel_means(element_of(image.sides, stress=False), solution.upper, division),
+        stress=_pixel_means(element_of(image.sides, stress=True), solution.lower, division),
+    )
+
+
+def _pixel_means(element: Element, side: SideSolution | None, division: int) -> Array | None:
+    """Return the means of a field over each pixel, shape (loads, components, *grid).
+
+    Args:
+        element: Unknowns and modes of a cell of the grid on which the field is solved.
+        side: The fluctuations under each load; None for no field.
+        division: Cells of that grid along each side of a pixel.
+    """
+    if side is None:
+        return None
+    fields = side.fields
+    n_loads, fine_grid = fields.shape[0], fields.shape[2:]
+    uniform_modes = element.mean_modes(np.eye(n_loads))
+    # The modes are coefficients of orthonormal polynomials, and those of a uniform field belong to
+    # the constant polynomial alone. So the least squares that give the uniform field nearest to the
+    # modes, by the pseudo-inverse, give the mean of the field over the cell.
+    to_means = np.linalg.pinv(element.of_voigt)
+    means = np.empty((n_loads, len(to_means), *fine_grid))
+    for found in modes_of(element, fields, uniform_modes):
+        of_cells = np.tensordot(to_means, on_host(found.modes), axes=1)
+        for component, load in np.ndindex(of_cells.shape[:2]):
+            grid = means[load, component]
+            grid[found.slab] = of_cells[component, load].reshape(grid[found.slab].shape)
+    # Each axis of the fine grid becomes two: of pixels, and of the cells in a pixel.
+    pairs = [size for length in fine_grid for size in (length // division, division)]
+    axes_in_pixel = tuple(range(3, 3 + 2 * len(fine_grid), 2))
+    return np.asarray(means.reshape(n_loads, -1, *pairs).mean(axis=axes_in_pixel))
+
+
+def write_vti(
+    path: Path | str, named: Mapping[str, Array | Ints], *, lengths: Sequence[float]
+) -> None:
+    """Write values of pixels or voxels as VTK's image, which ParaView and PyVista read.
+
+    Args:
+        path: Name of the file, which ends in .vti.
+        named: Arrays of one shape, (y, x) or (z, y, x), by the names that they get.
+        lengths: Sides of a pixel or voxel in m, along the axes of the arrays.
+
+    Raises:
+        RefusedError: The name has another ending.
+    """
+    require(Path(path).suffix == ".vti", "file", str(path), "a name that ends in .vti")
+    shape = next(iter(named.values())).shape
+    # VTK orders axes as x, y, z, with x the fastest; a picture is one voxel thick.
+    sizes = [*shape[::-1], 1][:3]
+    sides = [*map(float, lengths[::-1]), float(lengths[-1])][:3]
+    spacing = " ".join(map(repr, sides))
+    extent = " ".join(f"0 {size}" for size in sizes)
+    rows = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
+        f'<ImageData WholeExtent="{extent}" Origin="0 0 0" Spacing="{spacing}">',
+        f'<Piece Extent="{extent}"><CellData>',
+    ]
+    for name, values in named.items():
+        content = np.ascontiguousarray(values, "<f8").tobytes()
+        data = len(content).to_bytes(8, "little") + content  # the number of bytes comes first
+        attributes = f'type="Float64" Name={quoteattr(name)} format="binary"'
+        rows.append(f"<DataArray {attributes}>{base64.b64encode(data).decode()}</DataArray>")
+    rows.append("</CellData></Piece></ImageData></VTKFile>")
+    Path(path).write_text("\n".join(rows) + "\n", encoding="utf-8")
