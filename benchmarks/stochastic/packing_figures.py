@@ -77,7 +77,11 @@ def draw_radii(packings: Packings) -> Figure:
     axes.ecdf(values, color=BLUE, label=f"{len(values)} discs")
     if law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
-        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
+        if isinstance(law, LogNormalRadii):
+            label = f"log-normal, σ$_r$ = {law.sigma:.4f}"
+        else:
+            label = f"{len(law.values)} values of {law.source}"
+        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=label)
     axes.set(xlabel="radius [mm]", ylabel="share of discs", ylim=(0, 1.02))
     axes.legend()
     return figure

@@ -28,19 +28,21 @@ from alphacut.base.kept_files import is_regular, read_regular
 from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 
 Identity = Mapping[str, object]
-_WRITE_TIMEOUT = 60.0  # seconds to wait for another campaign's write
+"""What a sample depends on besides its inputs, as JSON has it."""
 _APPLICATION = 0x616C7068  # application id in the head of each store: "alph" in ASCII
-_HEAD = 72  # bytes of the head of an SQLite file that end with its application id
 _TABLE = """CREATE TABLE sample
 (model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
-_COLUMNS = "model, point, layout, outputs, checksum"
-_ACCESS_ERRORS = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
 
 
 class Row(NamedTuple):
-    """A sample as it is stored: inputs and layout as JSON, outputs as little-endian doubles.
+    """A sample as it is stored, a field for each column of the table.
 
-    `point` has the inputs by name, exact to the last bit, in the order of their names.
+    Args:
+        model: Key of the model, as of `model_key`.
+        point: Key of the point, as of `point_key`: the inputs by name, exact to the last bit.
+        layout: Names and shapes of the outputs as JSON.
+        outputs: Outputs as little-endian doubles.
+        checksum: Hash of the other columns.
     """
 
     model: bytes
@@ -51,36 +53,48 @@ class Row(NamedTuple):
 
     @classmethod
     def from_sample(cls, model: bytes, point: str, sample: Sample) -> Row:
-        """Row of a sample, with its checksum."""
+        """Return the row of a sample, with its checksum."""
         layout = json.dumps(sample.layout)
         outputs = sample.row.astype("<f8").tobytes()
         return cls(model, point, layout, outputs, _checksum(model, point, layout, outputs))
 
     @property
     def is_intact(self) -> bool:
-        """Whether the checksum is that of the other columns."""
-        with suppress(TypeError, AttributeError):
-            return _checksum(*self[:4]) == self.checksum
-        return False
+        """Whether the checksum is that of the other columns, and these have their types."""
+        try:
+            checksum = _checksum(self.model, self.point, self.layout, self.outputs)
+        except (TypeError, AttributeError):
+            return False
+        return checksum == self.checksum
 
     @property
     def sample(self) -> Sample:
-        """The sample."""
+        """The sample that the row holds."""
         layout: Layout = tuple((name, tuple(shape)) for name, shape in json.loads(self.layout))
         return Sample(layout, np.frombuffer(self.outputs, "<f8").astype(float))
 
 
 def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
-    parts = model, point.encode(), layout.encode(), outputs
-    sizes = np.array([len(part) for part in parts], "<i8").tobytes()
-    return blake2b(b"".join((sizes, *parts)), digest_size=16).digest()
+    """Return a hash of the columns of a row; their sizes keep them apart."""
+    columns = [model, point.encode(), layout.encode(), outputs]
+    sizes = np.array([len(column) for column in columns], "<i8").tobytes()
+    return blake2b(sizes + b"".join(columns), digest_size=16).digest()
+
+
+_COLUMNS = ", ".join(Row._fields)
 
 
 class Store:
     """Samples of all models in one file, which is created if there is none.
 
+    All samples are read when the store is opened, and are then held in memory.
+
+    Args:
+        path: Path of the file.
+
     Raises:
-        RefusedError: The file is not a store, or it cannot be opened or created.
+        RefusedError: The file is not a store, or it cannot be created.
+        FailedError: SQLite cannot use the file.
 
     Example:
         >>> from tempfile import TemporaryDirectory
@@ -99,30 +113,42 @@ class Store:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             is_store = _is_store(self.path)
         except OSError as error:
-            is_store, cure = False, str(error)
+            is_store = False
+            cure = str(error)
         allowed = "a file of samples that may be written"
         require(is_store, "store", value=self.path, allowed=allowed, cure=cure)
         with self._reported():
-            self._connection = sqlite3.connect(self.path, timeout=_WRITE_TIMEOUT)
+            self._connection = self._connect()
             if not self._read():
                 self._renew()
 
+    def _connect(self) -> sqlite3.Connection:
+        """Return a connection that waits a minute for another campaign's write."""
+        return sqlite3.connect(self.path, timeout=60.0)
+
     def _read(self) -> bool:
-        """Read the intact rows; False if the file or a row is damaged."""
+        """Read the intact rows into memory, and return whether file and rows are all intact.
+
+        Raises:
+            sqlite3.Error: The file cannot be accessed, which is no damage.
+        """
+        schema = "select sql from sqlite_master where sql is not null"
         try:
             _prepare(self._connection)
-            schema = "select sql from sqlite_master where sql is not null"
             check = self._connection.execute("pragma quick_check").fetchone()
-            is_intact = bool(check == ("ok",))
-            is_intact &= self._connection.execute(schema).fetchall() == [(_TABLE,)]
+            tables = self._connection.execute(schema).fetchall()
+            is_intact = check == ("ok",) and tables == [(_TABLE,)]
             for columns in self._connection.execute(f"select {_COLUMNS} from sample"):
-                row = Row(*columns)
-                is_intact &= row.is_intact
+                row = Row._make(columns)
                 if row.is_intact:
                     self._rows[row.model, row.point] = row
+                else:
+                    is_intact = False
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-            name = getattr(error, "sqlite_errorname", "")  # none: text is no UTF-8
-            if any(word in name for word in _ACCESS_ERRORS):  # no damage
+            # A text that is no UTF-8 raises an error without a name.
+            name = getattr(error, "sqlite_errorname", "")
+            of_access = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
+            if any(word in name for word in of_access):
                 raise
             return False
         return is_intact
@@ -133,25 +159,35 @@ class Store:
         with suppress(FileNotFoundError):
             os.remove(f"{self.path}-journal")
         os.replace(self.path, self.path.with_name(f"{self.path.name}.damaged"))
-        self._connection = sqlite3.connect(self.path, timeout=_WRITE_TIMEOUT)
+        self._connection = self._connect()
         _prepare(self._connection)
         self._write(self._rows.values())
         outcome = f"{len(self._rows)} samples are intact, the others are evaluated anew"
         warnings.warn(f"the store {self.path} was damaged: {outcome}", stacklevel=4)
 
     def get(self, model: bytes, point: str) -> Sample | None:
-        """The sample of a model at a point; None where there is none."""
+        """Return the sample of a model at a point; None where there is none.
+
+        Args:
+            model: Key of the model, as of `model_key`.
+            point: Key of the point, as of `point_key`.
+        """
         row = self._rows.get((model, point))
         return row and row.sample
 
     def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
-        """Write samples in one transaction: all or none."""
+        """Write samples of a model, by the keys of their points, in one transaction: all or none.
+
+        Raises:
+            FailedError: They cannot be written.
+        """
         rows = [Row.from_sample(model, point, sample) for point, sample in samples.items()]
         with self._reported():
             self._write(rows)
         self._rows |= {(row.model, row.point): row for row in rows}
 
     def _write(self, rows: Iterable[Row]) -> None:
+        """Write rows in one transaction; rows of the same model and point are replaced."""
         insert = f"insert or replace into sample ({_COLUMNS}) values (?, ?, ?, ?, ?)"
         with self._connection as transaction:
             transaction.executemany(insert, rows)
@@ -186,17 +222,21 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 
 def _is_store(path: Path) -> bool:
-    """Return True for a store, an empty file, or where there is nothing; none of them a link."""
+    """Return whether a path is a store, an empty file, or free.
+
+    Neither the file nor those that SQLite makes beside it may be a link, a pipe or a device.
+    """
+    head_size = 72  # bytes of the head of an SQLite file, of which the last four are its id
     for end in ("", "-journal", "-wal", "-shm"):
         with suppress(FileNotFoundError):
             if not is_regular(path.with_name(f"{path.name}{end}")):
                 return False
     if not path.exists():
         return True
-    head = read_regular(path, _HEAD)
+    head = read_regular(path, head_size)
     if not head.startswith(b"SQLite format 3\0"):
         return not head
-    return int.from_bytes(head[_HEAD - 4 :], "big") == _APPLICATION
+    return int.from_bytes(head[head_size - 4 :], "big") == _APPLICATION
 
 
 def model_key(identity: Identity) -> bytes:

@@ -51,11 +51,6 @@ class LogNormalRadii:
         require(rising, "largest_radius", value=f"{self.largest:g} m", allowed=allowed)
 
     @property
-    def label(self) -> str:
-        """The distribution in words."""
-        return f"log-normal, σ$_r$ = {self.sigma:.4f}"
-
-    @property
     def sigma(self) -> float:
         """Scale parameter σ_r; ln 10/6 for a factor of ten on [-3, 3]."""
         width = self.distribution.upper - self.distribution.lower
@@ -120,11 +115,6 @@ class MeasuredRadii:
     def largest(self) -> float:
         """Largest radius, in m."""
         return self.values[-1]
-
-    @property
-    def label(self) -> str:
-        """The distribution in words."""
-        return f"{len(self.values)} values of {self.source}"
 
     @cached_property
     def _grade(self) -> Array:
