@@ -229,7 +229,7 @@ class Hull:
             attained_error=self.attained_error if self.attained_error.any() else None,
             evaluations=int(facts.pop("evaluations", attained.size)),
             facts=facts,
-            notes=(*notes,),
+            notes=tuple(notes),
         )
 
     def _require_consistent(self, upper: Array) -> None:

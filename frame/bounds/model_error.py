@@ -210,7 +210,7 @@ def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
         impulse=np.ones(len(time)),
         table_error=np.zeros(model.count),
     )
-    return [free, *(_forced_part(model, growth, load) for load in model.loads)]
+    return [free] + [_forced_part(model, growth, load) for load in model.loads]
 
 
 def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:

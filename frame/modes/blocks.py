@@ -9,6 +9,7 @@ X̃(u) and L̃(u) of some degree, which need no proof; `enclosed_block` bounds w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -50,22 +51,20 @@ class Block:
 
     def truncated(self, order: int) -> Block:
         """Return the block with its Taylor models truncated to a lower order."""
-        return Block(
-            modes=self.modes,
-            eigenvalue_block=self.eigenvalue_block.truncated(order),
-            shapes=self.shapes.truncated(order),
-            mass_times_shapes=self.mass_times_shapes.truncated(order),
-            modal_mass=self.modal_mass.truncated(order),
-        )
+        return self._with_models(lambda model: model.truncated(order))
 
     def embedded(self, used: Ints, inputs: int) -> Block:
         """Return the block as functions of all inputs, of which those at `used` are its own."""
+        return self._with_models(lambda model: model.embedded(used, inputs))
+
+    def _with_models(self, change: Callable[[TaylorModel], TaylorModel]) -> Block:
+        """Return the block with each of its Taylor models changed in the same way."""
         return Block(
             modes=self.modes,
-            eigenvalue_block=self.eigenvalue_block.embedded(used, inputs),
-            shapes=self.shapes.embedded(used, inputs),
-            mass_times_shapes=self.mass_times_shapes.embedded(used, inputs),
-            modal_mass=self.modal_mass.embedded(used, inputs),
+            eigenvalue_block=change(self.eigenvalue_block),
+            shapes=change(self.shapes),
+            mass_times_shapes=change(self.mass_times_shapes),
+            modal_mass=change(self.modal_mass),
         )
 
 

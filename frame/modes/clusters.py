@@ -200,9 +200,9 @@ def _couplings(centre: CentredMatrices, modes: Ints) -> Array:
 
     λ is the mean of the eigenvalues of both modes.
     """
-    pairs = modes[:, np.newaxis], modes
-    stiffness = centre.stiffness.homogeneous_part(1)[:, *pairs]
-    mass = centre.mass.homogeneous_part(1)[:, *pairs]
+    rows = modes[:, np.newaxis]
+    stiffness = centre.stiffness.homogeneous_part(1)[:, rows, modes]
+    mass = centre.mass.homogeneous_part(1)[:, rows, modes]
     eigenvalues = centre.eigenvalues[modes]
     mean = (eigenvalues[:, np.newaxis] + eigenvalues) / 2
     return np.asarray(stiffness - mean * mass)

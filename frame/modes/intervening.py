@@ -71,11 +71,11 @@ class Oscillator:
             quotient_range=_overlap(_range(quotient), self.quotient_range),
         )
 
-    def table_cell(self, grid: Grid) -> tuple[int, int, int, int]:
-        """Return the first and last points of a grid that enclose ω, and those that enclose g/ω."""
+    def table_cell(self, grid: Grid) -> Ints:
+        """Return the first and last points of a grid that enclose ω, then g/ω, shape (4,)."""
         first, last = _enclosing_points(grid.omega, self.omega_range)
         low, high = _enclosing_points(grid.quotient, self.quotient_range)
-        return first, last, low, high
+        return np.array([first, last, low, high])
 
 
 @dataclass(frozen=True, eq=False)

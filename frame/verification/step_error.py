@@ -265,23 +265,25 @@ def reference_motions(
     velocity = eq.velocity(momenta)
     initial_q, initial_v = system.start()
     moving = dict(zip(eq.v, velocity, strict=True))
-    starting = dict(zip([*eq.q, *eq.v], [*initial_q, *initial_v], strict=True))
-    arguments = [*eq.q, *momenta, *eq.p.values()]
-    rates = sympy.lambdify(arguments, [*velocity, *eq.push.subs(moving)], "math")
-    initial_state = [*initial_q, *eq.momentum.subs(starting)]
-    start_at = sympy.lambdify([*eq.p.values()], initial_state, "math")
+    starting = dict(zip(eq.q, initial_q, strict=True)) | dict(zip(eq.v, initial_v, strict=True))
+    state_symbols = list(eq.q) + list(momenta)
+    symbols = [state_symbols, list(eq.p.values())]
+    state_rates = list(velocity) + list(eq.push.subs(moving))
+    rates = sympy.lambdify(symbols, state_rates, "math")
+    initial_state = list(initial_q) + list(eq.momentum.subs(starting))
+    start_at = sympy.lambdify(symbols[1:], initial_state, "math")
     observed = [system.output(name, list(velocity)) for name in system.outputs]
-    outputs = sympy.lambdify(arguments, observed, "math")
+    outputs = sympy.lambdify(symbols, observed, "math")
     trajectories = []
     for parameters in points:
         p = [float(parameters[name]) for name in eq.p]
-        start = np.array(start_at(*p), float)
+        start = np.array(start_at(p), float)
         # Magnitudes of the states, for the absolute tolerance: of the start, or of its rate.
-        speed = np.abs(np.array(rates(*start, *p), float))
+        speed = np.abs(np.array(rates(start, p), float))
         magnitude = np.maximum(np.abs(start), speed * float(times[-1]))
         magnitude = np.where(magnitude > 0, magnitude, magnitude.max() or 1.0)
         found = solve_ivp(
-            lambda _, state, p=p: rates(*state, *p),
+            lambda _, state, p=p: rates(state, p),
             (float(times[0]), float(times[-1])),
             start,
             method="DOP853",
@@ -291,5 +293,5 @@ def reference_motions(
         )
         if not found.success:
             raise FailedError(f"the reference motion: {found.message}")
-        trajectories.append([outputs(*state, *p) for state in found.y.T])
+        trajectories.append([outputs(state, p) for state in found.y.T])
     return np.array(trajectories, float)
