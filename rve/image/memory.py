@@ -21,7 +21,7 @@ def needed_memory(shape: Sequence[int], division: int = 1) -> float:
         shape: Number of pixels or voxels along each axis.
         division: Number of elements along each side of a pixel or voxel.
     """
-    program = 1.7e8  # of Python and its libraries
+    program = 1e8  # of Python and its libraries
     elements = math.prod([n * division for n in shape])
     return program + BYTES_PER_ELEMENT[len(shape)] * elements
 
