@@ -71,12 +71,15 @@ class LagrangianSystem(StructureModel):
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
 
+        # The variational integrator solves for velocities from momenta ∂L/∂v, which is linear if
+        # ∂²L/∂v² has no velocity in it.
         eq = self.symbols
         is_quadratic = not eq.mass.free_symbols & set(eq.v)
         allowed = "functions quadratic in v"
         require(is_quadratic, "lagrangian", value=eq.mass.tolist(), allowed=allowed)
         for name in self.observed:
             self.output(name, eq.v)
+        # without inertia a momentum does not tell the velocity; 1e-300 is 0 but for underflow
         q0, v0 = self.start()
         at_start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
         nominal = {eq.p[name]: value for name, value in self.parameters.items()}
@@ -166,6 +169,8 @@ def _expressions(
     import sympy
 
     allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
+    # The function is the user's: names that it asks for and operations that symbols do not have are
+    # refused with what it may use. Other errors are its own, and are not caught.
     try:
         expressions = [sympy.sympify(value) for value in values()]
     except (KeyError, IndexError, TypeError, AttributeError, sympy.SympifyError) as failure:

@@ -292,6 +292,7 @@ def evaluate(
 
     damping = full.dashpots
     for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
+        # what is zero with its derivative adds nothing, and no rounding
         if factor.value.any() or factor.first.any():
             damping = damping + factor[:, None, None] * matrix
     mass, stiffness = full.mass, full.stiffness
@@ -379,6 +380,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     """
     squared, shapes = undamped_modes(mass.value, stiffness.value)
     largest = np.maximum(abs(squared).max(-1, keepdims=True), 1e-300)
+    # An eigenvalue below the rounding of the largest one, some n 1e-16 of it, is arbitrary, and the
+    # derivative of √λ in D is infinite at 0.
     ratio = (squared / largest).min()
     what = f"such that a squared frequency is {ratio:.1e} of the greatest"
     cure = "support what moves freely, join storeys that are too stiff, or give dampers"
@@ -428,6 +431,8 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
         RefusedError: A mode is most similar to a nominal mode of another place and ratio.
     """
     shapes = undamped_modes(mass, stiffness)[1]
+    # Modal assurance by the mass: |φ_iᵀ M φ_k| is 1 of the same mode and 0 of another one at the
+    # nominal parameters. A crossing shows as a mode that is most like another nominal one.
     similarity = np.abs(shapes[0].T @ mass[0] @ shapes)  # (S, nominal modes, modes)
     nominal = similarity.argmax(axis=1)  # the nominal mode that each mode is most like, (S, n)
     for _, k in np.argwhere(ratios[nominal] != ratios):

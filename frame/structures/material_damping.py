@@ -37,6 +37,9 @@ def damping_from_loss(
         for name, number in numbers.items()
     }
 
+    # A mass on a spring k (1 + i η) has λ² = −ω² (1 + i η), so that ζ = −Re λ / |λ| is
+    # sin(½ arctan η). The loss factor of a mode is w η, if the fraction w of its strain energy is
+    # in the material (Ungar and Kerwin, J. Acoust. Soc. Am. 34, 954, 1962).
     def ratio(loss_factor: float, of_joints: float) -> float:
         return sin(atan(energy_fraction * loss_factor) / 2) + of_joints
 

@@ -184,6 +184,8 @@ class MatrixStructure(LinearSystem):
         require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
         total = stiffness.sum(axis=0)
         self._require_stable(total)
+        # Condensation divides by K_bb. An eigenvalue below 1e-14 of the largest entry is the
+        # rounding of a zero one, of an unknown that no spring holds.
         if not len(b):
             return
         smallest = np.linalg.eigvalsh(total[np.ix_(b, b)]).min() / np.abs(total).max()
@@ -251,6 +253,7 @@ class MatrixStructure(LinearSystem):
             if any(callable(factor) for factor, _ in getattr(self, kind)):
                 raise UnprovedError(f"{kind} has a factor that is a function")
         for factor, array in self.damping:
+            # the array is nonnegative but for the rounding of its eigenvalues
             eigenvalues = np.linalg.eigvalsh(array)
             is_definite = eigenvalues[0] >= -1e-14 * np.abs(eigenvalues).max()
             if value_of(factor, lowest) < 0 or not is_definite:
@@ -287,6 +290,9 @@ class MatrixStructure(LinearSystem):
         cure = "all matrices have as many rows and columns as there are unknowns"
         require(array.shape == (size, size), key, value=what, allowed=allowed, cure=cure)
         require_numbers(kind, array)
+        # Eigenvalue solvers read one triangle alone, and proofs bound entries: so the mean of both
+        # triangles is taken, which is symmetric to the last bit. A difference of more than
+        # rounding, 1e-9 of the largest entry, is an error of the caller.
         asymmetry = np.abs(array - array.T)
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
         is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
@@ -333,10 +339,12 @@ class MatrixStructure(LinearSystem):
         """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""
         n = self.size
         zero: Number = lifted(0.0, p)
+        # Σ_i f_i(p) M_i as one contraction of the factors with the stacked arrays
         matrices = {
             kind: values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
             for kind, arrays in self._arrays.items()
         }
+        # a row of n entries acts on displacements alone
         rows = np.zeros((len(self.observed), 2 * n))
         for row, observed in zip(rows, self.observed.values(), strict=True):
             row[: len(observed)] = observed
@@ -414,6 +422,8 @@ def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints)
     with these weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982). The modes are those at
     nominal values.
     """
+    # Every unknown is observed, so that the rows give the modes also at the unknowns without mass,
+    # which `evaluate` condenses. Damping by ratios would need the modes that are sought.
     unit: Array = np.eye(system.size)
     every_unknown = {f"u{k}": unit[k] for k in range(system.size)}
     observed = replace(system, observed=every_unknown, row_factors={}, ratios=())
@@ -457,7 +467,9 @@ class Monomial:
         """
         coefficient = 1.0
         powers: dict[str, int] = {}
-        tokens = re.split(r"(?<!\*)([*/])(?!\*)", text)  # factors, with single * and / between
+        # A single * or / is an operator, and ** is part of a factor: the texts between the
+        # operators are the factors.
+        tokens = re.split(r"(?<!\*)([*/])(?!\*)", text)
         operators = ["*", *tokens[1::2]]
         for operator, token in zip(operators, tokens[::2], strict=True):
             match = FACTOR.fullmatch(token)

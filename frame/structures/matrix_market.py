@@ -37,6 +37,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         RefusedError: The text is not of the format, of complex numbers, has an index outside the
             matrix, another number of entries than it states, or more rows or columns than allowed.
     """
+    # SciPy's reader is compiled code that a damaged file can end the process in, so the text is
+    # parsed here; every number goes through `float`.
     lines = [line for line in content.splitlines() if line.strip()]
     match = HEAD.fullmatch(lines[0]) if lines else None
     if match is None:
@@ -54,6 +56,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         n_sizes, cure = 3, "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
+    # a size beyond 64 bits stays one that is too large
     shape = int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))
     require_size(name, shape, max_rows)
     value = f"symmetric, {shape[0]} × {shape[1]}"
@@ -70,6 +73,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     rows, columns, values = entries.reshape(-1, 3).T
     matrix = dense_of_entries(name, shape, rows=rows - 1, columns=columns - 1, values=values)
     if is_symmetric:
+        # The format asks for the lower triangle; programs that write the upper one are read, too.
         lower, upper = np.tril(matrix, -1), np.triu(matrix, 1)
         has_both = bool(((lower != 0) & (upper.T != 0)).any())
         cure = "write general in the first line, or leave one triangle out"

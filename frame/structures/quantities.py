@@ -52,6 +52,7 @@ class Output(str):
 
     def __new__(cls, name: str, unit: str = "") -> Output:
         """Return the name with a unit; without one, that of its kind, such as "m" of "q3"."""
+        # a text, so that names of outputs are used and stored as any other names
         output = super().__new__(cls, name)
         of_kind, _ = OUTPUTS.get(output._parts[0], ("SI", ""))
         output.unit = unit or (name.unit if isinstance(name, Output) else of_kind)

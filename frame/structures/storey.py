@@ -165,6 +165,7 @@ class StoreyFrame(LinearSystem):
         for name in ("dampers", "q0", "v0", *others):
             values = tuple(getattr(self, name)) or defaults.get(name, ())
             object.__setattr__(self, name, values)
+        # frozen dataclasses are set by `object.__setattr__`, as in their own initialiser
         names = self.outputs or [f"q{z + 1}" for z in range(n)]
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
@@ -182,6 +183,7 @@ class StoreyFrame(LinearSystem):
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
+        # lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys
         sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
         for name, symbol in {**SYMBOLS, **SINGLE}.items():
             values = getattr(self, name)
@@ -345,6 +347,8 @@ class StoreyFrame(LinearSystem):
             inertia = self._of_floors("I{}", p)
         else:
             inertia = p["I"][..., None]
+        # A column that is clamped at both ends resists a unit displacement between them by
+        # 12 E I / l³ (slope-deflection equations); c columns of a storey act side by side.
         rigidity = 12.0 * p["E"][..., None] * inertia  # 24 E I / l³ of two columns in section 6.1
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
@@ -352,6 +356,7 @@ class StoreyFrame(LinearSystem):
         """Return the drifts at which storeys yield, shape (…, n), in m."""
         if self.yield_drift:
             return self._of_floors("dy{}", p)
+        # a bilinear spring is elastic up to its yield force
         return self._of_floors("fy{}", p) * self.springs(p) ** -1
 
     def hardenings(self, p: Mapping[str, Number]) -> Number:
@@ -380,7 +385,9 @@ class StoreyFrame(LinearSystem):
         springs = self.springs(p)
         damper_matrices = by_storey if self.damper_placement == "storey" else by_floor
 
-        coefficients = self._coefficients  # on displacements, velocities and accelerations
+        # Rows are constant but for the overturning moment, whose factors k_z l_z depend on
+        # parameters; the stiffness in a shear is a factor of its whole row.
+        coefficients = self._coefficients
         rows: Array | Number = coefficients[:, : 2 * n]
         if MOMENT in self.outputs:  # Σ_z l_z k_z (q_z − q_(z−1))
             drifts = np.zeros((n, len(self.outputs), 2 * n))
@@ -394,6 +401,7 @@ class StoreyFrame(LinearSystem):
 
         columns: Number | None = None
         if self.loads:
+            # one column a force: its amplitude times the unit vector of its floor
             amplitudes = stack([p[name] for name in self.force_names])
             unit_forces = np.array([identity[int(force.at) - 1] for force in self.loads])
             columns = amplitudes[..., None, :] * unit_forces.T
@@ -494,6 +502,8 @@ class StoreyFrame(LinearSystem):
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
         """
+        # With k = 12 c E I / l³ the ratio k l / P is 12 c E I / (l² P). It is smallest at the highest
+        # l and P and the lowest c, E and I; of given springs at the lowest k and l.
         worst_when_high = "m" if self.stiffness else "ml"
         p: dict[str, Jet] = {}
         for name, nominal in self.parameters.items():
