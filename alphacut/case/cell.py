@@ -123,16 +123,19 @@ class CellContent(Section, defer_build=True):
             return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
         require(self.mesh_cell is not None, "cell.phases", None, allowed)
+        # the file has its own elements, and its own shape of particles
         for key in ("size", "layers"):
             require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
         has_map = self.radius_map is not None or "microstructure" in self.stages
         require(not has_map, "radius", "a map of radii", "theta alone beside mesh.file")
+        # Without a second, finer mesh nothing is known of the error, and a tolerance promises one.
         tolerance, cure = self.modulus.tolerance, "set mesh.refine = true"
         has_error, allowed = self.mesh.refine, "none beside mesh.file, whose error nobody knows"
         require(tolerance is None or has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
         """Refuse stages without the sections that they need, and two sources of a radius."""
+        # the radius comes from one source: a stage, a fraction of equal particles, or [radius]
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
         has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell

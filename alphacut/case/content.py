@@ -130,6 +130,7 @@ class Content(CellContent):
     def require_consistent(self) -> None:
         """Refuse sections that do not fit each other."""
         super().require_consistent()
+        # the loss factor of the material is that which stage modulus computes
         if self.has_material_damping:
             has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
             key = f"{next(iter(self.structure_sections))}.damping_ratio"
@@ -146,6 +147,7 @@ class Content(CellContent):
     def _require_excitation(self) -> None:
         """Refuse a structure at rest without loads."""
         section = self.structure_section
+        # Without loads a structure at rest stays at rest, and bounds of that look like results.
         if section is None or section.moves_by_itself:
             return
         has_ground = section.nominal.model.ground is not None
@@ -167,6 +169,7 @@ class Content(CellContent):
             has_ground = section.nominal.model.ground is not None
             require_alone("records", has_ground, "an accelerogram")
             section.require_pattern()
+        # these ask for one response, and a suite has one for each record
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
@@ -184,6 +187,8 @@ class Content(CellContent):
 
     def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
         """Refuse studies and questions that the structure cannot answer."""
+        # the motion of columns that yield has kinks where they do, and proofs and followers need
+        # derivatives by the inputs
         if yields(structure.model):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
@@ -223,6 +228,7 @@ class Content(CellContent):
             computed = r"E|zeta\d*"
         elif "modulus" in self.stages:
             computed = "E"
+        # what a stage computes may be crisp in the stand-in and fuzzy in the run
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")
         for output in study.figures:

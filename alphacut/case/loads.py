@@ -67,11 +67,14 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
             return ForceHistory(History.constant(start, is_static=is_static))
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
+    # any other first word is the name of a file
     try:
         path = case_file(kind, info)
     except RefusedError as error:
         raise RefusedError("", kind, f"{HISTORY}; {error.allowed}") from None
     force = read_force_history(path)
+    # A file with a unit has forces, and amplitudes are factors of them; one without has numbers,
+    # and amplitudes are forces.
     history = History(force.step, force.samples, start, is_static=is_static)
     return ForceHistory(history, "" if force.has_unit else "N")
 
@@ -139,6 +142,7 @@ def with_forces(
             forces.append(PlacedForce(index, amplitude.nominal, history))
             amplitudes.append(amplitude)
             units.append(unit)
+    # the structure chooses the names of amplitudes: of floors as F3, of unknowns F1, F2 …
     model, names = structure.model.with_forces(forces)
     numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
     force_units = dict(zip(names, units, strict=True))
@@ -163,6 +167,7 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
     require(is_relative, "", value, allowed)
+    # sorted, so that a suite has the same order on every file system
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)

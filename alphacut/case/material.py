@@ -78,12 +78,14 @@ class RadiusMapSection(ThetaSection):
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """Return the map at crisp values of its parameters, by their names."""
+        # eq. 12: r = Σ a_i H_i(ξ) with the four Hermite functions on −1 ≤ ξ ≤ 1
         a1, a2, a3, a4 = [values[name] for name in self.numbers]
         return HermiteMap(a1, a2, a3, a4, self.law)
 
     def require_consistent(self) -> None:
         """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
-        # corners of the supports suffice, as the map is linear in a1 … a4
+        # r(θ) is linear in a1 … a4, so that its extremes over the box of their supports are at
+        # corners: the map stays in (0, 1) if it does at the 2⁴ corners.
         for ends in itertools.product(*({*x.support} for x in self.numbers.values())):
             corner = dict(zip(self.numbers, ends, strict=True))
             try:
@@ -281,6 +283,8 @@ class RoundCell(Section):
         is_solved = is_isotropic or self.particles != "spheres"
         key, allowed = "cell.inclusion_modulus", "Young's modulus of spheres"
         require(is_solved, key, "a plane stiffness", allowed)
+        # An outline of the reach R (its largest distance from the centre over r) touches the next
+        # cell where r is 1/R.
         if self.fraction is not None:
             largest = self.fraction.support.upper
             touching = float(self.shape.fractions(1 / reach(outline)))
@@ -337,6 +341,7 @@ class ImageCell(Section):
     @property
     def is_solid(self) -> list[bool]:
         """Whether each phase is neither a pore nor rigid, throughout its support."""
+        # a phase that may be a pore at some level has no lower bound of its own
         return [young.support.lower > 0 and young.support.upper < RIGID for young in self.modulus]
 
     @property
@@ -356,6 +361,8 @@ class ImageCell(Section):
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
+        # A pore dissipates nothing and a rigid phase is not strained: their loss factors would
+        # stand in no sum of energies.
         is_possible = all(self.is_solid) or not self.loss
         cure = "pores in one material leave its loss factor; else take a small modulus for pores"
         require(is_possible, "cell.loss", "there", "none beside a pore or a rigid phase", cure)
@@ -383,7 +390,7 @@ class ImageCell(Section):
         lengths: tuple[float, ...] = self.voxel or self.pixel or ()
         if len(lengths) == 1:
             return lengths * self.dimension
-        return lengths[::-1]
+        return lengths[::-1]  # as the axes of arrays
 
     @property
     def sides(self) -> tuple[float, ...]:

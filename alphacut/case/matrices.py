@@ -118,6 +118,7 @@ class MatricesSection(StructureSection):
         """
         damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
         ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
+        # a structure needs one parameter at least, from which numbers take their type
         numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
@@ -137,6 +138,7 @@ class MatricesSection(StructureSection):
                 ratios=tuple(ratios),
                 row_factors={name: output.factor for name, output in self.outputs.items()},
             )
+            # the fractions of energy by which the material damps modes need the modes of the model
             if damping is not None:
                 ratios = self._material_damping_ratios(damping, model, loss or LOSS_STAND_IN)
                 numbers |= ratios

@@ -58,6 +58,7 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
+        # Pydantic tries each member of a union, whose errors may be the same: each is told once.
         problems: dict[str, RefusedError] = {}
         for x in _refusals(model, error):
             place = "command line" if _is_below(x.key, changed) else str(path)
@@ -73,8 +74,9 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
     Raises:
         BadInput: The text is not TOML; it names the file and the line.
     """
+    # tomllib calls itself for nested brackets, of which a text may have more than the stack holds
     try:
-        return tomllib.loads(text.replace("\r\n", "\n"))
+        return tomllib.loads(text)
     except (RecursionError, ValueError) as error:
         shown, place = "the file", str(path)
         # an integer of too many digits has no line
@@ -88,6 +90,7 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
 
 def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedError]:
     """Yield what is wrong by each error of Pydantic; a misspelt key is not missing as well."""
+    # A misspelt key is two errors of Pydantic: an unknown key, and the right one that is missing.
     details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
@@ -182,6 +185,7 @@ def apply_changes(
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
+        # a key without its section is met by the section that has it
         if key not in full_keys:
             close = [full for full in full_keys if full.endswith(f".{key}")]
             cure = f"did you mean {close[0]}?" if close else suggestion(key, full_keys)

@@ -331,7 +331,8 @@ class Frame(StructureSection):
         # numbers by floor or storey, by the names of the frame's own arguments
         lists = {name: self.per_floor(getattr(self, NAMES.get(name, name))) for name in SYMBOLS}
         lists["second_moment"] = self.second_moment or ()  # of all storeys, where it is one
-        if self.stiffness:  # which needs neither columns nor a modulus
+        # given stiffnesses need neither columns nor a modulus
+        if self.stiffness:
             lists["columns"], young = (), self.modulus
         else:
             young = modulus or self.modulus or STAND_IN
@@ -369,6 +370,7 @@ class Frame(StructureSection):
         for name, numbers in lists.items():
             for z, number in enumerate(numbers, start=1):
                 stated[SYMBOLS[name].format(z)] = number
+        # what the case leaves out has the frame's default, such as q1_0 = 0
         by_name = {name: stated.get(name) or Crisp(x) for name, x in model.parameters.items()}
         heights: dict[str, FuzzyNumber] = {}
         for z, height in enumerate(lists["lengths"], start=1):
@@ -377,10 +379,12 @@ class Frame(StructureSection):
 
     def require_consistent(self) -> None:
         """Refuse a frame without damping, with contradictory damping or impossible values."""
+        # ζ of the material is that of a frame whose strain energy is all in its columns
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"
         require(has_columns, "frame.damping_ratio", value, allowed)
+        # undamped motions are unusual: whoever wants one says so, as "0 %"
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
         is_damped = any(map(self.has_key, DAMPING))

@@ -95,6 +95,7 @@ class CellProblem:
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         if fuzzy:
             return fuzzy
+        # a campaign has one input at least; of crisp cells it is a modulus at one value
         for name in ("inclusion_modulus", "matrix_modulus", *numbers):
             if name in numbers:
                 return {name: numbers[name]}
@@ -196,6 +197,7 @@ class CellProblem:
         if isinstance(self.cell, MeshedCell):
             return {}
         radius_map = self.nominal.radius_map
+        # the mean over θ of a fraction that is smooth in θ: Gauss quadrature with its distribution
         rule = gauss_rule(radius_map.distribution, points=NODES)
         is_space = self.cell.particles == "spheres"
         if is_space:
@@ -209,6 +211,7 @@ class CellProblem:
             return found
         if self.stated_fraction is not None:
             fraction = found["fraction_of_case"] = self.stated_fraction
+        # Hashin and Shtrikman (1963) of space; Hashin (1965) of the plane across fibres
         bounds = reference_bounds(phases, fractions=[1 - fraction, fraction], space=is_space)
         lower, upper = bounds.young
         found["hashin_shtrikman_E_GPa"] = lower / GPA, upper / GPA

@@ -116,6 +116,7 @@ class EnvelopeTask:
         arguments = self.arguments(structure) | {"progress": subprogress(context.tick, 0.0, end)}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
+        # the lowest level contains all others, so its extremes are those of the envelope
         data = result.to_dataset()
         lowest = data.isel(alpha=0)
         names = [str(name) for name in data["output"].values]
@@ -233,6 +234,7 @@ def require_tolerance(
     """
     if task.section.tolerance is None:
         return
+    # 1e-9 of the tolerance is left to the rounding of the errors' own computation
     allowed, data = task.tolerance(structure), result.arrays
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):

@@ -75,6 +75,8 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
 
     What neither of the extremes admits is wrong whatever a stage will compute.
     """
+    # Refusals that depend on the material are those of a modulus that is too small or of a loss
+    # factor that is too large, or the reverse: one of two extremes admits what any material does.
     known = foreseen_material(content)
     if known is not None:
         return (known,)
@@ -92,6 +94,8 @@ def structure_as_computed(content: Content, material: Material) -> Structure:
     structure = content.structure_of(material.modulus, material.loss)
     if "modulus" not in content.stages:
         return structure
+    # Which inputs are fuzzy decides on the method and its cost, how wide they are does not: widths
+    # of 1 % and 10 % stand for those that the stage will find.
     has_cuts = content.modulus.alpha != (1.0,)
     is_fuzzy = has_cuts
     if has_cuts and content.image_cell is None and "microstructure" not in content.stages:

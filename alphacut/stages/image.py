@@ -111,6 +111,7 @@ def compute_cuts(
 
 def image_result(found: FuzzyImageStiffness) -> ImageResult:
     """Return the numbers of a fuzzy stiffness in the units of results."""
+    # the whole matrices are of the highest level alone, where the phases are crisp or nearly so
     top, is_space = found.cuts[-1], len(found.lengths) == 3
     along_axes = in_units_of_results(found.constants)
     references = References()

@@ -107,6 +107,7 @@ def infinite_if_unknown(cuts: Ends) -> Ends:
 
 def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusResult:
     """Return the numbers of a fuzzy stiffness in the units of results."""
+    # results have moduli in GPa, the dataset beside them has SI units
     bounds = stiffness.bounds
     known = {name: stiffness.cuts(name) for name in stiffness.constants}
     plane: dict[str, dict[str, Ends]] = {}

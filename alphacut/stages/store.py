@@ -194,6 +194,7 @@ class StageStore:
                 results[stage.name] = found
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
+        # a stage alone may use all workers itself, and further files need this process
         total, done = sum(stage.work for stage in stale), 0.0
         if executor is None or self.folder is None or len(stale) == 1:
             for stage in stale:
@@ -223,6 +224,8 @@ class StageStore:
         files = folder.made_from(key)
         if numbers_file not in files:
             return None
+        # Every file of the stage is compared with its digest, figures too: a result is whole or
+        # computed anew.
         try:
             contents = {file: folder.content(file) for file in files}
             numbers = from_document(stage.kind, json.loads(contents[numbers_file])["result"])
@@ -244,6 +247,7 @@ class StageStore:
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:
             if folder is None:
                 return stage.run(StageContext(workers=self.workers, tick=tick))
+            # refused before hours of work, not after them
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
@@ -269,6 +273,7 @@ class StageStore:
     def _write(self, stage: Stage[T], computed: StageResult[T], files: Path) -> StageResult[T]:
         """Write a result into the folder, beside the other files of its stage in `files`."""
         assert self.folder is not None
+        # all ranks compute the same result, and the first one writes it
         name, key = f"{stage.name}.json", stage.key
         if rank() != 0:
             return replace(computed, fingerprint=key)

@@ -42,6 +42,7 @@ def suite_records(
         scale=section.scale.value,
         measure=section.scale.measure,
     )
+    # each response ends some periods after its record, at a time of its own
     for record in records:
         envelope.require_steps(f"envelope.duration of {record.name}", record.duration)
     return records

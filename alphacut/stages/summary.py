@@ -190,6 +190,7 @@ class Parts:
                 size = max(abs(float(peak.lower[0])), abs(float(peak.upper[0])))
                 output = output_of(name)
                 largest[output] = max(largest.get(output, 0.0), size)
+        # outputs without a peak have the extremes of their envelope
         for envelope in self.envelopes.values():
             for output in envelope.min:
                 size = max(abs(envelope.min[output]), abs(envelope.max[output]))

@@ -502,8 +502,8 @@ class StoreyFrame(LinearSystem):
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
         """
-        # With k = 12 c E I / l³ the ratio k l / P is 12 c E I / (l² P). It is smallest at the highest
-        # l and P and the lowest c, E and I; of given springs at the lowest k and l.
+        # With k = 12 c E I / l³ the ratio k l / P is 12 c E I / (l² P). It is smallest at the
+        # highest l and P and the lowest c, E and I; of given springs at the lowest k and l.
         worst_when_high = "m" if self.stiffness else "ml"
         p: dict[str, Jet] = {}
         for name, nominal in self.parameters.items():
