@@ -115,6 +115,7 @@ class Boxes:
             These boxes, and for each level of `alpha` the row of its box among them, (levels,).
         """
         ends = np.concatenate([self.lower, self.upper], axis=1)
+        # The lowest level is always new.
         is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
         return self.on_levels(np.flatnonzero(is_new)), np.cumsum(is_new) - 1
 
@@ -139,6 +140,7 @@ class Boxes:
         if 2**d <= max_corners:
             ends = corners(-np.ones(d), np.ones(d))
         else:
+            # The seed is fixed, so that repeated runs have equal bits.
             random = np.random.default_rng(7).choice([-1.0, 1.0], (max_corners - 2, d))
             ends = np.vstack([-np.ones(d), np.ones(d), random])
         return np.asarray(np.unique(np.vstack([self.nominal, self.to_physical(ends)]), axis=0))
@@ -158,6 +160,7 @@ class Boxes:
 
         The unit coordinate of a parameter without width is 0.
         """
+        # A radius of zero is replaced by 1, which gives 0 / 1 for the only point.
         return np.asarray((points - self.centre) / np.where(self.radius > 0, self.radius, 1.0))
 
     def to_physical(self, unit: Array) -> Array:
@@ -165,6 +168,7 @@ class Boxes:
 
         They never lie outside the widest box.
         """
+        # Rounding of the sum must not leave the support, which may end at a limit of the parameter.
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
     def unit_ends(self, level: int) -> tuple[Array, Array]:
@@ -251,6 +255,7 @@ class UnitFlow:
     @cached_property
     def _sizes(self) -> OutputSizes:
         """Peaks at the probes of the boxes, and which outputs are at rest."""
+        # The peak is needed for scales and tolerances only; a few responses tell it well enough.
         peak = np.abs(self.flow.values(self.boxes.probes)).max(axis=(0, 1))
         reach = self.flow.reach()
         at_rest = peak <= AT_REST * reach

@@ -106,6 +106,7 @@ class Envelope(Bounds):
             dataset["attained_error"] = (deviation, self.attained_error)
 
         units = sorted(set(self.units)) or ["SI"]
+        # One attribute serves all outputs of a variable.
         unit = units[0] if len(units) == 1 else "SI, by output"
         for name in set(dataset.data_vars) - {"nature", "label"}:
             is_input = name in ("lower_at", "upper_at")
@@ -136,5 +137,6 @@ def within_steps(size: Array, between: Array | None) -> Array:
     """
     if between is None:
         return size
+    # Within a step the function exceeds the larger end by `between` at most.
     inside = np.maximum(size[..., 1:], size[..., :-1]) + between[..., 1:]
     return np.concatenate([size[..., :1], inside], axis=-1)

@@ -105,7 +105,10 @@ def envelope(
         bounds = with_step_error(bounds, flow, steps)
         if proof:
             bounds = _with_proof(bounds, flow, proof, subprogress(tick, 0.5, 1.0))
+        # Between the nodes proofs state a bound; for other methods some trajectories give an
+        # estimate.
         bounds = with_node_deviation(bounds, flow)
+        # Guaranteed bounds are tested by exact responses that another algorithm computes.
         if has_matrices(model) and np.isfinite(bounds.proved.upper).all():
             bounds = with_motions_tested(bounds, model)
         if tick:
@@ -158,6 +161,7 @@ def _build_problem(
     allowed = "auto or quasi-monte-carlo where columns yield"
     require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
+        # Proofs hold for the exact response.
         is_exact = yields(model) or isinstance(chosen, Auto | Proof | DualProof)
         integrator = "exact" if is_exact and has_matrices(model) else "midpoint"
     cuts = boxes(inputs, alpha)
@@ -203,6 +207,7 @@ def require_envelope(
     """
     problem = _build_problem(model, inputs, method, **arguments)
     flow = problem.flow.flow
+    # Three steps show whether the response exists, at little cost.
     first_steps = replace(flow, duration=min(3 * flow.step, flow.duration))
     if isinstance(first_steps, LinearFlow):
         first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
@@ -253,7 +258,9 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
     if not has_matrices(system):
         return
     ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
+    # Second-order effects of the weight reduce the stiffness of a storey.
     system.require_standing(dict(zip(cuts.names, ends, strict=True)))
+    # A structure that nothing moves has no peaks to bound.
     is_moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
         try:

@@ -74,6 +74,7 @@ class Answer(ABC):
     def to_csv(self, path: str | Path) -> None:
         """Write the rows of numbers to a CSV file, with all digits and in SI units."""
         rows = self.records()
+        # An empty cell is an unknown number in every spreadsheet.
         cells = [["" if x is None else str(x) for x in row.values()] for row in rows]
         Path(path).write_text(csv_text([*rows[0]], cells), encoding="utf-8")
 
@@ -88,6 +89,7 @@ class Answer(ABC):
         variables = {}
         for title in rows[0]:
             column = [row[title] for row in rows]
+            # A column of unknown numbers alone is one of numbers.
             is_text = any(isinstance(value, str) for value in column)
             variables[title] = ("row", np.array(column, str if is_text else float))
         return xarray.Dataset(variables, attrs={"title": self.title, "notes": self.all_words()})

@@ -77,6 +77,7 @@ class LimitDecision(LimitResult):
     @property
     def verdict_and_motion(self) -> str:
         """The verdict; if only some responses exceed the limit, with the inputs of one of them."""
+        # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
         if not is_by_some or self.peak is None or not self.peak.reached_at:
             return self.verdict_words
@@ -136,6 +137,7 @@ class Decision(Answer):
             attained = part.attained_peak
             bound_text = part.text_of(bound, part.peak.bound_side)
             if np.isfinite(bound):
+                # The bound is an end of an interval that is open on the other side.
                 relation = {"lower": "≥", "upper": "≤"}[part.peak.bound_side]
                 bound_text = f"{relation} {bound_text}"
             attained_text = part.text_of(attained, part.peak.bound_side, Nature.ATTAINED)
@@ -227,6 +229,7 @@ def decide(
         found: Peaks = peaks(response, [limit.peak for limit in named.values()])
     else:
         named = limits_by_name(limits, ())
+        # A limit applies to the largest peak over the records, or to the mean.
         if isinstance(response, SuitePeaks):
             output_units |= response.units
             farthest_record = response.farthest_record
@@ -244,6 +247,7 @@ def decide(
             input_units=input_units or {},
         )
     if len(decisions) > 1:
+        # With one limit the event that any is exceeded is the limit itself.
         decisions[ANY] = _decide_any(list(decisions.values()))
     # All peaks have the same levels and enclose the same set.
     first = next(iter(found.values()))
@@ -317,6 +321,7 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
         margin = np.stack(part.margin)
         # Margins as fractions of the limits; for a limit of 0 only their signs have a meaning.
         margins.append(margin / abs(part.limit) if part.limit else np.sign(margin))
+    # The event leaves the smallest of the margins.
     lower, upper = np.min(margins, axis=0)
     lowest_level = single[0].from_level
     is_exceeded = any(part.verdict in ("exceeded", "can be exceeded") for part in single)

@@ -139,6 +139,7 @@ class CriticalMeasures:
             measure_or_infinite = np.append(record.measure, np.inf)
             # Index of the first measure at which some structure exceeds the limit, and of the first
             # one of the last measures at which all structures do; `count` if there is none.
+            # argmax of a mask is the index of its first true entry, and 0 if there is none.
             crossing = np.where(by_some.any(axis=1), by_some.argmax(axis=1), count)
             after_last = count - (~by_all)[:, ::-1].argmax(axis=1)
             ends = (
@@ -238,6 +239,8 @@ def counts_between(records: Sequence[Increments], name: str, measure: Array) -> 
         # Outside the measures that were tried, the first or the last one counts.
         before = np.maximum(after - 1, 0)
         after = np.minimum(after, len(record.measure) - 1)
+        # A structure that exceeds at both measures may keep the limit between them; this is not
+        # seen and said in `Fragility.words`.
         count_all += by_all[:, before] & by_all[:, after]
         count_some += by_some[:, before] | by_some[:, after]
     return Ends(count_all, count_some)
@@ -292,6 +295,7 @@ class LimitFragility(LimitResult):
         for end in ends:
             logarithms = np.log(end)
             if np.isfinite(end).all() and np.ptp(logarithms) > 0:
+                # The fit has the mean and the standard deviation of the logarithms of the sample.
                 deviation = logarithms.std(ddof=1)
                 curves.append(ndtr((np.log(self.measure) - logarithms.mean()) / deviation))
         return curves
@@ -345,6 +349,7 @@ class Fragility(Answer):
         text = f"median {self.measure} {_level_text(part.median, level, self.unit)}"
         if self.unit != "m/s^2":
             return text
+        # Engineers state accelerations in g.
         in_g = _level_text(part.median, level, "g", unit_size=STANDARD_GRAVITY)
         return f"{text} ({in_g})"
 
@@ -439,6 +444,7 @@ class Fragility(Answer):
         for peak, names in self.limits_by_demand.items():
             for record, increments in self.increments.items():
                 head: Record = {"peak": peak, "unit": self.limits[names[0]].unit, "record": record}
+                # All limits of a peak have the same curve.
                 demands = self.demand_curve(names[0], record)
                 measure = {self._measure_title: increments.measure}
                 rows += curve_rows(head, self.alpha, measure=measure, demands=demands)
@@ -639,7 +645,9 @@ def incremental_analyses(
     cuts = boxes(inputs, alpha)
     analyses = {}
     for record in records:
+        # A record divided by its intensity has the intensity 1.
         unit_samples = np.asarray(record.ground.samples / record.measures[intensity])
+        # A scaled record has no name and no remarks of its own.
         frame = replace(model, ground=Accelerogram(record.ground.step, unit_samples))
         analyses[record.name] = IncrementalAnalysis(
             frame, cuts, pairs, record.duration, step, events=events
@@ -698,6 +706,8 @@ def fragility_of(
             critical[name] = CriticalMeasures.from_peaks(peaks, measures, limit.outwards)
             natures[name] = Nature.weakest(peak.nature for peak in peaks)
         for event, members in events.items():
+            # Critical measures of linear structures are intervals of numbers; the event is reached
+            # with the first of its limits.
             critical[event] = CriticalMeasures.of_any([critical[member] for member in members])
             natures[event] = Nature.weakest(natures[member] for member in members)
 
@@ -713,6 +723,8 @@ def fragility_of(
         measure = _grid(critical[name], demands)
         counts = critical[name].counts(measure)
         if demands:
+            # The sets of measures of a yielding frame need not be intervals, so that they are
+            # counted one by one.
             counts = counts_between(demands, name, measure)
         parts[name] = _limit_fragility(
             about[name], natures[name], critical[name], measure, counts, independent=independent
@@ -752,6 +764,7 @@ def _limit_fragility(
     n_records = critical.low.shape[1]
     confidence = dispersion = None
     if independent:
+        # The probability of a miss is divided between both limits.
         tail = (1 - CONFIDENCE) / 2
         confidence = clopper_pearson(counts.lower, counts.upper, n_records, tail)
     if n_records > 1:

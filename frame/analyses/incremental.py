@@ -180,6 +180,7 @@ class IncrementalAnalysis:
         small_scale = 1e-6
         n_storeys = self.model.floors
         storeys = [(f"ductility{z}", 1.0) for z in range(1, n_storeys + 1)]
+        # Ductilities of all storeys tell at which scale the first one yields.
         demands = self._peaks_over_limits(small_scale, points, [*storeys, *self.limits])
         ductility = demands[:, :n_storeys].max(axis=1, keepdims=True)
         demands = demands[:, n_storeys:]
@@ -190,6 +191,8 @@ class IncrementalAnalysis:
 
     def _grid(self, structures: Array) -> list[float]:
         """Return the scales of the grid; at the first one all structures are elastic."""
+        # The first scale is a grid step below the one at which the first structure yields or
+        # exceeds a limit.
         first = self.elastic_scales(structures).min() / GRID_RATIO
         # At least two scales, even if the largest scale moves the structure elastically.
         first = min(first, self.greatest_scale / 2)
@@ -213,6 +216,7 @@ class IncrementalAnalysis:
         assert record is not None
         outputs = tuple(dict.fromkeys(output for output, _ in limits))
         ground = Accelerogram(record.step, scale * record.samples)
+        # Each output is computed once, however many limits it has.
         model = replace(self.model, ground=ground, outputs=outputs)
         flow = YieldingFlow(model, self.cuts.names, self.duration, self.step)
         peaks = flow.values_and_peaks(points, takes_collapse=True)[1]
@@ -229,7 +233,8 @@ class IncrementalAnalysis:
         for level, (low, high) in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
             # 16 points inside the cut, on its faces, and of its corners (tuned: more are slower and
             # leave less to the searches).
-            unit = spread_points(*cuts.unit_ends(level), count=16, skip=SKIPPED * (level + 1))
+            lower, upper = cuts.unit_ends(level)
+            unit = spread_points(lower, upper, count=16, skip=SKIPPED * (level + 1))
             structures.append(np.clip(cuts.to_physical(unit), low, high))
         return np.asarray(np.unique(np.concatenate(structures), axis=0))
 
@@ -245,6 +250,7 @@ class IncrementalAnalysis:
         moved, demands = self.moved.get(scale, nothing)
         # Rows are compared by their bits: the same structure always has the same coordinates.
         known_rows = {row.tobytes() for row in moved}
+        # Searches propose the same corners many times.
         points = np.unique(points.reshape(-1, n_inputs), axis=0)
         points = points[[row.tobytes() not in known_rows for row in points]]
         if len(points):
@@ -347,6 +353,7 @@ class ScaledPeaks(Answer):
                 low = float(smallest[0, -1])
                 high = float(largest[0, -1])
                 ends = range_text(low, high, Nature.ATTAINED)
+                # An output without a unit, such as a ductility, leaves a blank.
                 texts.append(f"{output} {ends} {self.units[output]}".strip())
             title = f"peaks at scale {self.scales[-1]:g}"
             rows.append({"record": record, title: "; ".join(texts), "nature": Nature.ATTAINED})

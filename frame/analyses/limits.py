@@ -81,6 +81,7 @@ class Limit:
 
         A smallest value of q that falls below the limit L is a largest value of -q above -L.
         """
+        # Smallest values are compared by their negatives, so that all limits are upper limits.
         sign = -1.0 if self.side == "min" else 1.0
         return sign * self.number + 0.0  # -0.0 becomes 0.0
 
@@ -184,6 +185,7 @@ class LimitResult:
             return in_si
         # Minus signs are typographic in texts.
         stated = re.sub(r"-(?=[\d.])", MINUS, self.stated)
+        # A fraction of a storey height or of the weight tells an engineer more with its value.
         is_fraction = stated.endswith("%") or re.fullmatch(r"1\s*/\s*\d+", stated)
         if is_fraction and self.unit:
             return f"{stated} ({in_si})"

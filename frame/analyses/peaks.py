@@ -142,6 +142,7 @@ class Peak:
         """Lower and upper bound of the smallest peak of each cut, of `outwards`."""
         if self.is_least:
             return self.outwards.min_peak_bounds
+        # A magnitude is not negative.
         below = self.lower - self._excluding_error
         lower_bound = np.maximum(np.maximum(below, _smallest_peak(self.side)), self.least_lower)
         # Each cut contains the narrowest one. The smallest peak of a cut is therefore at most the
@@ -172,6 +173,7 @@ class Peak:
         attained = np.where(np.isfinite(self.reached), self.reached, np.nan)
         difference = np.abs(self.far_end - attained)
         size = np.abs(self.far_end)
+        # A bound of zero is attained, as no magnitude is smaller.
         ratio = np.divide(difference, size, out=np.zeros_like(size), where=size > 0)
         return np.asarray(ratio)
 
@@ -233,6 +235,7 @@ def _peak_of(band: Envelope, name: str) -> Peak:
     upper = ends.upper.max(axis=1)
     lower = ends.lower.max(axis=1)
     bound_at_nodes = ends.upper + error
+    # Peaks count at all times, not at the nodes alone.
     bound = within_steps(bound_at_nodes, between).max(axis=1)
     if band.searched_peaks is not None and not side:
         added = np.zeros_like(bound)
@@ -251,6 +254,7 @@ def _peak_of(band: Envelope, name: str) -> Peak:
     above = bound - upper
     peak_error = np.maximum(above, below)
     if is_guaranteed:
+        # A proof may bound the smallest peak better than the band does.
         lower = np.maximum(lower, least_lower)
         upper = upper + above
         peak_error = np.zeros_like(upper)
@@ -321,6 +325,7 @@ def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
     Returns:
         Inputs by name, in SI units; empty if none are known.
     """
+    # A magnitude is largest at the upper end, or at the lower end with its sign changed.
     upper_end = band.attained.upper[0, :, column], band.upper_at[0, :, column]
     lower_end = -band.attained.lower[0, :, column], band.lower_at[0, :, column]
     chosen = {"max": [upper_end], "min": [lower_end]}.get(name[:3], [upper_end, lower_end])
@@ -364,13 +369,16 @@ def _tighter(first: Peak, second: Peak) -> Peak:
     # The guarantees are listed from the weakest to the strongest one.
     strength = list(Nature)
     better = max(both, key=lambda peak: (strength.index(peak.nature), -peak.error.max()))
+    # What either analysis attains is attained, and bounds of the smallest peak hold together.
     found = with_combined(better, both, np.max, "reached", "least_lower")
     found = with_combined(found, both, np.min, "least_upper")
     natures = {first.nature, second.nature}
     if natures == {Nature.GUARANTEED}:
+        # Both guarantees hold, hence their intersection.
         found = with_combined(found, both, np.max, "lower")
         found = with_combined(found, both, np.min, "upper")
     elif natures == {Nature.ATTAINED}:
+        # Both ranges are attained, hence their union.
         found = with_combined(found, both, np.min, "lower")
         found = with_combined(found, both, np.max, "upper", "error")
     between_nodes = better.between_nodes

@@ -194,9 +194,11 @@ def probability(
     """
     if not isinstance(random, Mapping):
         random = {name: inputs[name] for name in random}
+        # What is random is not fuzzy.
         inputs = {name: number for name, number in inputs.items() if name not in random}
     named = limits_by_name(limits, (), magnitudes=True)
     model = model.with_outputs(tuple(named))
+    # A parameter that is drawn at random cannot be a coordinate of a fuzzy point as well.
     shared = ", ".join(sorted(set(inputs) & set(random)))
     require(not shared, "random", value=shared, allowed="inputs that are not fuzzy too")
     draws = _random_draws(random, samples, seed)
@@ -253,6 +255,7 @@ def _random_draws(random: Mapping[str, FuzzyNumber | Sampler], samples: int, see
     Raises:
         RefusedError: A parameter does not give `samples` finite values.
     """
+    # One generator for all parameters: their draws are independent.
     rng = np.random.default_rng(seed)
     columns = []
     for name, number in random.items():
@@ -278,6 +281,7 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     # where it is linear between them.
     grid = np.unique(np.append(uniform, number.cuts[1:]))
     membership = number.membership(grid)
+    # Trapezoidal rule.
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2
     integral = np.concatenate([[0.0], np.cumsum(areas)])
 
@@ -383,9 +387,11 @@ def _limit_probability(
         is_random: Whether there are random inputs.
     """
     # The bounds are computed for 201 further limits, and for the limit itself, a ratio of 1.
+    # Beyond these limits the probability is 0 or 1.
     smallest = ratios.lower.min()
     largest = ratios.upper.max()
     limits = np.append(np.linspace(0.95 * smallest, 1.05 * largest, 201), 1.0)
+    # Lower bounds of peaks give lower bounds of probabilities, and upper ones upper bounds.
     low = _bounds_over_points(_fractions_above(ratios.lower, limits), level).lower
     at_nodes = _bounds_over_points(_fractions_above(ratios.upper, limits), level)
     lower_at_nodes = at_nodes.lower[:, -1]

@@ -95,6 +95,7 @@ def sensitivity(
     start = np.empty((len(outputs), len(inputs)))
     for row, output in zip(start, outputs, strict=True):
         known = (reached_at or {}).get(output, {})
+        # The attained peak of a proof is a good start: it is often the largest one.
         row[:] = [known.get(name, number.nominal) for name, number in inputs.items()]
     # Inputs of the largest and the smallest peak of each output when all inputs are fuzzy, shape
     # (2, outputs, inputs); filled by the first call of `bounds`.
@@ -125,6 +126,7 @@ def sensitivity(
             found.extend(np.array([x.point for x in side]) for side in (largest, smallest))
         return np.array([x.peak for x in smallest]), np.array([x.peak for x in largest])
 
+    # The width with a group fixed is compared with the width with all inputs fuzzy.
     fractions = width_shares(bounds, inputs, groups=groups)
     by_output = {}
     for k, output in enumerate(outputs):

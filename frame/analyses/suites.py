@@ -143,6 +143,7 @@ def scaled_records(
         # damping ratio of 5 % reduces it to a fifth. The small number allows for rounding.
         record_length = (len(record.samples) - 1) * record.step
         length = min(duration, record_length + 5 * mode.period)
+        # The response ends with a whole step.
         n_steps = max(1, ceil(length / step - 1e-9))
         truncated_fraction = 0.0
         if length < record_length:
@@ -275,6 +276,7 @@ class SuitePeaks(Answer):
                     "unit": self.units[output_of(peak_name)],
                     "farthest peak": known(bound[0]),
                 }
+                # Statistics have no measures and no guarantee of their own.
                 rows.append(no_values | row)
         return rows
 
@@ -392,6 +394,8 @@ def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
         of_records = [found[name].outwards for found in peaks.values()]
         farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
         nature = Nature.weakest(peak.nature for peak in of_records)
+        # A bound of the largest peak is the largest of the bounds; the fields that are no arrays
+        # are those of the record under which it is attained.
         found = with_combined(
             replace(farthest, nature=nature), of_records, np.max,
             "lower", "upper", "error", "reached", "least_lower", "least_upper",
@@ -427,6 +431,7 @@ def mean_peaks(
         # At most 64 corners of each cut (tuned: more take time, and none is a bound).
         ends_of_inputs = np.column_stack([lower, upper])
         points += map(np.array, islice(product(*ends_of_inputs), 64))
+    # Cuts share corners, for example those of crisp inputs.
     tried = np.unique(points, axis=0)
     is_inside = (tried >= cuts.lower[:, np.newaxis]) & (tried <= cuts.upper[:, np.newaxis])
     is_in_cut = is_inside.all(axis=-1)  # (levels, structures)
@@ -434,6 +439,7 @@ def mean_peaks(
     tried_means: Array = np.zeros((len(tried), len(magnitudes)))
     for record in records:
         moved = model.moved_by(record.ground).with_outputs(magnitudes)
+        # Exact responses at the same nodes as the bounds.
         flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
         columns = [flow.outputs.index(output) for output in magnitudes]
         tried_means += np.abs(flow.values(tried)).max(axis=1)[:, columns] / len(records)

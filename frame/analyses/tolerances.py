@@ -89,6 +89,7 @@ class Tolerances(Answer):
             if self.kept is not None:
                 ends = rounded_ends(*support.kept, Nature.ATTAINED)
                 text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in ends))
+                # A deviation from zero has no percentage.
                 relative = f"about {support.nominal:g}"
                 if support.nominal:
                     relative = ", ".join(f"{x / support.nominal - 1:+.2%}" for x in support.kept)
@@ -179,6 +180,7 @@ def require_admissible_scale(
         require_admissible(model, boxes(scale_supports(inputs, most), [0.0]))
     except RefusedError as error:
         value = f"{most:g} times the supports: {error.key} is {error.value}"
+        # The user chose the scale, not the support.
         raise RefusedError("most", value, error.allowed, "a smaller scale") from None
 
 
@@ -220,6 +222,7 @@ def tolerances(
         name: limit.number for name, limit in limits_by_name(limits, (), magnitudes=True).items()
     }
     model = model.with_outputs(tuple(largest_allowed))
+    # A scale beyond 1 may lead to a negative mass or stiffness.
     require_admissible_scale(model, inputs, most)
     # Peaks by the scales that were tried.
     tried: dict[float, Peaks] = {}
@@ -258,6 +261,7 @@ def tolerances(
     width = precision * most
     kept = next((scale for scale in (most, *tried, 0.0) if is_excluded(scale)), 0.0)
     if kept < most and is_excluded(kept):
+        # The smallest scale above it that was tried, which is not excluded.
         not_excluded = min(scale for scale in tried if scale > kept)
         kept = _bisected(is_excluded, kept, not_excluded, width)
 
@@ -271,6 +275,7 @@ def tolerances(
         clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and np.isfinite(passed):
         clear = _bisected(lambda scale: not is_exceeded(scale), clear, passed, width)
+        # The bisection has tried further scales.
         passed = min(filter(is_exceeded, tried))
 
     supports = {}

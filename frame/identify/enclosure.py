@@ -53,6 +53,7 @@ def enclosure(
         if relaxation.unmeasured and not relaxation.is_empty:
             for key, expression in relaxation.unmeasured.items():
                 amplitudes[key] = relaxation.bounds(expression)
+            # An empty range proves that no parameters agree with the modes.
             if any(low > high for low, high in amplitudes.values()):
                 return None
             relaxation = ChainRelaxation(chain, lower, upper, modes, amplitudes)
@@ -63,6 +64,8 @@ def enclosure(
         has_width = width > 0
         for k in np.flatnonzero(has_width):
             low, high = relaxation.bounds(relaxation.logs[k])
+            # Each program uses the box with which the pass began; its bounds are intersected with
+            # the box.
             lower[k] = max(low, lower[k])
             upper[k] = min(high, upper[k])
         if (lower > upper).any():
@@ -125,6 +128,7 @@ class LinearRelaxation:
             return y * a
         if c == d:
             return x * c
+        # A bilinear function has its extremes over a rectangle at the corners.
         corners = (a * c, a * d, b * c, b * d)
         z = self.variable(min(corners), max(corners))
         for p, q, sign in ((a, c, -1), (b, d, -1), (b, c, 1), (a, d, 1)):
@@ -142,6 +146,7 @@ class LinearRelaxation:
         x = self.variable(float(np.exp(low)) * (1 - 1e-15), float(np.exp(high)) * (1 + 1e-15))
         for point in (low, (low + high) / 2, high):
             self.rows.append(np.exp(point) * (y + (1 - point) * self.one) - x)
+        # expm1 keeps the digits of a secant over a short interval.
         slope = np.exp(low) * np.expm1(high - low) / (high - low)
         self.rows.append(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
         return x
@@ -178,8 +183,10 @@ def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array
         slack = np.append(np.zeros(len(lower)), 1.0)
         if proved_minimum(slack, relaxed, np.append(lower, 0.0), np.append(upper, 1e3)) > 0:
             return np.inf
+    # Multipliers of zero give the minimum over the box alone.
     multipliers = no_multipliers
     if result.status == 0:
+        # The solver violates the sign by its tolerance at most.
         multipliers = np.minimum(result.ineqlin.marginals, 0.0)
 
     # The minimum of (c - Aᵀy)ᵀx over the box is attained at an end of each variable, by the sign of
@@ -298,6 +305,8 @@ class ChainRelaxation(LinearRelaxation):
         shears = []
         below = nothing  # amplitude of the ground
         for z in range(n):
+            # The shear force of a storey over the mean stiffness, since programs with numbers near
+            # 1 are solved best.
             shear = self.product(self.stiffness[z], shape[z + 1] - below)
             shears.append(shear * (chain.stiffness[z] / unit))
             below = shape[z + 1]
@@ -307,6 +316,7 @@ class ChainRelaxation(LinearRelaxation):
             force = inertia * (eigenvalue * chain.mass[z] / unit)
             imbalance = shears[z] - shears[z + 1] - force
             self.rows.append(imbalance)
+            # An equation is a pair of inequalities.
             self.rows.append(-imbalance)
 
     def _amplitude_ranges(
@@ -340,6 +350,7 @@ class ChainRelaxation(LinearRelaxation):
             springs = np.append(k[:, 0], 0.0)[np.append(floors, floors[-1] + 1)]
             difference = chain_matrix(springs[:-1]) - eigenvalue * np.diag(m[floors, 1])
             difference[-1, -1] += springs[-1]
+            # A computed eigenvalue is reduced by its rounding.
             smallest = float(np.linalg.eigvalsh(difference)[0]) * (1 - 1e-12)
             if smallest <= 0:
                 return None
@@ -396,6 +407,8 @@ class ChainRelaxation(LinearRelaxation):
 
         # Bound of |K x - μ M x| over the box at each floor, with the eigenvalue μ of the midpoint,
         # and rounding.
+        # The change of K x is the change of each storey shear, which acts on the floors above and
+        # below it.
         shears = radius[0] * np.abs(chain.stiffness * drift)
         force = np.abs(chain.mass * shape)
         residual = shears + np.append(shears[1:], 0.0) + value * radius[1] * force
@@ -408,5 +421,6 @@ class ChainRelaxation(LinearRelaxation):
         strains = strain @ np.array(self.stiffness)
         inertias = inertia @ np.array(self.mass)
         for end, sign in ((cut.low - error_below, -1.0), (cut.high + error_above, 1.0)):
+            # Both sides are divided by their size, and the row is relaxed by rounding.
             row = sign * (strains - end * inertias) / unit
             self.rows.append(row - 1e-12 * self.one)

@@ -154,6 +154,8 @@ class Evidence:
         allowed = f"some of modes {numbers}, not all"
         require(is_part, "identify.held_out", value=shown, allowed=allowed)
 
+        # Modes that are held out may be of any number and without scatter: nothing is learned from
+        # them.
         measured = tuple(mode for mode in modes if mode.mode not in held_out)
         for mode in measured:
             largest = max(mode.mode, mode.reference, *mode.shape)
@@ -167,6 +169,7 @@ class Evidence:
             else:
                 prior[name] = Crisp(float(number))
         chain = Chain(frame, tuple(prior))
+        # Parameters enter by their logarithms.
         smallest = min(widest_cut(number).lower for number in prior.values())
         require(smallest > 0, "identify.parameters", value=smallest, allowed="positive priors")
         return cls(chain, prior, measured, tuple(x for x in modes if x.mode in held_out))
@@ -273,6 +276,8 @@ class Identified:
             decided = float(self.alpha[0])
             lower = self.lower[:, column]
             upper = self.upper[:, column]
+            # An opinion has a support, which is the cut of level 0; a claim says nothing below its
+            # level.
             if not isinstance(prior, ClaimedNumber):
                 alpha = np.append(0.0, alpha)
                 decided = 0.0
@@ -292,6 +297,7 @@ class Identified:
     def narrowed(self) -> dict[str, float]:
         """Width of the box of each parameter over the width of its prior, on the lowest level."""
         level = float(self.alpha[0])
+        # The prior is cut at the same joint level, so that only the measurement narrows it.
         widths = [self.evidence.cut(x, level).width for x in self.evidence.prior.values()]
         fractions = (self.upper[0] - self.lower[0]) / np.array(widths)
         return dict(zip(self.names, fractions.tolist(), strict=True))
@@ -308,6 +314,7 @@ class Identified:
             for k in range(len(self.alpha)):
                 low = np.log(self.lower[k] / chain.nominal)
                 high = np.log(self.upper[k] / chain.nominal)
+                # Rounding may make a bound of a small eigenvalue negative.
                 eigenvalues = np.maximum(eigenvalue_ranges(chain, low, high), 0.0)
                 lower[k], upper[k] = np.sqrt(eigenvalues) / (2 * np.pi)
         modes = self.evidence.measured + self.evidence.held_out

@@ -59,6 +59,7 @@ class Predictions:
         """The measured modes that were not learned from, as far as the frame has them."""
         predictions = []
         for mode in sorted(self.measured.keys() - set(self.learned_from)):
+            # A frame with n floors has n modes; a higher measured mode is no mode of this model.
             if mode <= self.lower.shape[1]:
                 low = float(self.lower[0, mode - 1])
                 high = float(self.upper[0, mode - 1])

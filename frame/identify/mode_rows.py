@@ -63,6 +63,7 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     is_known = is_complete and "" not in columns
     require(is_known, f"{path.name}, header", ",".join(header)[:80], allowed)
 
+    # Frequencies and deviations are positive; amplitudes have either sign.
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
@@ -111,6 +112,7 @@ def _measurements_of_mode(
     require(is_moved, f"{path.name}, mode {mode}", "0 at every floor", allowed)
 
     frequencies = values[:, columns["frequency"]]
+    # Independent deviations of several measurements are averaged by their squares.
     deviations = {}  # root mean squares
     for name in ("frequency_std", "shape_std"):
         if name in columns:

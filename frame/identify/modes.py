@@ -80,6 +80,7 @@ class Chain:
         Returns:
             Lower and upper ends, shape (2, floors) each, with the stiffnesses first.
         """
+        # A linear function has its extremes over a box at the ends of each coordinate.
         ends = np.sort([self.powers * lower, self.powers * upper], axis=0).sum(axis=-1)
         return ends[0], ends[1]
 
@@ -170,6 +171,7 @@ class MeasuredMode:
 
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
         """Return the ranges of eigenvalue and amplitudes for a function that cuts fuzzy numbers."""
+        # A claim from few values may reach below zero.
         frequency = np.maximum(cut(self.frequency), 0.0)
         low, high = (2 * np.pi * frequency) ** 2
         shape = {floor: cut(number) for floor, number in self.shape.items()}
@@ -301,6 +303,7 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyN
     """
     count = len(values)
     if deviation is None:
+        # Equal values have no scatter to estimate a deviation from.
         if np.allclose(values, values[0], 1e-12, 0.0):
             return Crisp(float(values.mean()))
         return from_data(values, "mean", law="normal")

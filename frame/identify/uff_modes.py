@@ -100,6 +100,7 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
         node = int(lines[start])
         if f"{node}.x" in amplitudes:
             raise ValueError(f"node {node} twice in a mode")
+        # A node has three or six directions.
         for axis, k in zip(DIRECTIONS, range(0, numbers_of_node, numbers_of_value), strict=False):
             amplitudes[f"{node}.{axis}"] = complex(*numbers[k : k + numbers_of_value])
     return UffShape(int(head[6].split()[3]), hertz, amplitudes)
@@ -146,6 +147,8 @@ def phase_collinearity(shape: Array) -> float:
         shape: Complex amplitudes, shape (unknowns,).
     """
     parts = np.stack([shape.real, shape.imag])
+    # The eigenvalues of a symmetric matrix [[a, b], [b, c]] differ by √((a - c)² + 4 b²), and their
+    # sum is the trace.
     covariance = parts @ parts.T
     difference = (covariance[0, 0] - covariance[1, 1]) ** 2 + 4 * covariance[0, 1] ** 2
     total = np.trace(covariance) ** 2

@@ -86,6 +86,8 @@ class Auto:
             found = PeakSearch().run(flow, progress)
             return _noted(found, f"{PeakSearch.name}: motions of columns that yield have kinks")
         if not isinstance(flow.flow, LinearFlow):
+            # Twice the predicted gain and the difference of two passes are part of the error of a
+            # follower.
             follower = ImprovedFollower(0.7 * tolerance, seed=self.seed)
             return _noted(follower.run(flow, progress), f"{follower.name}: not linear")
 
@@ -105,6 +107,7 @@ class Auto:
             proved.append(found)
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
 
+        # A wide guarantee is better than none, unless a stated tolerance is meant for all nodes.
         best = min(proved, key=lambda found: _gap(found, flow), default=None)
         if best is not None and not self.is_for_all_nodes:
             if _gap(best, flow) <= WIDE:
@@ -140,6 +143,7 @@ class Auto:
                 methods.append(method)
             except UnprovedError as error:
                 reasons.append(f"{method.name}: {error}")
+        # If only one proof is possible, there is no choice.
         if len(methods) < 2:
             return methods
         undivided = replace(proof, parts=1)
@@ -198,6 +202,7 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
         followed: Attained bounds of the same problem. Their values may be wrong by a 1e-9th of the
             peak through rounding, which is subtracted.
     """
+    # The attained values of a proof contain a bound of their rounding; those of a follower do not.
     rounding = 1e-9 * np.abs(followed.bounds).max(axis=(0, 1, 3))[:, np.newaxis]
     values = followed.bounds - rounding
     outer, inner = _sides(proved)
@@ -232,6 +237,7 @@ def _gap(proved: Envelope, flow: UnitFlow) -> float:
     outer, inner = _sides(proved)
     outer_peaks = outer.max(axis=1)  # (levels, outputs, 2)
     inner_peaks = inner.max(axis=1)
+    # The peak of an output at rest is rounding; what the energy permits is taken in its place.
     peak = np.where(flow.at_rest, flow.peak, outer_peaks.max(axis=-1))
     gaps = (outer_peaks - inner_peaks).max(axis=-1)
     return float((gaps / np.maximum(peak, 1e-300)).max())

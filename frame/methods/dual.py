@@ -159,6 +159,8 @@ class DualProof:
         nodes = np.flatnonzero(needed.any(axis=(1, 2)))
         outputs = np.flatnonzero(needed.any(axis=(0, 2)))
         is_complete = bool(needed.all())
+        # Over the whole box all bounds are wanted; over a sub-box those of the peaks that are still
+        # open.
         gap = self.peaks * goal.peak
         if is_complete:
             gap = self.gap * goal.peak
@@ -377,6 +379,7 @@ def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Arr
     attained = np.full(needed.shape, -np.inf)
     attained[needed] = np.where(side, value, -value) - error
     attained_error = np.zeros(needed.shape[:2])
+    # The exact response may lie on either side of the computed one.
     np.maximum.at(attained_error, (node, output), 2 * error)
     return attained, attained_error
 
@@ -407,6 +410,8 @@ def _least_peaks(
     sign_changes = 1 - 2 * np.eye(d + 1, d)
     for _ in range(numbers.LEAST_PEAK_DESCENTS):
         tried = np.unique((unit[:, np.newaxis] * sign_changes).reshape(-1, d), axis=0)
+        # Small peaks are often attained at corners, since outputs are nearly monotone in single
+        # inputs.
         peaks = np.abs(flow.values(box.inputs(tried))).max(axis=1)
         unit = tried[peaks.argmin(axis=0)]
     reached = []

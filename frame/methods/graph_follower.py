@@ -93,8 +93,12 @@ class Storage:
         """
         jet = self.flow.taylor(points)
         top = self.top.reshape(-1)
+        # The first derivatives of all graphs are kept only by their largest magnitude, which tells
+        # whether neighbouring trajectories diverge.
         slopes = np.abs(np.moveaxis(jet.first, -1, 0)).reshape(len(self.steepest), -1)
         self.steepest = np.maximum(self.steepest, slopes.max(axis=1))
+        # Each new graph is compared with the best values so far, so that of equal graphs the first
+        # one is kept and a repeated run has the same bits.
         best_new = np.full(top.shape, -1)  # index among the new graphs; -1 for none
         for k, value in enumerate(jet.value):
             signed = np.stack([-value, value], axis=-1).ravel()
@@ -133,9 +137,12 @@ class Storage:
         sides = places[2]
         signs = 2.0 * sides - 1  # -1 for the side 0, 1 for the side 1
         center = self.points[self.best[places]]
+        # The side -output has a Taylor model with the opposite signs.
         g = signs[:, np.newaxis] * self.first[places]
         H = bend * signs[:, np.newaxis, np.newaxis] * self.second[places]
         lower, upper = box
+        # The graph lies inside the box or on its boundary, so that x = 0 is admissible and the
+        # model predicts at least the stored value.
         x = maximise(g, H, np.maximum(lower - center, -reach), np.minimum(upper - center, reach))
         return ModelMaxima(self.top[places] + gain(g, H, x), np.clip(center + x, lower, upper))
 
@@ -203,6 +210,7 @@ class GraphFollower:
             steps: If given, it is filled with what was done at each place.
         """
         storage = Storage(flow)
+        # The nominal graph belongs to all boxes.
         storage.add(flow.boxes.to_unit(flow.boxes.nominal)[np.newaxis])
         shape = (len(flow.boxes.alpha), *storage.top.shape)
         bounds = np.zeros(shape)
@@ -223,9 +231,12 @@ class GraphFollower:
             for node in range(len(flow.time)):
                 tick(node / len(flow.time))
                 steps.guess[level, node] = storage.best[node]
+                # Eq. 21: the next graph is computed where a model predicts the largest output of
+                # this node, if the gain is worth it.
                 is_worth_a_graph = predicted[node] > storage.top[node] + limit
                 points: list[Array] = []
                 for point in target[node][is_worth_a_graph]:
+                    # Both sides and several outputs often point to the same inputs.
                     is_new = all(np.abs(point - x).max() > 1e-9 for x in points)
                     if is_new and not storage.holds(point):
                         points.append(point)

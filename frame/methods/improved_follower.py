@@ -75,6 +75,7 @@ class ImprovedFollower:
         first = self.run_pass(flow, subprogress(progress, 0.0, 0.4))
         other_points = replace(self, seed=self.seed + 1)
         second = other_points.run_pass(flow, subprogress(progress, 0.4, 0.8))
+        # Both passes attain their bounds, so that the larger one of each is attained, too.
         is_better = second.bounds > first.bounds
         bounds = np.maximum(first.bounds, second.bounds)
         points = np.where(is_better[..., np.newaxis], second.points, first.points)
@@ -89,8 +90,12 @@ class ImprovedFollower:
         # around it, and at least a tenth of the largest of all.
         difference = np.abs(second.bounds - first.bounds).max(axis=-1)
         window = 2 * (len(flow.time) // 40) + 1
+        # A basin that one pass missed is missed at neighbouring nodes as well, where the passes may
+        # agree by chance.
         nearby = maximum_filter1d(difference, window, axis=1)
         difference = np.maximum(nearby, 0.1 * difference.max(axis=1, keepdims=True))
+        # Gains up to the tolerance are left aside on purpose; half of the tolerance stands for
+        # those that no model shows.
         left_aside = predicted.max(axis=-1) + limit[:, 0] / 2
         error = SAFETY * (left_aside + difference + missed[:, np.newaxis])
         notes: tuple[str, ...] = ()
@@ -124,6 +129,7 @@ class ImprovedFollower:
         storage = Storage(flow)
         shape = (n_levels, *storage.top.shape)
         out = PassBounds(np.zeros(shape), np.zeros((*shape, d)), np.zeros(shape), storage)
+        # Without a selection the gain of every bound counts.
         if asked is None:
             asked = np.ones(shape, bool)
         chunk_size = _chunk_size(flow)
@@ -170,11 +176,13 @@ class ImprovedFollower:
             # Optima of the models that are not worth a graph are worth their values.
             is_predicted = models.predicted > storage.top
             if has_crossings and is_predicted.any():
+                # With many inputs a graph with all derivatives costs as much as many values.
                 targets = np.unique(models.target[is_predicted], axis=0)
                 models.explore(targets)
                 out.evaluations += len(targets)
 
             # Post-processing: the best of all graphs and explored trajectories counts.
+            # A trajectory that was only explored may exceed all graphs.
             is_sampled = (models.sampled > storage.top)[..., np.newaxis]
             graph_points = storage.points[storage.best]
             out.bounds[level] = np.maximum(models.sampled, storage.top)
@@ -197,6 +205,7 @@ def _chunk_size(flow: UnitFlow) -> int:
     """
     d = len(flow.boxes.names)
     n_times = flow.time.size
+    # The propagator of linear structures is applied in blocks of about √times nodes.
     count = n_times * len(flow.outputs)
     if isinstance(flow.flow, LinearFlow):
         states = 2 * len(frequencies(flow.flow.system))
@@ -267,6 +276,7 @@ class _LevelModels:
             points: Unit coordinates, shape (trajectories, inputs).
         """
         values, index = largest_values(self.storage.flow, points)
+        # The first of equal trajectories is kept, so that the result does not depend on later ones.
         better = values > self.sampled
         self.sampled[better] = values[better]
         self.sampled_at[better] = points[index][better]
@@ -284,6 +294,8 @@ class _LevelModels:
         storage = self.storage
         d = len(self.radius)
         count = 8 * len(storage)
+        # Places are drawn with their frequency: a graph that is the best at many nodes is drawn
+        # often.
         optima, partners = storage.points[rng.choice(storage.best.ravel(), (2, count))]
         # A third of the random numbers lies at the ends of the range.
         unit = np.clip(rng.uniform(-1.5, 1.5, optima.shape), -1, 1)
@@ -327,8 +339,12 @@ class _LevelModels:
         Returns:
             Unit coordinates, shape (points, inputs).
         """
+        # Gains are compared over the least gain of each bound, since outputs have different units
+        # and peaks are worth more.
         gains = (np.maximum(self.predicted, self.sampled) - self.storage.top) / self.least_gains
         chosen: list[Array] = []
+        # The graphs of one batch do not know of each other: they come from different windows of
+        # time and lie apart, so that they find different optima.
         count = min(count, BATCH)
         windows = np.array_split(np.arange(len(gains)), max(1, min(count, len(gains))))
         for window in windows:

@@ -92,6 +92,7 @@ class Proof:
         Raises:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
         """
+        # A gap alone is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
         return prove(replace(self, tolerance=tolerance), flow, progress)
 
@@ -122,6 +123,8 @@ class Proof:
             )
         if len(flow.system.ratios) > 1:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
+        # The bound of the model error integrates the residual over time, which needs that the
+        # energy of the error does not grow.
         require_dissipation(flow.system, boxes)
         return float(numbers.BOXES_OF_INPUT**n_inputs)
 
@@ -167,10 +170,14 @@ class Proof:
             BisectionError: Too many bisections would be needed.
         """
         max_degree = _max_degree(len(boxes.names))
+        # Most structures need few degrees, and the cost of a degree grows as the number of
+        # monomials.
         degree = min(numbers.FIRST_DEGREE, max_degree)
         last_step = 0
         last_excess = np.inf
         while True:
+            # Modes that contribute less than a small part of the gap are left out; their energy
+            # counts as error.
             model = ModalModel.of_degree(flow, boxes, degree, numbers.LEFT_OUT_MODES * gap * scale)
             error = proved_error(model)
             excess = float((error / scale).max()) / (numbers.MAX_ERROR_FRACTION * gap)
@@ -263,6 +270,7 @@ def bound_levels(
     n_boxes: list[int] = []
     for level, tick in model.boxes.inside_out(progress):
         lower, upper = model.boxes.unit_ends(level)
+        # Good attained values let branch and bound discard most boxes at once.
         optima = first_optima(model, lower, upper, numbers.NEWTON_GAP * search_gap)
         if all_optima:  # a wider box contains what the narrower one attains
             inside = all_optima[-1]
@@ -284,6 +292,7 @@ def bound_levels(
         all_proved.append(proved)
         n_boxes.append(count)
 
+    # Within the steps, the model and its error deviate from straight lines.
     error_between = _error_between_nodes(model, error, direct=direct / scale)
     between = (_line_deviation(model) + error_between) * scale
     facts = {
@@ -332,6 +341,7 @@ def _line_deviation(model: ModalModel) -> Array:
     radius = eigenvalue.imag.deviation()
     midpoint = np.abs(eigenvalue.value.imag)
     omega = np.stack([midpoint - radius, midpoint + radius])
+    # The grids need the phase ω t of each mode.
     if (omega[0] <= 0).any():
         raise UnprovedError("a mode may not oscillate", "take less damping")
     q_lower = (decay[0] / omega).min(axis=0)
@@ -358,6 +368,8 @@ def _line_deviation(model: ModalModel) -> Array:
             coefficient = np.multiply.outer(2 * part.coefficient.value[k], np.ones(sigma.shape))
             responses.append(Response(sigma, load, 0, coefficient, radii[k]))
     time = model.flow.time
+    # The sum of the magnitudes of all modes bounds the deviation; where it is large, the signs of
+    # the modes are used, which often cancel.
     by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)
     deviation = narrowed_straying(responses, time, by_magnitude)
     return narrowed_at_jumps(responses, time, deviation)
@@ -395,6 +407,7 @@ def _error_fractions(model: ModalModel) -> Array:
     for polynomials in (model.eigenvalue, model.coefficient):
         magnitudes = np.abs(polynomials.coefficients).reshape(len(exponents), -1)
         largest = np.maximum(magnitudes.max(axis=0), 1e-300)
+        # Polynomials of different units are compared by their coefficients over the largest one.
         weight += (magnitudes / largest).max(axis=1)
     is_highest = exponents.sum(axis=1) == model.degree
     by_input = weight[is_highest] @ exponents[is_highest]

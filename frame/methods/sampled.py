@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
-from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.campaign.call import Call, SpentError
@@ -53,6 +53,8 @@ class Sampled:
         """Return Sobol points of a box, denser towards its faces, shape (samples, inputs)."""
         from scipy.stats import qmc
 
+        # The cosine of a uniform variable has the Chebyshev density, which is largest at the ends:
+        # extremes over a box lie on its boundary more often than inside.
         unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
         return np.asarray((lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit))
 
@@ -66,7 +68,8 @@ class Sampled:
             if level + 1 < n_levels:  # a wider box contains the trajectories of the narrower one
                 bounds[level] = bounds[level + 1]
                 at[level] = at[level + 1]
-            points = self.points(*flow.boxes.unit_ends(level))
+            lower, upper = flow.boxes.unit_ends(level)
+            points = self.points(lower, upper)
             values, index = largest_values(flow, points, tick)
             better = values > bounds[level]
             bounds[level][better] = values[better]
@@ -107,6 +110,7 @@ class PeakSearch:
         assert isinstance(yielding_flow, YieldingFlow)
         domain = Domain(cuts.inputs, tuple(cuts.alpha))
         band = _Band(flow, domain, yielding_flow)
+        # The trajectories at the probes belong to the band, too.
         band.peaks(**dict(zip(cuts.names, cuts.probes.T, strict=True)))  # raises their errors here
         call = Call(band.peaks, cuts.names, vectorised=True)
         campaign = Campaign(call, budget=self.budget, progress=progress)
@@ -114,6 +118,7 @@ class PeakSearch:
         linkage = SingleLinkage(campaign, domain, outputs, has_kinks=True)
         notes: tuple[str, ...] = ()
         try:
+            # Without a width there is nothing to search.
             if linkage.cuts:
                 n_uncertain = len(linkage.cuts[0].uncertain_inputs)
                 linkage.run(np.random.default_rng([SEED, 0]).random((MIN_SAMPLES, n_uncertain)))
@@ -125,8 +130,9 @@ class PeakSearch:
         evaluations = len(campaign)
         excess = np.zeros(searched.lower.shape)  # (levels, outputs)
         for level in range(len(cuts.alpha)):
-            points = spread_points(*cuts.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
+            points = independent_points(cuts, level)
             peaks = yielding_flow.values_and_peaks(cuts.to_physical(points))[1]
+            # Points that the search has not seen show what it may have missed.
             below = searched.lower[level] - peaks.min(axis=0)
             above = peaks.max(axis=0) - searched.upper[level]
             excess[level] = np.maximum(np.maximum(below, above), 0.0)
@@ -186,6 +192,7 @@ class _Band:
         for level, is_inside in enumerate(self.domain.inside(points)):
             for row in np.flatnonzero(is_inside):
                 signed = np.stack([-values[row], values[row]], axis=-1)
+                # A trajectory widens the band of each level to whose cut its inputs belong.
                 better = signed > self.bounds[level]
                 self.bounds[level][better] = signed[better]
                 self.at[level][better] = points[row]
@@ -209,12 +216,20 @@ def independent_excess(
     excess = np.zeros((len(bounds), len(flow.outputs)))
     count = 0
     for level in range(len(bounds)):
-        points = spread_points(*flow.boxes.unit_ends(level), SAMPLES, SKIPPED * (level + 1))
+        points = independent_points(flow.boxes, level)
+        # The excess at a node tells what the bounds at neighbouring nodes may miss, so that the
+        # largest one over time counts.
         values, _ = largest_values(flow, points)
         excess[level] = np.maximum((values - bounds[level]).max(axis=(0, 2)), 0.0)
         count += len(points)
         progress((level + 1) / len(bounds))
     return excess, count
+
+
+def independent_points(boxes: Boxes, level: int) -> Array:
+    """Return points of a box that no search has used, in unit coordinates, (points, inputs)."""
+    lower, upper = boxes.unit_ends(level)
+    return spread_points(lower, upper, SAMPLES, SKIPPED * (level + 1))
 
 
 def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
@@ -231,6 +246,7 @@ def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
     """
     d = len(lower)
     inside = chebyshev_points(d, count, skip=skip)
+    # A coordinate beyond half of its range is moved to the nearer end.
     on_faces = np.clip(2 * chebyshev_points(d, count, skip=skip + count), -1, 1)
     if 2**d > count:
         ends = np.sign(chebyshev_points(d, count, skip=skip + 2 * count))
