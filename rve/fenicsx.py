@@ -66,8 +66,9 @@ with uninterrupted(), _without_numba():
 __all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
 
 
-# twice as fast as the default -O2, equal to round-off; other processes may compile the same
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}
+"""Options of DOLFINx's compiler. The code is twice as fast as by its default -O2, and equal to
+round-off. It waits as long, in s, for another process that compiles the same."""
 
 
 @contextmanager
@@ -91,7 +92,9 @@ def at_points(value: Any, points: Array) -> fem.Expression:
 
 
 def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
-    """DOLFINx mesh with all coordinates 0, to be set later; rank r gets the r-th part of the cells.
+    """Return a DOLFINx mesh with all coordinates 0, to be set later.
+
+    The cells are divided evenly: rank r keeps the r-th part of them.
 
     Args:
         comm: Communicator.
@@ -100,9 +103,8 @@ def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfi
         element: Coordinate element.
     """
     coordinates = np.zeros((nodes, element.reference_value_shape[0]))
-    rank_cells, rank_coordinates = (
-        np.array_split(rows, comm.size)[comm.rank] for rows in (cells, coordinates)
-    )
+    rank_cells = np.array_split(cells, comm.size)[comm.rank]
+    rank_coordinates = np.array_split(coordinates, comm.size)[comm.rank]
 
     def keep_on_rank(*_: Any) -> Any:
         destinations = np.full((len(rank_cells), 1), comm.rank, np.int32)
@@ -126,27 +128,35 @@ def option_is_used(name: str) -> bool:
 
 
 def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
-    """PETSc matrix on the values of a SciPy one with sorted indices, of this rank alone."""
-    starts, columns = (np.asarray(x, PETSc.IntType) for x in (matrix.indptr, matrix.indices))
-    csr = starts, columns, matrix.data
+    """Return a PETSc matrix of this rank alone on the values of a SciPy one.
+
+    The indices of `matrix` are to be sorted. The PETSc matrix follows changes of its values.
+    """
+    indptr = np.asarray(matrix.indptr, PETSc.IntType)
+    indices = np.asarray(matrix.indices, PETSc.IntType)
+    csr = indptr, indices, matrix.data
     result = PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)
     result.assemble()
     return result
 
 
-def columns(values: Array) -> PETSc.Mat:
-    """PETSc matrix whose columns are the rows of an array, (n, size).
+def columns(vectors: Array) -> PETSc.Mat:
+    """Return a dense PETSc matrix whose columns are the rows of an array, shape (n, size).
 
-    It has its values in the array if that is contiguous, else in a copy.
+    PETSc stores a dense matrix column by column, which is the layout of the transpose of a
+    contiguous array. The matrix then has its values in the array, else in a copy.
     """
-    values = np.ascontiguousarray(values)
-    result = PETSc.Mat().createDense(values.T.shape, array=values.T, comm=PETSc.COMM_SELF)
+    vectors = np.ascontiguousarray(vectors)
+    result = PETSc.Mat().createDense(vectors.T.shape, array=vectors.T, comm=PETSc.COMM_SELF)
     result.assemble()
     return result
 
 
 def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
-    """Cholesky solver of a matrix by CHOLMOD, or MUMPS without it; PETSc options override that."""
+    """Return a Cholesky solver of a matrix by CHOLMOD, or by MUMPS where PETSc is without it.
+
+    Options of PETSc with this prefix override that.
+    """
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(prefix)

@@ -14,13 +14,14 @@ from alphacut.base.errors import RefusedError, checked_number, is_number
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
-AREA = 4.0  # of the cell, in halves of its side
-STRAIN = 0.01  # eq. 15
-NOT_IN_PA = (0.01, 1e4)  # range of E that solids have in GPa or MPa, but softer than gels in Pa
-# eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
+AREA = 4.0
+"""Area of the cell, in squares of half of its side."""
+STRAIN = 0.01
+"""Macroscopic strain of eq. 15."""
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
-# with the third, the whole planar stiffness follows
+"""Macroscopic strains of eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component."""
 THREE_LOADS = np.vstack([LOADS, [[STRAIN, -STRAIN, 0.0]]])
+"""`LOADS` and a deviatoric strain, from which the whole planar stiffness follows."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,9 @@ class Phase:
             raise RefusedError(
                 "Young's modulus", f"{self.modulus:g} Pa", "positive and finite numbers"
             )
-        is_normalised = self.modulus == 1  # a common choice where only ratios of moduli count
-        if NOT_IN_PA[0] <= self.modulus < NOT_IN_PA[1] and not is_normalised:
+        # Solids have such a modulus in GPa or MPa, but the softest gel has more in Pa. The
+        # number 1 is a common choice where only ratios of moduli count.
+        if 0.01 <= self.modulus < 1e4 and self.modulus != 1:
             soft = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
             warnings.warn(f"{soft}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:
@@ -58,22 +60,22 @@ class Phase:
     @property
     def stiffness(self) -> Array:
         """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), (3, 3), in Pa (eq. 6)."""
-        e, nu = self.modulus, self.poisson
+        nu = self.poisson
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
-        return e / ((1 + nu) * (1 - 2 * nu)) * unit
+        return self.modulus / ((1 + nu) * (1 - 2 * nu)) * unit
 
     @property
     def bulk_and_shear(self) -> Array:
         """K of three dimensions and G, shape (2,), in Pa."""
-        e, nu = self.modulus, self.poisson
-        return np.array([e / (3 * (1 - 2 * nu)), e / (2 * (1 + nu))])
+        bulk = self.modulus / (3 * (1 - 2 * self.poisson))
+        return np.array([bulk, self.modulus / (2 * (1 + self.poisson))])
 
     @property
     def stiffness_parts(self) -> Array:
-        """What K and G give to the stiffness, shape (2, 3, 3), in Pa."""
-        bulk = np.zeros((3, 3))
-        bulk[:2, :2] = self.bulk_and_shear[0]
-        return np.array([bulk, self.stiffness - bulk])
+        """What K and what G give to the stiffness, shape (2, 3, 3), in Pa."""
+        by_bulk = np.zeros((3, 3))
+        by_bulk[:2, :2] = self.bulk_and_shear[0]
+        return np.array([by_bulk, self.stiffness - by_bulk])
 
 
 @dataclass(frozen=True)
@@ -161,15 +163,9 @@ class Cell:
 
     @property
     def square(self) -> bool:
-        """True where the stiffness has the symmetry of the square: round, isotropic."""
-        isotropic = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
-        return isotropic and is_round(self.outline)
-
-
-JUMP = 0.01
-"""Of radii over 1/2048 of the support of θ; twenty times as steep as maps of particles are."""
-MAX_POISSON = 0.45
-"""Poisson's ratio above which quadratic elements lock."""
+        """Whether the stiffness has the symmetry of the square: round and isotropic phases."""
+        is_isotropic = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
+        return is_isotropic and is_round(self.outline)
 
 
 def require_mesh_size(size: float) -> None:
@@ -187,13 +183,19 @@ def require_points(points: int | None) -> None:
 
 
 def continuous_radii(radius_map: RadiusMap) -> Array:
-    """Radii at 2049 even steps of θ; refuses maps with a jump, whose error no rule can tell."""
+    """Return the radii at 2049 even steps of θ.
+
+    Raises:
+        RefusedError: The map has a jump, whose error no rule in θ can tell.
+    """
     require_map(radius_map)
-    law = radius_map.distribution
-    theta = np.linspace(law.lower, law.upper, 2049)
+    distribution = radius_map.distribution
+    theta = np.linspace(distribution.lower, distribution.upper, 2049)
     radii = radius_map(theta)
-    jump = int(np.argmax(abs(np.diff(radii))))
-    if abs(radii[jump + 1] - radii[jump]) > JUMP:
+    changes = abs(np.diff(radii))
+    jump = int(np.argmax(changes))
+    # A change of this size within a step is twenty times as steep as maps of particles are.
+    if changes[jump] > 0.01:
         value = f"{radii[jump]:.4g} and {radii[jump + 1]:.4g} side by side"
         raise RefusedError(f"r at θ = {theta[jump]:.4g}", value, "maps without a jump")
     return np.asarray(radii)
@@ -201,10 +203,12 @@ def continuous_radii(radius_map: RadiusMap) -> Array:
 
 def require_compressible(*phases: AnyPhase) -> None:
     """Refuse phases that are so incompressible that quadratic elements lock."""
-    ratio = max((phase.poisson for phase in phases if isinstance(phase, Phase)), default=0.0)
-    if ratio > MAX_POISSON:
+    ratios = [phase.poisson for phase in phases if isinstance(phase, Phase)]
+    max_poisson = 0.45  # tuned: above, the errors of quadratic elements grow quickly
+    if max(ratios, default=0.0) > max_poisson:
         cure = "finite elements lock above: take the series"
-        raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {MAX_POISSON:g}", cure)
+        allowed = f"values up to {max_poisson:g}"
+        raise RefusedError("Poisson's ratio", f"{max(ratios):g}", allowed, cure)
 
 
 def require_solve_arguments(

@@ -23,9 +23,6 @@ from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaDistribution
 
-ASYMMETRY = 1e-8
-"""Largest |(A − Aᵀ) x| over |A x| of a symmetric operator; round-off leaves some 1e-15."""
-
 ARITIES = {
     0: "scalar form (without test or trial function)",
     1: "linear form (with a test function)",
@@ -175,7 +172,10 @@ def _separate_problem(
 
 
 def require_symmetric(matrix: PETSc.Mat) -> None:
-    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong."""
+    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong.
+
+    It is compared with its transpose on one random vector.
+    """
     x, product = matrix.createVecs()
     difference = x.duplicate()
     x.array[:] = np.random.default_rng(x.owner_range[0]).standard_normal(x.local_size)
@@ -183,9 +183,10 @@ def require_symmetric(matrix: PETSc.Mat) -> None:
     matrix.multTranspose(x, difference)
     difference.axpy(-1, product)
     asymmetry = difference.norm() / (product.norm() or 1.0)
-    if not asymmetry <= ASYMMETRY:
-        allowed = "symmetric operators"
+    max_asymmetry = 1e-8  # of |(A − Aᵀ) x| over |A x|; round-off leaves some 1e-15
+    if not asymmetry <= max_asymmetry:
         cure = (
             "use a Krylov method of PETSc for others, with `preconditioner` of the symmetric part"
         )
-        raise RefusedError("asymmetry of the matrix", f"{asymmetry:.1e}", allowed, cure)
+        what = "asymmetry of the matrix"
+        raise RefusedError(what, f"{asymmetry:.1e}", "symmetric operators", cure)

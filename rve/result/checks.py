@@ -14,8 +14,7 @@ from alphacut.rve.result.moduli import hashin_shtrikman, reuss, voigt
 from alphacut.rve.result.result import HomogenisedStiffness
 
 ROUND_OFF = 1e-9
-ALGEBRAIC = 1e-7
-"""Most by which what holds in exact arithmetic may be violated."""
+"""Relative violation of a bound by round-off alone."""
 
 
 class CertificateError(FailedError):
@@ -30,23 +29,24 @@ WHAT = {
     "voigt": "the effective stiffness is above the Voigt bound",
     "hashin_shtrikman": "the bulk modulus is outside the Hashin–Shtrikman bounds",
 }
-BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
 
 
 def checks_within_limits(
     checks: Mapping[str, float], *, discretisation: float = ROUND_OFF
 ) -> dict[str, float]:
-    """Copy of the checks, relative violations by the names of `WHAT`.
+    """Return a copy of relative violations by the names of `WHAT`, none of which is too large.
 
     Args:
-        checks: The checks.
-        discretisation: Limit of those in `BOUNDS`; that of the others is `ALGEBRAIC`.
+        checks: Relative violations.
+        discretisation: Limit of those of bounds, by which the error of a mesh may violate them.
 
     Raises:
         CertificateError: A violation is too large; the message names it, its value and its limit.
     """
+    algebraic = 1e-7  # by which what holds in exact arithmetic may be violated
     for name, value in checks.items():
-        limit = discretisation if name in BOUNDS else ALGEBRAIC
+        is_bound = name in ("reuss", "voigt", "hashin_shtrikman")
+        limit = discretisation if is_bound else algebraic
         if not value <= limit:
             raise CertificateError(
                 f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed",
@@ -56,12 +56,16 @@ def checks_within_limits(
 
 
 def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """Copy of a result, which has its stiffness, with violations of symmetry and bounds as checks.
+    """Return a copy of a result with its violations of symmetry and bounds as checks.
+
+    Args:
+        result: Result with its stiffness and its cell.
 
     Raises:
         CertificateError: A violation exceeds the declared error of the result.
     """
-    curve, cell = result.curve, result.cell
+    curve = result.curve
+    cell = result.cell
     assert cell is not None
     assert curve.stiffness is not None
     checks = stress_checks(
@@ -74,7 +78,7 @@ def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
 def stress_checks(
     stress: Array, loads: Array, fractions: Array, weights: Array, phases: Sequence[AnyPhase]
 ) -> dict[str, float]:
-    """Relative violations of symmetry and of bounds by the mean stiffness over θ, 0 for none.
+    """Return relative violations of symmetry and of bounds by the mean stiffness, 0 for none.
 
     Voigt's, Reuss's and, of isotropic phases, Hashin and Shtrikman's bounds are those of energies
     of the loads, under which alone the stiffness is known.
@@ -90,7 +94,7 @@ def stress_checks(
     stiffness = [phase.stiffness for phase in phases]
     checks = order_checks(energy, loads, fractions, weights, stiffness)
     if all(isinstance(phase, Phase) for phase in phases):
-        # factors of the loads that add up to ε11 = ε22 = 1
+        # The loads times these factors add up to ε11 = ε22 = 1, whose energy is 4 K.
         equibiaxial = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
         bulk = float(equibiaxial @ energy @ equibiaxial / 4)
         checks |= bulk_check(bulk, hashin_shtrikman(fractions, phases)[0] @ weights)
@@ -100,14 +104,18 @@ def stress_checks(
 def order_checks(
     energy: Array, loads: Array, fractions: Array, weights: Array, stiffness: Sequence[Array]
 ) -> dict[str, float]:
-    """Relative violations of symmetry and of Reuss ≤ energy ≤ Voigt, in the sense of Loewner.
+    """Return relative violations of symmetry and of Reuss ≤ energy ≤ Voigt in Loewner's sense.
 
-    Args as of `stress_checks`; `energy` is that of pairs of the loads, `stiffness` of each phase.
+    Args:
+        energy: Mean energy of pairs of the loads, shape (loads, loads), in Pa.
+        loads: Macroscopic strains, shape (loads, 3).
+        fractions: Fractions of the phases at the nodes, shape (phases, n).
+        weights: Weights of the nodes, shape (n,).
+        stiffness: Stiffness of each phase, in Pa.
     """
     scale = float(abs(energy).max())
-    reuss_energy, voigt_energy = (
-        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T for bound in (reuss, voigt)
-    )
+    reuss_energy = loads @ mean(weights, reuss(fractions, stiffness)) @ loads.T
+    voigt_energy = loads @ mean(weights, voigt(fractions, stiffness)) @ loads.T
     return {
         "symmetry": float(abs(energy - energy.T).max()) / scale,
         "reuss": _below(energy - reuss_energy) / scale,
@@ -116,15 +124,21 @@ def order_checks(
 
 
 def bulk_check(bulk: float, bounds: Array) -> dict[str, float]:
-    """Relative violation of the lower and upper Hashin–Shtrikman bound by a bulk modulus, in Pa."""
+    """Return the relative violation of the Hashin–Shtrikman bounds by a bulk modulus.
+
+    Args:
+        bulk: Bulk modulus in Pa.
+        bounds: Lower and upper bound in Pa, shape (2,).
+    """
     low, high = bounds
     return {"hashin_shtrikman": float(max(0.0, low - bulk, bulk - high) / bulk)}
 
 
 def mean(weights: Array, values: Array) -> Array:
-    """Weighted sum over the first axis."""
+    """Return the weighted sum over the first axis."""
     return np.asarray(np.tensordot(weights, values, axes=1))
 
 
 def _below(difference: Array) -> float:
+    """Return by how much the smallest eigenvalue of a matrix's symmetric part lies below 0."""
     return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0]))

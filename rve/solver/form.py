@@ -37,7 +37,7 @@ class CellForm:
 
     Args:
         space: Displacements of two components.
-        points: Matrices (3, 3) in cells or at quadrature points.
+        points: Space of matrices (3, 3) in cells or at quadrature points.
         dx: Measure of the cells.
         weight: f_Θ of eq. 1 at the points, or w_s of a slice; 1 where there is no θ.
 
@@ -51,7 +51,8 @@ class CellForm:
     ) -> None:
         self.stiffness = fem.Function(points)
         self._uniform = fem.Constant(space.mesh, np.zeros(3))
-        u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+        u = ufl.TrialFunction(space)
+        v = ufl.TestFunction(space)
         # eq. 7 with the strain ε̄ + ε(u): a(u, v) = −∫ f_Θ C ε̄ : ε(v) for all v
         self.bilinear = compiled(virtual_work(self.stiffness, strain(u), v, weight) * dx)
         self._load = compiled(-virtual_work(self.stiffness, self._uniform, v, weight) * dx)
@@ -63,54 +64,84 @@ class CellForm:
         matrix.assemble()
 
     def load(self, uniform: Array) -> Array:
-        """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
+        """Return the forces of a macroscopic strain ε̄, shape (3,), on this rank's nodes.
+
+        They are the right-hand side of eq. 7 for each nodal displacement, shape (2 nodes,).
+        """
         self._uniform.value[:] = uniform
         return np.asarray(fem.assemble_vector(self._load).array)
 
 
 class PointStrains:
-    """Strains and det J at quadrature points (n, dimension) of this rank's cells."""
+    """Strains and det J at points of this rank's cells.
+
+    Args:
+        space: Displacements of two components.
+        points: Points of the reference cell, shape (points, dimension).
+    """
 
     def __init__(self, space: fem.FunctionSpace, points: Array) -> None:
-        mesh = space.mesh
-        self._mesh, self._cells = mesh, np.arange(len(mesh.geometry.dofmap), dtype=np.int32)
+        self._mesh = space.mesh
+        self._cells = np.arange(len(self._mesh.geometry.dofmap), dtype=np.int32)
         self._u = fem.Function(space)
         self._strain = at_points(strain(self._u), points)
-        self._determinant = at_points(ufl.JacobianDeterminant(mesh), points)
+        self._determinant = at_points(ufl.JacobianDeterminant(self._mesh), points)
 
     def __call__(self, displacement: Array) -> Array:
-        """(ε11, ε22, 2 ε12), shape (cells, points, 3), of displacements of nodes, (nodes, 2)."""
+        """Return (ε11, ε22, 2 ε12) of displacements of nodes, shape (cells, points, 3).
+
+        `displacement` has the shape (nodes, 2) or (2 nodes,).
+        """
         self._u.x.array[:] = displacement.ravel()
         values = np.asarray(self._strain.eval(self._mesh, self._cells))
         return values.reshape(len(self._cells), -1, 3)
 
     def determinants(self) -> Array:
-        """Determinants of J at the points, shape (cells, points)."""
+        """Return the determinants of J at the points, shape (cells, points)."""
         values = np.asarray(self._determinant.eval(self._mesh, self._cells))
         return values.reshape(len(self._cells), -1)
 
 
 def strain_products(strains: Array, weights: Array) -> Array:
-    """Integral of ε_a ⊗ ε_b over each phase, (phases, 3, fields, 3, fields).
+    """Return the integral of ε_a ⊗ ε_b over each phase for all pairs of fields a, b.
 
-    From strains at n points, (n, 3, fields), and weights in each phase, (phases, n).
+    Args:
+        strains: Strains at n points, shape (n, 3, fields).
+        weights: Quadrature weights of the points in each phase, shape (phases, n).
+
+    Returns:
+        Products, shape (phases, 3, fields, 3, fields).
     """
     fields = strains.shape[-1]
     flat = strains.reshape(-1, 3 * fields)
-    products = np.array([flat.T @ (phase[:, None] * flat) for phase in weights])
+    products = np.array([flat.T @ (phase[:, np.newaxis] * flat) for phase in weights])
     return products.reshape(-1, 3, fields, 3, fields)
 
 
 def total_energy(products: Array, stiffness: Sequence[Array]) -> Array:
-    """Mean of σ_a : ε_b over all phases, shape (fields, fields), in Pa, from `strain_products`."""
+    """Return the mean of σ_a : ε_b over all phases, shape (fields, fields), in Pa.
+
+    Args:
+        products: Result of `strain_products`.
+        stiffness: Stiffness of each phase, (3, 3), in Pa.
+    """
     return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), products))
 
 
 def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array) -> Array:
-    """Σ ε : C_X ε of X = K, G of each phase in the three moduli, (phases, 2, 3), in Pa.
+    """Return the parts X ∂c/∂X of X = K, G of each phase in the three moduli c.
 
-    C_X is what X gives to the phase's stiffness; `loads` are the fields' macroscopic strains,
-    `LOADS` or `THREE_LOADS`; without the third, parts of C11 − C12 are nan.
+    By Hill and Mandel's lemma they are the energies ε : C_X ε, where C_X is what X gives to the
+    stiffness of its phase.
+
+    Args:
+        products: Result of `strain_products` for fields under the loads.
+        phases: Materials.
+        loads: Macroscopic strains of the fields, `LOADS` or `THREE_LOADS`, shape (2 or 3, 3).
+
+    Returns:
+        Energies in C11 + C12, C11 − C12 and C33, shape (phases, 2, 3), in Pa; nan for C11 − C12
+        without the third load.
     """
     parts = np.array([phase.stiffness_parts for phase in phases])
     energies = np.einsum("pxij,piaja->pxa", parts, products)

@@ -26,16 +26,13 @@ DEFAULTS = {
     "ksp_norm_type": "unpreconditioned",
     "pc_type": "python",
 }
-MAX_ITERATIONS = 500
-"""Iterations by the preconditioner, which takes tens at most; others may take ten times as many."""
-
 PRINTS = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
 """Options that make PETSc print: to standard error if they have no value."""
 
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The default with the PETSc options, without prefix, that override it.
+    """The default solver with the PETSc options, without prefix, that override it.
 
     Those of the environment, PETSC_OPTIONS, come after the default and before `overrides`.
     """
@@ -49,13 +46,16 @@ class SolverOptions:
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
         chosen = {**DEFAULTS, **self.environment, **self.overrides}
-        chosen |= {x: "ascii:stderr" for x, y in chosen.items() if PRINTS.search(x) and not y}
-        max_iterations = MAX_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
+        for name, value in chosen.items():
+            if PRINTS.search(name) and not value:
+                chosen[name] = "ascii:stderr"
+        # The preconditioner along θ takes tens of iterations at most, others may take hundreds.
+        max_iterations = 500 if chosen["pc_type"] == "python" else 5000
         return {"ksp_max_it": str(max_iterations), **chosen}
 
     @property
     def by_levels(self) -> bool:
-        """True for the preconditioner that solves level by level."""
+        """Whether the preconditioner is the one that solves level by level."""
         return self.all["pc_type"] == "python"
 
     def described(self, elements: str) -> str:
@@ -64,18 +64,22 @@ class SolverOptions:
         return f"one UFL form over {elements} by DOLFINx, solved by PETSc's {krylov} with {self}"
 
     def __str__(self) -> str:
-        changes = {**self.environment, **self.overrides}.items()
-        words = [f"-{PREFIX}{name} {value}".strip() for name, value in changes]
-        return " ".join(["theta", *words] if self.by_levels else words)
+        changes = {**self.environment, **self.overrides}
+        words = ["theta"] if self.by_levels else []
+        words += [f"-{PREFIX}{name} {value}".strip() for name, value in changes.items()]
+        return " ".join(words)
 
 
 def require_petsc(petsc: object) -> None:
-    """Refuse what is no table of options of PETSc by their names without dash and prefix."""
+    """Refuse what is no table of PETSc's options by their names without dash and prefix."""
     allowed = 'a dict of options without dash and prefix, as {"ksp_type": "gmres"}'
     if not isinstance(petsc, Mapping):
         cure = ""
-        if words := re.findall(r"-(\S+)\s+([^-\s]\S*)", petsc if isinstance(petsc, str) else ""):
-            cure = f"write {dict(words)}".replace("'", '"')
+        if isinstance(petsc, str):
+            # A command line such as "-ksp_type cg" is written as the dict that it means.
+            words = dict(re.findall(r"-(\S+)\s+([^-\s]\S*)", petsc))
+            if words:
+                cure = f"write {words}".replace("'", '"')
         raise RefusedError("petsc", repr(petsc), allowed, cure)
     for name in petsc:
         bare = str(name).lstrip("-").removeprefix(PREFIX)
@@ -95,8 +99,8 @@ class Solutions:
     """Solutions of K x = f.
 
     Args:
-        vectors: x of each load f.
-        iterations: Of each.
+        vectors: Solution x of each load f.
+        iterations: Iterations for each load.
         residual: Largest |K x − f| over |f|.
     """
 
@@ -108,9 +112,13 @@ class Solutions:
 def krylov_solver(
     matrix: PETSc.Mat, options: SolverOptions, preconditioner: Callable[[], ThetaPreconditioner]
 ) -> PETSc.KSP:
-    """PETSc Krylov solver of a reduced stiffness, symmetric positive definite, set up.
+    """Return PETSc's Krylov solver of a reduced stiffness, set up.
 
-    `preconditioner` makes the one along θ; it is called where the options do not name another.
+    Args:
+        matrix: Symmetric positive definite matrix or operator.
+        options: The options.
+        preconditioner: Function that makes the preconditioner along θ. It is called where the
+            options do not name another one.
 
     Raises:
         RefusedError: PETSc refuses an option or its value, or does not use it.
@@ -120,7 +128,8 @@ def krylov_solver(
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
-    translations = [matrix.createVecRight() for _ in range(2)]  # which multigrid takes
+    # Multigrid takes the translations, which have almost no energy.
+    translations = [matrix.createVecRight() for _ in range(2)]
     for component, vector in enumerate(translations):
         vector.array[component::2] = 1.0
         vector.normalize()
@@ -137,27 +146,36 @@ def krylov_solver(
 def solve(
     ksp: PETSc.KSP, loads: Sequence[PETSc.Vec], guesses: Sequence[PETSc.Vec] = ()
 ) -> Solutions:
-    """Solve for each load, from a guess of each solution or from zero.
+    """Solve K x = f for each load.
 
-    Where the solver's vectors are n times as long as a load, n loads are solved at once: divided by
-    their norms, they stand one after another in a vector.
+    Where the vectors of the solver are n times as long as a load, n loads are solved at once:
+    divided by their norms, they stand one after another in a vector.
+
+    Args:
+        ksp: Solver of K, or of n times K.
+        loads: Right-hand sides f.
+        guesses: First guess of each solution; zero if not given.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
     """
     matrix, _ = ksp.getOperators()
     together = matrix.size[0] // loads[0].size
-    vectors, iterations, residuals = [], [], []
+    vectors: list[PETSc.Vec] = []
+    iterations: list[int] = []
+    max_residual = 0.0
     ksp.setInitialGuessNonzero(bool(guesses))
     for first in range(0, len(loads), together):
         group = slice(first, first + together)
         norms = [load.norm() or 1.0 for load in loads[group]]
-        b, x = matrix.createVecLeft(), matrix.createVecRight()
+        b = matrix.createVecLeft()
+        x = matrix.createVecRight()
         _join(loads[group], norms, into=b)
         if guesses:
             _join(guesses[group], norms, into=x)
         ksp.solve(b, x)  # eq. 7: K U = F
-        reason, count = ksp.getConvergedReason(), ksp.getIterationNumber()
+        reason = ksp.getConvergedReason()
+        count = ksp.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
             raise ConvergenceError(
                 f"{ksp.getType()} with {ksp.pc.getType()} stopped after {count}"
@@ -165,12 +183,14 @@ def solve(
                 f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
             )
         LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
-        product = b.duplicate()
-        matrix.mult(x, product)
         vectors += _split(x, loads[group], norms)
         iterations += together * [count]
-        residuals.append((product - b).norm())  # at least that of each load, whose norm is 1
-    return Solutions(vectors, tuple(iterations), max(residuals))
+        # The residual of all loads together is at least that of each load, whose norm is 1.
+        residual = b.duplicate()
+        matrix.mult(x, residual)
+        residual.axpy(-1.0, b)
+        max_residual = max(max_residual, residual.norm())
+    return Solutions(vectors, tuple(iterations), max_residual)
 
 
 def _join(vectors: Sequence[PETSc.Vec], norms: Sequence[float], *, into: PETSc.Vec) -> None:
@@ -198,8 +218,10 @@ def in_database(options: SolverOptions) -> Iterator[None]:
 
     Raises:
         RefusedError: PETSc refuses an option, or has not used an override in the block.
+        ConvergenceError: PETSc fails though no option overrides the default.
     """
-    database, environment = PETSc.Options(PREFIX), options.environment
+    database = PETSc.Options(PREFIX)
+    environment = options.environment
     from_environment = environment.keys() - options.overrides.keys()
     added = {name: value for name, value in options.all.items() if name not in from_environment}
     for name, value in added.items():
