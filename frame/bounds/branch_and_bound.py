@@ -46,7 +46,7 @@ MAX_ITEMS = 30_000
 """Items that a thread examines together, which limits the memory."""
 
 
-def enclosed(
+def bound_problems(
     model: ModalModel,
     lower: Array,
     upper: Array,

@@ -29,7 +29,7 @@ LARGEST = 1e100
 with a larger one the products of three of them could."""
 
 
-class Data(NamedTuple):
+class DualFunctionData(NamedTuple):
     """Models and tables of one side of one output, as the kernels take them.
 
     There are K modes, T time nodes, L inputs, and Z = K (2 + sources) intervening variables: of
@@ -65,13 +65,13 @@ class Data(NamedTuple):
     multiplier_spacing: Array  # distance of the values that multipliers take, (1,)
 
 
-def data_without_modes() -> Data:
-    """Return `Data` of empty arrays, with which a kernel can be called before there are models."""
-    dimensions = dict.fromkeys(Data._fields, 2)
+def data_without_modes() -> DualFunctionData:
+    """Return data of empty arrays, with which a kernel can be called before there are models."""
+    dimensions = dict.fromkeys(DualFunctionData._fields, 2)
     dimensions["table"] = 4
     for name in ("grid_points", "expected_cubic", "remainder", "multiplier_spacing"):
         dimensions[name] = 1
-    return Data(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
+    return DualFunctionData(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
 
 
 def roundings(modes: int, sources: int, inputs: int) -> int:
@@ -181,7 +181,7 @@ def dot(a: Array, b: Array) -> float:
 
 @loops
 def dual_value(
-    mu: Array, cell: Ints, node: int, side: float, data: Data, gradient: Array, u: Array
+    mu: Array, cell: Ints, node: int, side: float, data: DualFunctionData, gradient: Array, u: Array
 ) -> float:
     """Return the dual function D(μ) of side × output at a node, without constants and cubic terms.
 
@@ -232,7 +232,7 @@ def dual_value(
 
 @loops
 def mode_maximum(
-    mu: Array, k: int, cell: Ints, node: int, side: float, data: Data, values: Array
+    mu: Array, k: int, cell: Ints, node: int, side: float, data: DualFunctionData, values: Array
 ) -> tuple[float, int]:
     """Return the maximum of mode k's term in D(μ) over a cell of its table, and its table point.
 
@@ -262,7 +262,7 @@ def mode_maximum(
 
 @loops
 def maximand(
-    mu: Array, k: int, first: int, node: int, side: float, data: Data, values: Array
+    mu: Array, k: int, first: int, node: int, side: float, data: DualFunctionData, values: Array
 ) -> None:
     """Write Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g to `values`, from mode k's point `first` on.
 
@@ -291,7 +291,7 @@ def maximand(
 
 
 @loops
-def remainder_bound(mu: Array, data: Data) -> float:
+def remainder_bound(mu: Array, data: DualFunctionData) -> float:
     """Bound Σ μ (cubic terms) over the box, less what D(μ) has expected of it."""
     total = np.zeros(data.cubic.shape[1])
     expected = 0.0
@@ -307,7 +307,7 @@ def minimise(
     cell: Ints,
     node: int,
     side: float,
-    data: Data,
+    data: DualFunctionData,
     steps: int,
     patience: int,
     target: float,

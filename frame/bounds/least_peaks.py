@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import Data, data_without_modes, minimise
+from alphacut.frame.bounds.dual_function import DualFunctionData, data_without_modes, minimise
 from alphacut.frame.bounds.level import LevelModels, OutputBounds
 
 
@@ -80,7 +80,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 @compiled
 def _bound_cell(
     ends: Ints,
-    sides: tuple[Data, Data],
+    sides: tuple[DualFunctionData, DualFunctionData],
     constants: Array,
     effort: CellEffort,
     multipliers: Array,
@@ -150,7 +150,7 @@ def call_bound_cell() -> None:
     _bound_cell(no_ends, (data, data), none, CellEffort(0, 0, 0), none, np.zeros(0))
 
 
-def _halves(cell: PeakCell, data: Data) -> tuple[Ints, Ints] | None:
+def _halves(cell: PeakCell, data: DualFunctionData) -> tuple[Ints, Ints] | None:
     """Return the ends (K, 4) of both halves of a cell; None where no range can be halved.
 
     It is halved along the ω or q of that mode whose contribution varies most along one of its axes

@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import Data, require_in_range, roundings
+from alphacut.frame.bounds.dual_function import DualFunctionData, require_in_range, roundings
 from alphacut.frame.bounds.node_bounds import Effort, bound_nodes
 from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.rounding import gamma
@@ -246,7 +246,7 @@ class OutputBounds:
     # constants (2, T): what the response has besides the model `data`, and what an upper bound
     # adds to that for everything that is bounded by magnitude
     constant: Array
-    data: Data  # models and tables of the output
+    data: DualFunctionData  # models and tables of the output
     upper: Array  # guaranteed upper bounds of side × output, (T,)
     model_value: Array  # largest values of the model that are known, not guaranteed, (T,)
     model_inputs: Array  # unit coordinates at which the model has these values, (T, d)
@@ -359,14 +359,16 @@ def improve_all(
         tick(done / len(futures))
 
 
-def _dual_function_data(level: LevelModels, output: int, side: float) -> tuple[Data, Array]:
+def _dual_function_data(
+    level: LevelModels, output: int, side: float
+) -> tuple[DualFunctionData, Array]:
     """Return the models and tables of one side of an output, and the constants of its bounds.
 
     The intervening variables of K modes, each ω, g and one participation factor for each source,
     are scaled to z = (variable − midpoint) / radius, which lies in [−1, 1] over the box.
 
     Returns:
-        `Data`, and the constants (2, T) of `OutputBounds.constant`.
+        `DualFunctionData`, and the constants (2, T) of `OutputBounds.constant`.
     """
     modes = level.models.oscillators
     table = level.tables[int(level.structure.derivative_orders[output])]
@@ -399,7 +401,7 @@ def _dual_function_data(level: LevelModels, output: int, side: float) -> tuple[D
     participations = np.array([np.abs(mode.participation.value[:, output]) for mode in modes])
     response_scale = float((participations * table.max_magnitude).sum())
     truncated, constant = _truncated_terms(level, output, side)
-    data = Data(
+    data = DualFunctionData(
         table=table.value,
         omega=(omega - midpoints[:, [0]]) / radii[:, [0]],
         decay=(decay - midpoints[:, [1]]) / radii[:, [1]],

@@ -63,7 +63,7 @@ def proved_error(model: ModalModel) -> Array:
     deviation = np.zeros(len(model.flow.time))
     output_error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
     growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
-    for s, part in enumerate(motion_parts(model, growth)):
+    for s, part in enumerate(response_parts(model, growth)):
         if isinstance(part.load, Direct):
             assert structure.feeds is not None
             feedthrough = structure.feeds[:, s - len(start_errors)]
@@ -183,7 +183,7 @@ def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionPart:
+class ResponsePart:
     """The free response of a modal model, or what one load adds, with bounds over time."""
 
     coefficient: TaylorModel  # coefficients C_k, polynomials, (n, m)
@@ -195,7 +195,7 @@ class MotionPart:
     load: LoadTables | None = None  # the load; None for the free response
 
 
-def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
+def response_parts(model: ModalModel, growth: Array) -> list[ResponsePart]:
     """Return the free response of a model, then the part of each load, with bounds over time.
 
     `growth` (n,) are upper bounds g_k of Re λ_k, in 1/s.
@@ -203,7 +203,7 @@ def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     time = model.flow.time[:, np.newaxis]
     divisor = np.where(growth == 0, 1.0, growth)
     powers = time ** np.arange(4)[:, np.newaxis, np.newaxis]
-    free = MotionPart(
+    free = ResponsePart(
         coefficient=model.coefficient,
         waves=powers * np.exp(growth * time),
         elapsed=np.where(growth == 0, time, np.expm1(growth * time) / divisor),
@@ -213,13 +213,13 @@ def motion_parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     return [free] + [_forced_part(model, growth, load) for load in model.loads]
 
 
-def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPart:
+def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> ResponsePart:
     """Return the part of a load a(t), with bounds of w = R = ∫ exp(λ τ) a(t − τ) dτ over time."""
     time = model.flow.time
     if isinstance(load, Direct):  # w of the first mode is a(t), and that of all others 0
         waves: Array = np.zeros((4, len(time), model.count))
         waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
-        return MotionPart(
+        return ResponsePart(
             coefficient=load.share,
             waves=waves,
             elapsed=np.zeros(waves[0].shape),
@@ -238,7 +238,7 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> MotionPa
     # where g < 0, and at most τ exp(g τ) else.
     by_decay = undamped[0] / np.maximum(-growth, 1e-300)[:, np.newaxis]
     decaying = np.minimum(undamped[1], by_decay).T
-    return MotionPart(
+    return ResponsePart(
         coefficient=load.share,
         waves=of_modes[:4],
         elapsed=np.where(growth < 0, decaying, of_modes[1]),
@@ -265,7 +265,7 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     rho = [part[..., np.newaxis] for part in eigenvalue]
     cubic = np.zeros((len(time), count(d, 3), m))
     rounding = np.zeros((len(time), 1 + d, m))  # of values, then of slopes
-    for part in motion_parts(model, growth):
+    for part in response_parts(model, growth):
         relative_rounding = _relative_rounding(model, eigenvalue[0][0], part.load)
         term = majorant_parts(part.coefficient, reach)  # of C ρ^p / p!, (monomials, n, m)
         for p in range(4):

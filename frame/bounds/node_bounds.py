@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame.bounds.dual_function import (
-    Data,
+    DualFunctionData,
     add,
     data_without_modes,
     dot,
@@ -55,7 +55,13 @@ class Cells(NamedTuple):
 
 @compiled
 def bound_nodes(
-    nodes: Ints, side: float, effort: Effort, constants: Array, data: Data, out: Array, at: Array
+    nodes: Ints,
+    side: float,
+    effort: Effort,
+    constants: Array,
+    data: DualFunctionData,
+    out: Array,
+    at: Array,
 ) -> None:
     """Write upper bounds of side × output at rising time nodes (J,).
 
@@ -154,7 +160,7 @@ def bound_cell(
     cell: int,
     node: int,
     side: float,
-    data: Data,
+    data: DualFunctionData,
     effort: Effort,
     target: float,
     cells: Cells,
@@ -226,7 +232,9 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
 
 
 @loops
-def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
+def model_and_gradient(
+    u: Array, node: int, side: float, data: DualFunctionData, gradient: Array
+) -> float:
     """Return side × output in the model at inputs u (L,), without its constants.
 
     `gradient` is overwritten with its derivatives by the inputs, shape (L,).
@@ -259,7 +267,9 @@ def model_and_gradient(u: Array, node: int, side: float, data: Data, gradient: A
 
 
 @loops
-def response_and_gradient(u: Array, node: int, side: float, data: Data, slopes: Array) -> float:
+def response_and_gradient(
+    u: Array, node: int, side: float, data: DualFunctionData, slopes: Array
+) -> float:
     """Return the sum of the modes' responses, side × output, in the model at inputs u (L,).
 
     Responses are read by bilinear interpolation in the tables. `slopes` is overwritten with the
@@ -309,7 +319,7 @@ def response_and_gradient(u: Array, node: int, side: float, data: Data, slopes: 
 
 
 @loops
-def ascend(u: Array, node: int, side: float, data: Data, steps: int) -> float:
+def ascend(u: Array, node: int, side: float, data: DualFunctionData, steps: int) -> float:
     """Raise side × output in the model by moving the inputs u (L,), in place; return its value.
 
     It is a projected gradient ascent over the box [−1, 1]^L with the step lengths of Barzilai and

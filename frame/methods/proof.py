@@ -27,15 +27,15 @@ from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
-from alphacut.frame.bounds.branch_and_bound import Optima, enclosed, first_optima
+from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
 from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.model_error import (
     MAX_PARAMETERS,
     direct_error_in_steps,
     largest_growth,
-    motion_parts,
     proved_error,
     remainder_bounds,
+    response_parts,
 )
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
@@ -277,7 +277,7 @@ def bound_levels(
             better = inside.value > optima.value
             optima.value[better] = inside.value[better]
             optima.point[better] = inside.point[better]
-        proved, count = enclosed(
+        proved, count = bound_problems(
             model,
             lower,
             upper,
@@ -353,7 +353,7 @@ def _line_deviation(model: ModalModel) -> Array:
         grids.append(np.multiply.outer(-along_q + 1j, along_omega))
 
     responses = []
-    for part in motion_parts(model, growth):
+    for part in response_parts(model, growth):
         load = None
         if part.load is not None:
             load = part.load.history

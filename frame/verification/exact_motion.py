@@ -22,7 +22,7 @@ from scipy.linalg import cholesky, expm, solve_triangular
 Array = NDArray[np.float64]
 
 
-class Course(NamedTuple):
+class LoadHistory(NamedTuple):
     """A load over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0."""
 
     samples: Array  # of g, linear between and zero outside, shape (R,)
@@ -94,7 +94,7 @@ class LinearMotion:
     record_step: float  # time between samples, in s
     forces: Array  # b of each force, shape (n, H), in N
     feeds: Array  # what a unit of each force adds to the outputs at once, shape (m, H)
-    courses: tuple[Course, ...] = ()  # f of each force
+    histories: tuple[LoadHistory, ...] = ()  # f of each force
 
     def outputs(self, times: Array) -> RoundedOutputs:
         """Return outputs at times ≥ 0, rising, and bounds of their rounding, (T, m) each."""
@@ -104,17 +104,17 @@ class LinearMotion:
         system = _ScaledSystem.of_matrices(lower, self.damping, self.stiffness, self.rows)
         omega = system.omega
         start = np.concatenate([lower.T @ self.start[:n], lower.T @ self.start[n:] / omega])
-        ground = Course(self.record, self.record_step)
+        ground = LoadHistory(self.record, self.record_step)
         values, rounding = system.outputs(start, -(lower.T @ self.pattern) / omega, ground, times)
         # A force acts from its start on, on a structure at rest. Responses add up.
-        for force, feed, course in zip(self.forces.T, self.feeds.T, self.courses, strict=True):
-            acts = times >= course.start - 1e-12 * times[-1]
+        for force, feed, history in zip(self.forces.T, self.feeds.T, self.histories, strict=True):
+            acts = times >= history.start - 1e-12 * times[-1]
             if acts.any():
-                since = np.maximum(times[acts] - course.start, 0.0)
-                by_force = system.outputs(0.0 * start, inverse @ force / omega, course, since)
+                since = np.maximum(times[acts] - history.start, 0.0)
+                by_force = system.outputs(0.0 * start, inverse @ force / omega, history, since)
                 values[acts] += by_force.values
                 rounding[acts] += by_force.rounding
-            values += feed * course.values(times)[:, np.newaxis]
+            values += feed * history.values(times)[:, np.newaxis]
         return RoundedOutputs(values, rounding)
 
 
@@ -157,7 +157,9 @@ class _ScaledSystem:
             norm=omega + float(np.linalg.norm(damper)),
         )
 
-    def outputs(self, start: Array, push: Array, course: Course, times: Array) -> RoundedOutputs:
+    def outputs(
+        self, start: Array, push: Array, history: LoadHistory, times: Array
+    ) -> RoundedOutputs:
         """Return outputs at times from x(0) = start, and their rounding.
 
         Rounded matrices are those of a structure whose L⁻¹ K L⁻ᵀ differs by n ε of its norm ω², so
@@ -166,24 +168,24 @@ class _ScaledSystem:
         Args:
             start: Initial state, shape (2n,).
             push: What a unit of the load adds to the second half of ẋ, shape (n,).
-            course: The load f.
+            history: The load f.
             times: Times, rising, shape (T,), in s.
         """
         n = len(push)
         last = max(float(times.max(initial=0.0)), 1e-300)
-        interval = course.step if len(course.samples) else last
+        interval = history.step if len(history.samples) else last
         # The norm of A times a substep is at most 2; a larger one needs a higher degree.
-        fastest = max(self.norm, course.frequency)
+        fastest = max(self.norm, history.frequency)
         substeps = max(1, ceil(fastest * interval / 2.0))
         substep = interval / substeps
         scale = float(np.linalg.norm(push)) or 1.0
-        load = scale * course.substep_loads(substeps, max(1, ceil(last / substep)))
+        load = scale * history.substep_loads(substeps, max(1, ceil(last / substep)))
 
         # The matrix of the states and the four numbers of the load, times a substep.
         flow = np.zeros((2 * n + 4, 2 * n + 4))
         flow[: 2 * n, : 2 * n] = self.matrix * substep
         flow[n : 2 * n, 2 * n] = push / scale * substep
-        turn = course.frequency * substep
+        turn = history.frequency * substep
         rotation = np.kron(np.eye(2), [[0, turn], [-turn, 0]])  # d/dt of sin θ and cos θ
         rise = np.eye(4, k=2)  # g rises by r
         flow[2 * n :, 2 * n :] = rotation + rise
@@ -202,7 +204,7 @@ class _ScaledSystem:
 
         # 64 roundings of the series and of the rows do not grow with time.
         slow_phase = self.omega**2 * np.minimum(times**2, times / self.lowest) / 2
-        phase = slow_phase + course.frequency * times
+        phase = slow_phase + history.frequency * times
         rounding = n * np.finfo(float).eps * (64.0 + phase)
         magnitude = np.abs(self.rows) @ np.abs(states).max(axis=0)
         return RoundedOutputs(values, rounding[:, np.newaxis] * magnitude)

@@ -23,7 +23,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.frame.structures.quantities import Output
-from alphacut.frame.verification.exact_motion import Course, LinearMotion
+from alphacut.frame.verification.exact_motion import LinearMotion, LoadHistory
 from alphacut.fuzzy.result import ROUND_OFF
 from alphacut.fuzzy.sets.boxes import quasi_random_points
 
@@ -45,7 +45,7 @@ AXES = {
     "forces": ("motion", "row", "load"),
     "feeds": ("motion", "output", "load"),
 }
-"""Axes of each array of a `LinearMotion` in datasets; record and courses of forces are the same for
+"""Axes of each array of a `LinearMotion` in datasets; record and forces over time are the same for
 all."""
 
 
@@ -85,8 +85,8 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
     if system.ground is not None:
         record = system.ground.samples
         record_step = system.ground.step
-    courses = tuple(
-        Course(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
+    histories = tuple(
+        LoadHistory(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
         for x in distinct_histories(system.loads)
     )
     motions = []
@@ -113,7 +113,7 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
             record_step=record_step,
             forces=forces,
             feeds=matrices.accelerated @ np.linalg.solve(M, forces),
-            courses=courses,
+            histories=histories,
         )
         motions.append(motion)
     return motions
@@ -157,15 +157,15 @@ class _TestedMotion(NamedTuple):
     jumps: Mask  # whether a force jumps at the end of each step, (T − 1,)
 
 
-def jumps_at_ends(courses: Sequence[Course], time: Array) -> Mask:
+def jumps_at_ends(histories: Sequence[LoadHistory], time: Array) -> Mask:
     """Return whether one of the forces jumps at the end of each step between nodes, (T − 1,)."""
     jumps = np.zeros(len(time), bool)
-    for course in courses:
-        ends = [course.start]
-        if not course.is_held:
-            ends.append(course.start + (len(course.samples) - 1) * course.step)
+    for history in histories:
+        ends = [history.start]
+        if not history.is_held:
+            ends.append(history.start + (len(history.samples) - 1) * history.step)
         for end in ends:
-            jumps |= np.abs(time - end) <= 1e-9 * course.step
+            jumps |= np.abs(time - end) <= 1e-9 * history.step
     return jumps[1:]
 
 
@@ -226,7 +226,7 @@ class Trial:
         """
         for k, motion in enumerate(motions):
             point = points[k]
-            jumps = jumps_at_ends(motion.courses, self.envelope.time)
+            jumps = jumps_at_ends(motion.histories, self.envelope.time)
             outputs = motion.outputs(self.times)
             tested = _TestedMotion(point, outputs.values, outputs.rounding, jumps)
             near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
@@ -345,9 +345,9 @@ def variables(
     """
     count = max(1, min(len(motions), 1_000_000 // (3 * motions[0].mass.size)))
     first = motions[0]
-    # Of each course the number of samples, and the fields after these.
-    numbers = np.array([[len(x.samples), *x[1:]] for x in first.courses], float)
-    samples = np.concatenate([np.zeros(0), *(x.samples for x in first.courses)])
+    # Of each history the number of samples, and the fields after these.
+    numbers = np.array([[len(x.samples), *x[1:]] for x in first.histories], float)
+    samples = np.concatenate([np.zeros(0), *(x.samples for x in first.histories)])
     found: dict[str, tuple[tuple[str, ...], Array]] = {
         "motion_inputs": (("motion", "parameter"), points[:count])
     }
@@ -356,7 +356,7 @@ def variables(
     found["record"] = ("sample",), first.record
     found["record_step"] = (), np.array(first.record_step)
     found["course_samples"] = ("course_sample",), samples
-    found["course_numbers"] = ("load", "number"), numbers.reshape(len(first.courses), 6)
+    found["course_numbers"] = ("load", "number"), numbers.reshape(len(first.histories), 6)
     return found
 
 
@@ -367,11 +367,11 @@ def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
     numbers = values["course_numbers"]
     ends = np.cumsum(numbers[:, 0]).astype(int)[:-1]
     samples = np.split(values["course_samples"], ends)
-    courses = []
+    histories = []
     for course_samples, (_, step, start, is_held, frequency, phase) in zip(
         samples, numbers, strict=False
     ):
-        courses.append(Course(course_samples, step, start, bool(is_held), frequency, phase))
+        histories.append(LoadHistory(course_samples, step, start, bool(is_held), frequency, phase))
     motions = []
     for s in range(len(points)):
         arrays = {name: values[f"motion_{name}"][s] for name in AXES}
@@ -379,7 +379,7 @@ def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
             **arrays,
             record=values["record"],
             record_step=float(values["record_step"]),
-            courses=tuple(courses),
+            histories=tuple(histories),
         )
         motions.append(motion)
     return points, motions

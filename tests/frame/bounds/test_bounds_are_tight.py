@@ -7,13 +7,19 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
-from alphacut.frame.bounds.branch_and_bound import Frontier, Optima, Piece, enclosed, examine_items
+from alphacut.frame.bounds.branch_and_bound import (
+    Frontier,
+    Optima,
+    Piece,
+    bound_problems,
+    examine_items,
+)
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import (
     largest_growth,
-    motion_parts,
     proved_error,
     remainder_bounds,
+    response_parts,
 )
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
@@ -64,7 +70,7 @@ def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> 
     """Short of a turn all of the pulse adds up: R and its derivatives by λ are ∫ τ^r a."""
     model = spring(1e-2, PULSE, 4.0, 0.1)
     growth = largest_growth(model.eigenvalue, np.ones(1))
-    free, forced = motion_parts(model, growth)
+    free, forced = response_parts(model, growth)
     rate = model.eigenvalue.at(np.zeros((1, 1)))
     time = model.flow.time
     if order < 3:
@@ -138,7 +144,7 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_proved_error() -> None:
     rate, at = model.eigenvalue.at(unit), (np.repeat(unit, 61, 0), np.tile(nodes, 21))
     series = load.response(np.repeat(rate, 61, 0), at[1])[0].reshape(21, 61)
     missed = load.at_nodes(rate)[..., 0] - series
-    largest = motion_parts(model, largest_growth(model.eigenvalue, np.ones(1)))[1].waves[0][:, 0]
+    largest = response_parts(model, largest_growth(model.eigenvalue, np.ones(1)))[1].waves[0][:, 0]
     table.truncation = (np.abs(missed[:, 1:]) / largest[1:]).max()
     truth = UnitFlow(model.flow, model.boxes).values(unit)[..., 0]
     off = np.abs(model.at(*at, 0 * at[1])[0].reshape(21, 61) - truth).max(0)
@@ -170,7 +176,7 @@ def test_branch_and_bound_needs_all_of_the_remainder(start, gap, budget) -> None
     """From a best point of a cubic, in which half of the remainder would hide the highest value."""
     best = np.full((4, 1), start)  # of two nodes and both sides
     optima = Optima(best, np.array([-1, 1, -1, 1]) * start**3)
-    proved, _ = enclosed(cube(), -np.ones(1), np.ones(1), optima, gap=gap, budget=budget)
+    proved, _ = bound_problems(cube(), -np.ones(1), np.ones(1), optima, gap=gap, budget=budget)
     assert 1 <= proved[3] <= 1.02
 
 

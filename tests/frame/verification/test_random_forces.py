@@ -13,7 +13,7 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.verification.exact_motion import Course, LinearMotion
+from alphacut.frame.verification.exact_motion import LinearMotion, LoadHistory
 from alphacut.fuzzy import Interval
 from tests.frame.motions import random_points
 
@@ -93,8 +93,9 @@ def exact_accelerations(frame, inputs, times):
         record_step=0.0,
         forces=push,
         feeds=np.linalg.solve(M, push),
-        courses=tuple(
-            Course(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase) for x in histories
+        histories=tuple(
+            LoadHistory(x.samples, x.step, x.start, x.is_held, x.frequency, x.phase)
+            for x in histories
         ),
     )
     return motion.outputs(times)[0]
