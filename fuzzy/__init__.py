@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from alphacut.fuzzy.knowledge.known import Knowledge
     from alphacut.fuzzy.plans.automatic import Automatic
     from alphacut.fuzzy.plans.transformation import General, Reduced, Signed
-    from alphacut.fuzzy.propagation import propagate, width_shares
+    from alphacut.fuzzy.propagation import propagate, width_fractions
     from alphacut.fuzzy.result import Bounds, Nature
     from alphacut.fuzzy.sets.boxes import levels
 
@@ -28,7 +28,7 @@ __all__ = [
     "Automatic", "Bounds", "Crisp", "FailedError", "FuzzyNumber", "General", "Interval",
     "Knowledge", "Nature", "PiecewiseLinear", "Reduced", "RefusedError", "Signed",
     "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels", "propagate",
-    "width_shares",
+    "width_fractions",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "Automatic": "plans.automatic",
@@ -43,7 +43,7 @@ AT_FIRST_USE = {
     "jointly": "knowledge.joint",
     "levels": "sets.boxes",
     "propagate": "propagation",
-    "width_shares": "propagation",
+    "width_fractions": "propagation",
 }
 """Module of each exported name that is imported at its first use, since a case file needs fuzzy
 numbers alone. Campaigns, with SQLite and processes, take .04 s of processor time."""

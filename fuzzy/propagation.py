@@ -100,14 +100,17 @@ def propagate(
         Ends(lower=array([3., 6.]), upper=array([20., 10.]))
     """
     start = perf_counter()
-    alpha_levels = levels(4) if alpha is None else alpha
-    domain = Domain(joined_inputs(inputs), alpha_levels)
+    if alpha is None:
+        alpha = levels(4)
+    domain = Domain(joined_inputs(inputs), alpha)
     method = method or Automatic()
     _require_method(method)
     is_allowed = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(is_allowed, "executor", value=executor, allowed=allowed)
-    model = b"" if store is None else model_key(identity or {})
+    model = b""
+    if store is not None:
+        model = model_key(identity or {})
     # A store or an executor that the caller made is not closed here.
     with (
         progress_reporter(progress) as report,
@@ -145,26 +148,26 @@ def _require_method(method: Plan) -> None:
     require(is_plan, "method", value=repr(method), allowed=allowed, cure=cure)
 
 
-class Shares(NamedTuple):
+class WidthFractions(NamedTuple):
     """Contribution of each input, or group of inputs, to the width of a result (Figs. 34, 35).
 
     Args:
         names: Names of the inputs, or of the groups.
-        share: Fraction of the width, shape (names, …, outputs): the reduction of the width when the
-            input is fixed at its nominal value, over the width with all inputs fuzzy; 0 where the
-            width is 0. The fractions need not add up to 1: effects overlap.
+        fraction: Fraction of the width, shape (names, …, outputs): the reduction of the width when
+            the input is fixed at its nominal value, over the width with all inputs fuzzy; 0 where
+            the width is 0. The fractions need not add up to 1: effects overlap.
     """
 
     names: tuple[str, ...]
-    share: Array
+    fraction: Array
 
 
-def width_shares(
+def width_fractions(
     propagation: Callable[[Mapping[str, FuzzyNumber]], Bounds | tuple[Array, Array]],
     inputs: Mapping[str, FuzzyNumber | float],
     *,
     groups: Mapping[str, Sequence[str]] | None = None,
-) -> Shares:
+) -> WidthFractions:
     """Return how much of the width of a fuzzy result each input causes, by fixing one at a time.
 
     Args:
@@ -181,7 +184,7 @@ def width_shares(
         >>> from alphacut.fuzzy import Interval, Reduced
         >>> inputs = {"a": Interval(0, 1), "b": Interval(0, 3)}
         >>> total = lambda fuzzy: propagate(lambda a, b: a + b, fuzzy, Reduced(), alpha=[0])
-        >>> width_shares(total, inputs).share.ravel()
+        >>> width_fractions(total, inputs).fraction.ravel()
         array([0.25, 0.75])
     """
     numbers = fuzzy_inputs(inputs)
@@ -206,5 +209,5 @@ def width_shares(
     # whole box may have missed it: so no fraction is negative.
     width = np.maximum(ends.upper, uppers.max(axis=0)) - np.minimum(ends.lower, lowers.min(axis=0))
     reduction = width - (uppers - lowers)
-    share = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
-    return Shares(tuple(members), share)
+    fraction = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)
+    return WidthFractions(tuple(members), fraction)

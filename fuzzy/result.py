@@ -123,8 +123,9 @@ class Bounds:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", np.array(checked_levels(self.alpha)))
-        times = () if self.time is None else (len(self.time),)
-        shape = (len(self.alpha), *times, len(self.outputs))
+        shape: tuple[int, ...] = (len(self.alpha), len(self.outputs))
+        if self.time is not None:
+            shape = (len(self.alpha), len(self.time), len(self.outputs))
         for name in ("lower", "upper", "error"):
             _require_shape(name, getattr(self, name).shape, shape)
         for name in ("lower_at", "upper_at"):
@@ -253,12 +254,17 @@ class Bounds:
         """Return nature, basis and cost, a line for each level of the first outputs, the notes."""
         max_lines = 25  # of levels of outputs; the text shall fit on a screen
         n_shown = max(1, max_lines // len(self.alpha))
-        basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
-        time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
-        budget = f" of at most {self.budget:,}" if self.budget else ""
-        cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
-        box = f" {of_enclosing_box(self.encloses)}" if self.encloses else ""
-        lines = [f"bounds {self.nature}{box}{basis}{time} by the method {self.method}: {cost}"]
+        head = f"bounds {self.nature}"
+        if self.encloses:
+            head += f" {of_enclosing_box(self.encloses)}"
+        if self.basis:
+            head += f" (given that {' and '.join(self.basis)})"
+        if self.time is not None:
+            head += f" over {self.time[0]:g} … {self.time[-1]:g} s"
+        head += f" by the method {self.method}: {self.evaluations:,} evaluations"
+        if self.budget:
+            head += f" of at most {self.budget:,}"
+        lines = [f"{head}, {self.seconds:.2g} s"]
         for output in self.outputs[:n_shown]:
             lines += self._lines(output)
         n_hidden = len(self.outputs) - n_shown
@@ -321,7 +327,8 @@ class Bounds:
         output = output or self.outputs[0]
         if self.time is None:
             return self.number(output).plot(axes, **line)
-        axes = new_axes() if axes is None else axes
+        if axes is None:
+            axes = new_axes()
         opacity = 0.8 / len(self.alpha)  # bands of all levels lie on one another
         style: dict[str, Any] = {"color": "tab:blue", "alpha": opacity, "lw": 0} | line
         ends = self.bounds(output)

@@ -86,19 +86,25 @@ class RadiusLimits:
         allowed = f"shares up to {max_fraction:.0%}, since particles touch at r_n = 1"
         is_loose = fraction <= max_fraction
         require(is_loose, "particles", value=value, allowed=allowed, cure=self._cure)
-        return sample if shape == SPHERES else sample.capped(shape.reach)
+        if shape == SPHERES:
+            return sample
+        return sample.capped(shape.reach)
 
     def capped_fraction(self, sample: AreaWeighted) -> float:
         """Return the fraction of area or volume in cells tighter than `Shape.reach`.
 
         It is 0 with stated limits.
         """
-        return 0.0 if self.stated is not None else 1 - float(sample.cdf(self.shape.reach))
+        if self.stated is not None:
+            return 0.0
+        return 1 - float(sample.cdf(self.shape.reach))
 
     @property
     def _cure(self) -> str:
         """Advice in the message on particles that are too dense for cells of one particle."""
-        fraction = "…" if self.packed_fraction is None else f"{self.packed_fraction:g}"
+        fraction = "…"
+        if self.packed_fraction is not None:
+            fraction = f"{self.packed_fraction:g}"
         by_fraction = f"set cell.fraction = {fraction} in place of [microstructure]"
         if self.shape == SPHERES:
             return by_fraction
@@ -319,7 +325,9 @@ def fit_radius_map(
         is_range = len(limits) == 2 and 0 < limits[0] < limits[1] < 1
         require(is_range, "limits", value=limits, allowed="two numbers that rise within (0, 1)")
     report = progress or (lambda fraction: None)
-    packed_fraction = sections.packing.fraction if isinstance(sections, Packings) else None
+    packed_fraction = None
+    if isinstance(sections, Packings):
+        packed_fraction = sections.packing.fraction
     rule = RadiusLimits(sections[0].shape, limits, packed_fraction)
 
     # Particles → tessellation
@@ -446,7 +454,9 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
     slopes = slope_band(
         fit, truncated, level=confidence, resamples=RESAMPLES, generator=slope_generator
     )
-    pbox = least_pbox(fit, truncated, band, required=slopes if rule.shape == DISCS else None)
+    # The supports of the slopes contain their bootstrap band as well, but for spheres.
+    required = slopes if rule.shape == DISCS else None
+    pbox = least_pbox(fit, truncated, band, required=required)
     return FuzzyFit(truncated, pbox, slopes, band)
 
 

@@ -183,8 +183,10 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
     for end in (float(values[sound].min()), float(values[sound].max())):
         for grey in classes:
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
-            at_end = counts[0] / grey.size if distance[0] == 0 else 0.0
-            next_to_end = counts[1] / grey.size if len(counts) > 1 else 0.0
+            if distance[0] != 0:  # no pixel of the class is at this end
+                continue
+            at_end = counts[0] / grey.size
+            next_to_end = counts[1:2].sum() / grey.size
             if at_end >= 0.01 and at_end > 3.0 * next_to_end:
                 what = f"{at_end:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"

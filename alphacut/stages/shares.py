@@ -10,7 +10,7 @@ from alphacut.base.arrays import Array
 from alphacut.case.structure import Structure
 from alphacut.frame import Peak, sensitivity
 from alphacut.fuzzy import FuzzyNumber, Reduced
-from alphacut.fuzzy.propagation import Shares, width_shares
+from alphacut.fuzzy.propagation import WidthFractions, width_fractions
 from alphacut.io.provenance import NESTED
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask
@@ -54,7 +54,7 @@ def _fractions_of_widths(
     if campaign is not None and len(campaign.inputs) > 1:
         shares = cell_shares(campaign)
         for column, name in enumerate(("E", "ν")):
-            fractions = map(float, shares.share[:, column])
+            fractions = map(float, shares.fraction[:, column])
             table[name] = dict(zip(shares.names, fractions, strict=True))
     if structure is None or task is None:
         return StageResult(table)
@@ -71,7 +71,7 @@ def _fractions_of_widths(
     return StageResult(table)
 
 
-def cell_shares(campaign: CellProblem) -> Shares:
+def cell_shares(campaign: CellProblem) -> WidthFractions:
     """Return the fractions of the widths of E and ν that each input causes, shape (inputs, 2).
 
     Whatever the case uses, the cell is solved by `auto`, which is the series where it has a
@@ -86,4 +86,4 @@ def cell_shares(campaign: CellProblem) -> Shares:
         columns = [cell_bounds.column(name) for name in OUTPUTS]
         return cell_bounds.lower[0, columns], cell_bounds.upper[0, columns]
 
-    return width_shares(bounds, campaign.inputs)
+    return width_fractions(bounds, campaign.inputs)

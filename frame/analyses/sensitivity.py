@@ -20,7 +20,7 @@ from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.propagation import width_shares
+from alphacut.fuzzy.propagation import width_fractions
 from alphacut.fuzzy.result import Nature
 
 
@@ -104,7 +104,7 @@ def sensitivity(
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         """Return the smallest and the largest peak of each output, shape (outputs,) each.
 
-        `width_shares` calls this first with all inputs fuzzy, and then with one group fixed.
+        `width_fractions` calls this first with all inputs fuzzy, and then with one group fixed.
         """
         ends = np.array([number.cut(level) for number in numbers.values()], float)
         nominal = [number.nominal for number in numbers.values()]
@@ -127,10 +127,10 @@ def sensitivity(
         return np.array([x.peak for x in smallest]), np.array([x.peak for x in largest])
 
     # The width with a group fixed is compared with the width with all inputs fuzzy.
-    fractions = width_shares(bounds, inputs, groups=groups)
+    fractions = width_fractions(bounds, inputs, groups=groups)
     by_output = {}
     for k, output in enumerate(outputs):
-        column = map(float, fractions.share[:, k])
+        column = map(float, fractions.fraction[:, k])
         by_output[f"the peak of {output}"] = dict(zip(fractions.names, column, strict=True))
     return Sensitivity(by_output)
 

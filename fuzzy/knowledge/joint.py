@@ -64,7 +64,9 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
     numbers = fuzzy_inputs(inputs)
     rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
     are_joined = len(rules) == 1 and None not in rules
-    return numbers if are_joined else fuzzy_inputs(jointly(numbers))
+    if are_joined:
+        return numbers
+    return fuzzy_inputs(jointly(numbers))
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
@@ -121,9 +123,10 @@ class JointClaim:
             rule = _rule_of(claimed)
             if rule.words:
                 conditions.append(rule.words)
-        if opinions:
-            cuts = "their cuts" if len(opinions) > 1 else "its cut"
-            conditions.append(f"{', '.join(opinions)} in {cuts} at α (opinions)")
+        if len(opinions) == 1:
+            conditions.append(f"{opinions[0]} in its cut at α (opinions)")
+        elif opinions:
+            conditions.append(f"{', '.join(opinions)} in their cuts at α (opinions)")
         if rule and nature != "guaranteed":
             conditions.append(
                 f"if the true range stays inside the {nature} bounds, which is not proved"

@@ -39,8 +39,8 @@ class Knowledge:
     def __post_init__(self) -> None:
         checked_number("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
-            values = list(sign.values()) if isinstance(sign, Mapping) else [sign]
-            for value in values:
+            by_output = sign if isinstance(sign, Mapping) else {"all": sign}
+            for value in by_output.values():
                 allowed = "1 (rises), -1 (falls)"
                 require(value in (-1, 1), f"sign of {name}", value=value, allowed=allowed)
 

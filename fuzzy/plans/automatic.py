@@ -115,8 +115,9 @@ class _AutomaticSearch:
         is_searched = ~(walk.is_monotone | walk.is_constant)
         if not is_searched.any():
             return
-        names = tuple(self.outputs[is_searched])
-        searched = names if len(names) <= SEARCH.max_searched_outputs else ()
+        searched = tuple(self.outputs[is_searched])
+        if len(searched) > SEARCH.max_searched_outputs:
+            searched = ()
         linkage = SingleLinkage(self.campaign, self.domain, searched)
         self.linkage = linkage
         linkage.run(walk.samples)
@@ -174,8 +175,10 @@ def _with_errors(bounds: Bounds, is_estimated: Mask, domain: Domain) -> Bounds:
 def _listed(names: Iterable[str]) -> str:
     """Return the first four names, with an ellipsis if there are more."""
     all_names = list(names)
-    ellipsis = " …" if len(all_names) > 4 else ""
-    return ", ".join(all_names[:4]) + ellipsis
+    text = ", ".join(all_names[:4])
+    if len(all_names) > 4:
+        text += " …"
+    return text
 
 
 @dataclass(frozen=True)

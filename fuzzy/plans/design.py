@@ -130,7 +130,9 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
     ends = np.hstack([lower, upper])
     differs_from_wider = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
     for level in np.flatnonzero(differs_from_wider & widths.any(axis=1))[::-1]:
-        count = -(-tests // 4) if points else tests
+        count = tests
+        if points:  # in a wider cut than the first one
+            count = -(-tests // 4)
         unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
         points += list(lower[level] + widths[level] * unit_points)
     return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))

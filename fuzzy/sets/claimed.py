@@ -22,8 +22,10 @@ class CoverageClaim:
     conditions: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        under = f", given {'; '.join(self.conditions)}" if self.conditions else ""
-        return f"the {self.about} lies in its α-cut with P >= 1 - α over repeated samples{under}"
+        claim = f"the {self.about} lies in its α-cut with P >= 1 - α over repeated samples"
+        if self.conditions:
+            claim += f", given {'; '.join(self.conditions)}"
+        return claim
 
 
 @dataclass(frozen=True)

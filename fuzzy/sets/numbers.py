@@ -63,7 +63,7 @@ class FuzzyNumber(ABC):
 
     @cached_property
     def nominal(self) -> float:
-        """The nominal value: of membership 1, or the middle of the interval of such values."""
+        """The nominal value: of membership 1, or the midpoint of the interval of such values."""
         lower, upper = self.cut(1.0)
         return lower if lower == upper else (lower + upper) / 2
 
@@ -73,7 +73,11 @@ class FuzzyNumber(ABC):
         return self.cut(0.0)
 
     def cut(self, alpha: float) -> Cut:
-        """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support."""
+        """Return the α-cut: the values of membership `alpha` or more; at 0 the closed support.
+
+        Raises:
+            RefusedError: The level is outside [0, 1].
+        """
         alpha = checked_level(alpha)
         cuts = self.cuts
         lower = _interpolate(alpha, cuts.alpha, cuts.lower)
@@ -94,7 +98,8 @@ class FuzzyNumber(ABC):
 
         `line` has keywords of `Axes.plot`, such as `color`.
         """
-        axes = new_axes() if axes is None else axes
+        if axes is None:
+            axes = new_axes()
         cuts = self.cuts
         support = cuts.lower[:1], cuts.upper[:1]  # where the function falls to 0
         values = np.concatenate([support[0], cuts.lower, cuts.upper[::-1], support[1]])

@@ -62,7 +62,9 @@ class HermiteFit:
             sample: Reduced radii between the limits.
             weights: Other weights of the values, by the bootstrap, shape (n,), sum 1.
         """
-        cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
+        cumulated = sample.cumulated
+        if weights is not None:
+            cumulated = np.minimum(np.cumsum(weights), 1.0)
         probability = np.append(0.0, cumulated)
         probability[-1] = 1.0
 
@@ -72,8 +74,9 @@ class HermiteFit:
         of_ends = h[[1, 3]] * rule_weights @ (self.a1 * h[0] + self.a3 * h[2])
         of_sample = np.diff(self._integrals(probability), axis=1) @ sample.values
         best = np.asarray(np.linalg.solve(self._gram, of_sample - of_ends), float)
-        a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
-        return float(max(a2, 0)), float(max(a4, 0))
+        if not self.is_monotone(best):
+            best = self._nearest_monotone(best)
+        return float(max(best[0], 0)), float(max(best[1], 0))
 
     def map(self, slopes: tuple[float, float]) -> HermiteMap:
         """Return the radius map with slopes (a2, a4)."""

@@ -92,7 +92,8 @@ class Packing:
             )
             radii = np.append(radii, self.radii.sample(self.number, generator))
             measure = float(self.shape.measure(radii).sum()) / self.fraction
-            side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))
+            root = np.sqrt if self.shape == DISCS else np.cbrt
+            side = float(root(measure))
         return radii, side
 
 

@@ -47,8 +47,9 @@ def require_distribution(distribution: object) -> None:
     cure = "give the law itself, as TruncatedNormal(-3, 3)"
     if hasattr(distribution, "ppf"):
         cure = "for scipy.stats.norm give TruncatedNormal(-3, 3); else a class with these members"
-    is_text = isinstance(distribution, str)
-    shown = repr(distribution) if is_text else type(distribution).__name__
+    shown = type(distribution).__name__
+    if isinstance(distribution, str):
+        shown = repr(distribution)
     raise RefusedError("law of θ", shown, "a law with lower, upper, pdf, cdf and quantile", cure)
 
 

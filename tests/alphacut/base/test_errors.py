@@ -18,7 +18,7 @@ from alphacut.fuzzy import (
     jointly,
     levels,
     propagate,
-    width_shares,
+    width_fractions,
 )
 from alphacut.fuzzy.campaign.store import model_key
 
@@ -61,7 +61,7 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: model_key({"f": abs}), "identity"),
         (lambda: run(alpha=[0.5]).number(), "alpha"),
         (
-            lambda: width_shares(lambda x: run(inputs=x), X, groups={"g": ("z",)}),
+            lambda: width_fractions(lambda x: run(inputs=x), X, groups={"g": ("z",)}),
             "input of a group",
         ),
         (lambda: from_data([], "next value"), "values"),

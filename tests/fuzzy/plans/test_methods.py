@@ -16,7 +16,7 @@ from alphacut.fuzzy import (
     Triangular,
     levels,
     propagate,
-    width_shares,
+    width_fractions,
 )
 
 
@@ -140,12 +140,12 @@ def test_shares_of_width():
     def run(fuzzy):
         return propagate(lambda a, b, c: a + b + 0 * c, fuzzy, Reduced())
 
-    shares = width_shares(run, inputs)
+    shares = width_fractions(run, inputs)
     expected = np.array([[1 / 3] * 4, [2 / 3] * 4, [0] * 4])
-    np.testing.assert_allclose(shares.share[:, :-1, 0], expected, atol=1e-12)
-    assert (shares.share[:, -1] == 0).all()
-    grouped = width_shares(run, inputs, groups={"both": ("a", "b")})
-    np.testing.assert_allclose(grouped.share[0, :-1], 1)
+    np.testing.assert_allclose(shares.fraction[:, :-1, 0], expected, atol=1e-12)
+    assert (shares.fraction[:, -1] == 0).all()
+    grouped = width_fractions(run, inputs, groups={"both": ("a", "b")})
+    np.testing.assert_allclose(grouped.fraction[0, :-1], 1)
 
 
 @pytest.mark.parametrize("method", [Signed(), Reduced(), None])
@@ -165,5 +165,5 @@ def test_what_an_input_fixed_reaches_is_reached_in_the_whole_box():
         return np.array([0.0]), np.array([1.2 if is_fixed else 1.0])
 
     numbers = {"a": Interval(0, 1), "b": Interval(0, 1)}
-    shares = width_shares(missing, numbers).share.ravel()
+    shares = width_fractions(missing, numbers).fraction.ravel()
     assert shares == pytest.approx([1 - 1.0 / 1.2, 0.0])
