@@ -47,7 +47,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     if dimension == 2:
         allowed_file = "an image or an array"
         allowed_shape = "one plane of 2 × 2 numbers or more"
-        cures = {3: TAKE_VOXEL}
+        cures = {3: TAKE_VOXEL}  # by the dimension of an array of another one
         require(not path.is_dir(), path.name, "a folder", "a picture", TAKE_VOXEL)
     else:
         allowed_file = "a volume"
@@ -69,6 +69,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     is_grid = values.ndim == dimension and not is_thin and values.dtype.kind in "buif"
     what = f"{values.dtype} of shape {values.shape}"
     require(is_grid, path.name, what, allowed_shape, cures.get(values.ndim, ""))
+    # before the numbers of a mapped array are touched
     require_memory(values.shape)
     n_not_finite = int((~np.isfinite(values)).sum())
     what = f"with {n_not_finite} values that are not finite"
@@ -124,6 +125,7 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
     require(count > 1, folder.name, f"{count} pictures", allowed)
     by_number = dict(zip(_numbers_in_names(files), files, strict=True))
     lowest = min(by_number)
+    # a slice that is missing, or twice there, would move all above it
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
@@ -180,6 +182,7 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
         cure = "save the one meant as grey values; a volume takes cell.voxel"
         is_read = (is_grey or is_colour) and frames == 1
         require(is_read, path.name, what, "one page of grey values", cure)
+        # Many programs write equal resolutions whatever the pixels are; unlike ones are meant.
         dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
         is_as_stated = not has_square_pixels or abs(dpi_x / dpi_y - 1) <= 0.01
         what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"

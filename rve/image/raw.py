@@ -89,6 +89,7 @@ class RawHead:
         with self.data.open("rb") as file:
             file.seek(max(self.offset, 0))
             packed = file.read()
+        # The limit stops a small file that would unpack to gigabytes.
         gzip_or_zlib = 47  # zlib's number for the largest window and either of both heads
         try:
             return zlib.decompressobj(gzip_or_zlib).decompress(packed, expected + 1)
@@ -119,6 +120,7 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     are_whole = all(re.fullmatch(r"\+?\d{1,9}", size) and int(size) > 0 for size in sizes)
     are_whole = are_whole and math.prod(map(int, sizes)) <= 1 << 40
     require(are_whole, name, f"sizes {' '.join(sizes)}", "whole numbers greater than 0")
+    # folders and devices are no data
     require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
 
     encoding = entries.value("encoding").lower() or "raw"
@@ -131,6 +133,7 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     channels = entries.value("elementnumberofchannels") or "1"
     require(channels == "1", name, f"{channels} numbers a voxel", "one")
 
+    # Spacings are those of the axes of the file, the case's those of x, y and z.
     layout = _layout(name, entries)
     lengths = layout.lengths[np.argsort(layout.axes)]  # along x, y, z
     require_spacing(name, [float(length) for length in lengths], sides)

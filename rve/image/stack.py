@@ -75,6 +75,7 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     require_memory([n for n in spatial if n > 1])
     n_bytes = sum(one.nbytes for one in series)
     require_free_memory(name, 3.0 * n_bytes, what)
+    # A head may promise gigabytes that a short file cannot hold.
     compression = int(first.keyframe.compression)
     file_size = path.stat().st_size
     max_bytes = _max_bytes_per_byte(compression) * file_size

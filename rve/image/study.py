@@ -446,6 +446,7 @@ def solve_study(
     images = [study.images(level, level) for level in alpha]
     progress_of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
     cuts = model.cuts(images, (nominal, solution), progress_of_cuts)
+    # a test of the proof itself, by solutions that share nothing with those of the cuts
     model.require_consistent(images, cuts)
     _require_positive(cuts[0])
     tick((len(alpha) + 3) / n_solutions)
@@ -454,6 +455,7 @@ def solve_study(
     references = None
     if np.isfinite(cuts[0].bounds.width):
         widths = _widths_by_cause(study, model, solution, lowest=alpha[0])
+        # classical bounds are of phases with finite moduli
         if all(phase.is_solid for phase in study.phases):
             references = _reference_bounds(study)
     first, last = study.phase_ranges(alpha[0])
@@ -489,6 +491,7 @@ def _widths_by_cause(
         (cut,) = model.cuts([study.images(threshold, phases)], (nominal, solution))
         return float(cut.modulus.upper - cut.modulus.lower)
 
+    # Causes are varied one at a time: their widths need not add up to that of the cut.
     at_nominal = width(None, None)
     widths = {"discretisation": at_nominal}
     if study.fuzzy_threshold:

@@ -189,6 +189,8 @@ def isotropic_parts(dimension: int, *, stress: bool) -> Array:
     shears = len(SHEARS[dimension])
     parts = np.zeros((dimension + shears, dimension + shears))
     parts[0, :dimension] = 1
+    # Row k is orthogonal to those before it, and its squared norm is 2, so that the squares of the
+    # rows sum to 2 dev:dev (of normal components).
     for k in range(1, dimension):  # 11 − 22, then (11 + 22 − 2·33)/√3
         parts[k, :k] = 1
         parts[k, k] = -k
@@ -290,6 +292,7 @@ Derivatives = list[list[Derivative]]
 
 def unknown_functions(derivatives: Derivatives) -> list[tuple[int, int]]:
     """Return the indices of the functions that occur in strains or stresses, sorted."""
+    # the order of the unknowns of a cell, which all of `fields` relies on
     return sorted({term.function for terms in derivatives for term in terms})
 
 

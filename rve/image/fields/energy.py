@@ -268,12 +268,15 @@ def solve_side(
         if nodes is None:
             return None
         potentials = PorePotentials.of_nodes(element, nodes)
-        # stiff there for the preconditioner, as there is no stress that could have an energy
+        # The material of pores does not matter, as there is no stress in them that could have an
+        # energy. The stiffest one of the others keeps the spectrum narrow.
         bulk, shear = (xp.where(is_pore, x.max(), x) for x in (bulk, shear))
     trace, deviator = coefficients_of(element, bulk, shear)
     fields = _least_energy_fields(element, trace, deviator, solver, potentials, start)
     field_errors = None
     if potentials is not None:
+        # Potentials are prescribed to the last bit but for `field_errors`, and pores count nothing:
+        # the exact potentials have no stress there.
         field_errors = potentials.impose(fields)
         trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
     unit_modes = element.mean_modes(np.eye(len(fields)))
@@ -326,6 +329,8 @@ def _least_energy_fields(
             fields[this] = solver.solve(system)
         else:
             fields[this] = _solve_beside_pores(solver, system, potentials, loads[this])
+    # The energies of all pairs of fields are computed of what rounding leaves here, so that this
+    # combination need not be exact.
     to_unit_loads = xp.asarray(np.linalg.inv(loads))
     for slab in slabs(fields):  # in place
         fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)

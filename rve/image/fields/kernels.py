@@ -98,6 +98,8 @@ def _apply(
     modes = np.zeros((6, n, n, n * nx))
     lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
     for z in range(nz):
+        # A row of voxels takes the strips of n rows of unknowns, from y to y + n − 1. They are kept
+        # in a ring of n, so that each further row of voxels computes one.
         for y in range(n - 1):
             _fill_strips(tables, terms, groups, factors, field, z, y, shifted, lines, strips)
         for y in range(ny):
@@ -105,8 +107,10 @@ def _apply(
                 tables, terms, groups, factors, field, z, y + n - 1, shifted, lines, strips
             )
             _modes_of_row(tables, terms, strips, y, modes)
+            # a uniform field has the constant mode alone
             for c in range(6):
                 modes[c, 0, 0, :nx] += uniform[c]
+            # from modes of the strain to those of its conjugate, in place
             of_trace, of_deviator = trace[z, y], deviator[z, y]
             for i in range(n):
                 for j in range(n):
@@ -124,6 +128,9 @@ def _apply(
                             yz[x] *= shear
                             xz[x] *= shear
                             xy[x] *= shear
+            # The transposed pass along y: what a row of voxels exerts on n rows of unknowns is
+            # added to their sums, which are passed on once no further row adds to them. Derivatives
+            # lower the degree, so that the highest modes are zero and are left out.
             for term in range(len(terms)):
                 c, _, dz, dy, dx = terms[term]
                 for b in range(n):
@@ -132,6 +139,7 @@ def _apply(
                         out = sums[term, (y + b) % n, i]
                         _add_combination(out, (n - dx) * nx, n - dy, 1.0, weights, modes[c, i])
             _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
+        # the last rows of unknowns, which are the first ones of the periodic grid
         for y in range(ny, ny + n - 1):
             _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
 
@@ -175,6 +183,7 @@ def _fill_strips(
     for start, stop in groups:  # terms of one unknown and one derivative along x
         _, u, _, _, dx = terms[start]
         lines[:] = 0.0
+        # along x: function f of voxel x has its unknown f voxels further, around the periodic row
         for a in range(n):
             row = field[u, (z + a) % nz, y % ny]
             for f in range(n):
@@ -185,6 +194,7 @@ def _fill_strips(
             for k in range(n - dx):
                 out = lines[a, k * nx : (k + 1) * nx]
                 _add_combination(out, nx, n, 1.0, tables[2, dx, k], shifted[a])
+        # along z, for each term of the group
         size = (n - dx) * nx
         for term in range(start, stop):
             dz = terms[term, 2]
@@ -207,6 +217,7 @@ def _modes_of_row(tables: Any, terms: Any, strips: Any, y: int, modes: Any) -> N
     for term in range(len(terms)):
         c, _, dz, dy, dx = terms[term]
         for j in range(n - dy):
+            # the strip of row y + b stands at (y + b) % n
             for b in range(n):
                 weights[(y + b) % n] = tables[1, dy, j, b]
             for i in range(n - dz):

@@ -70,6 +70,7 @@ class PoreNodes:
         owner, number = np.divmod(first, len(offsets))
         position = unwrapped[owner] + offsets[number]
         sums = np.stack([np.bincount(pore[owner], x) for x in position.T], axis=1)
+        # whole numbers keep the coordinates of nodes exact
         centre = np.round(sums / np.bincount(pore[owner])[:, None])
         return cls(nodes[first], pore[owner], position - centre[pore[owner]])
 
@@ -102,7 +103,8 @@ def _unwrapped_pieces(
     Returns:
         The pieces; None where a pore meets its own periodic image.
     """
-    # Links (piece, neighbouring piece, periods from one to the other along each axis)
+    # Links (piece, neighbouring piece, periods from one to the other along each axis). Pieces are
+    # few where cells are many, so that links are compared by piece and each kind counts once.
     rows = []
     for offset in product(range(-reach, reach + 1), repeat=labels.ndim):
         period, neighbour = np.divmod(cells + offset, labels.shape)
@@ -126,7 +128,8 @@ def _unwrapped_pieces(
         predecessor = predecessors[piece]
         if predecessor < count:
             moved[piece] = moved[predecessor] + periods[between[predecessor, piece]]
-    # A pore is closed if every link agrees with the periods found along the tree.
+    # The tree moves each piece beside its predecessor. A pore is closed if all other links agree
+    # with it; a loop of links whose periods do not add up to zero leads to the pore's own image.
     if (moved[second] != moved[first] + periods).any():
         return None
     return _Pieces(pore, moved)
