@@ -21,7 +21,7 @@ from alphacut.frame.analyses.suites import (
     summarised,
 )
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.storey import yields
+from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
@@ -107,7 +107,7 @@ def analyses_of(
 ) -> dict[str, IncrementalAnalysis]:
     """Return analyses of a frame that yields, over the intensity measure, by the record's name."""
     frame = structure.model
-    assert yields(frame)
+    assert isinstance(frame, StoreyFrame)
     return incremental_analyses(
         frame,
         structure.inputs(task.fuzzy),
