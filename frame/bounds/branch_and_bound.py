@@ -43,7 +43,7 @@ from alphacut.fuzzy.sets.boxes import chebyshev_points
 LOWER, UPPER = -1, -2
 """Positions along an axis of a sub-box that is confined to an end of the whole box."""
 MAX_ITEMS = 30_000
-"""Items that a thread examines together, which limits the memory."""
+"""Items that a thread examines together on average, which limits the memory."""
 
 
 def bound_problems(
@@ -236,20 +236,17 @@ class Frontier:
         )
 
     def pieces(self, max_items: int) -> Iterator[Piece]:
-        """Yield pieces of at most `max_items` items, in order.
+        """Yield pieces of equally many sub-boxes, in order, with `max_items` items each on average.
 
-        A sub-box with more items is a piece alone.
+        A sub-box is not divided, however many items it has.
         """
         n_boxes = len(self.position)
-        first_items = np.append(np.searchsorted(self.box, np.arange(n_boxes)), len(self))
-        start = 0
-        while start < n_boxes:
-            end_item = first_items[start] + max_items
-            stop = int(np.searchsorted(first_items, end_item, "right")) - 1
-            stop = min(max(stop, start + 1), n_boxes)
-            items = slice(int(first_items[start]), int(first_items[stop]))
-            yield Piece(slice(start, stop), items)
-            start = stop
+        count = min(-(-len(self) // max_items), n_boxes)
+        first_boxes = np.linspace(0, n_boxes, count + 1).astype(int)
+        first_items = np.searchsorted(self.box, first_boxes)
+        for k in range(count):
+            boxes = slice(int(first_boxes[k]), int(first_boxes[k + 1]))
+            yield Piece(boxes, slice(int(first_items[k]), int(first_items[k + 1])))
 
     def children(self, code: Ints) -> Frontier:
         """Return the halves and faces of sub-boxes with the items that are left open.

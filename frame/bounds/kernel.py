@@ -155,20 +155,26 @@ def stays_below(g: Array, H: Array, r: Array, allowed: float, work: Array, facto
 
 
 @compiled
-def expand_output(waves: Array, factors: Array, jet: Array, H: Array) -> None:
+def expand_output(waves: Array, factors: Array, jet: Array) -> None:
     """Write value, gradient and packed Hessian of an output, Σ_k waves_k factors_k, to `jet`.
 
-    The Hessian is written to `H` (d, d) too. `waves` has the shape (K,), `factors` (K, q), `jet`
-    (q,) with q = 1 + d + d (d + 1)/2.
+    `waves` has the shape (K,), `factors` (K, q), `jet` (q,) with q = 1 + d + d (d + 1)/2.
     """
     jet[:] = 0.0
     for k in range(len(waves)):
         for a in range(len(jet)):
             jet[a] += waves[k] * factors[k, a]
-    a = 1 + len(H)
-    for i in range(len(H)):
-        for j in range(i, len(H)):
-            H[i, j] = H[j, i] = jet[a]
+
+
+@compiled
+def unpack_derivatives(jet: Array, side: float, g: Array, H: Array) -> None:
+    """Write gradient (d,) and Hessian (d, d) of side × output to `g` and `H`."""
+    d = len(g)
+    a = 1 + d
+    for i in range(d):
+        g[i] = side * jet[1 + i]
+        for j in range(i, d):
+            H[i, j] = H[j, i] = side * jet[a]
             a += 1
 
 
@@ -259,9 +265,8 @@ def examine(
     outputs = boxes.factors.shape[1]
     d = boxes.radius.shape[1]
     jet = np.empty(boxes.factors.shape[3])
-    H = np.empty((d, d))  # Hessian of the output
-    signed_g = np.empty(d)  # gradient of side × output
-    signed_H = np.empty((d, d))
+    g = np.empty(d)  # gradient of side × output
+    H = np.empty((d, d))  # its Hessian
     bend = np.empty(d)
     slope_error = np.empty(d)
     work = np.empty((3, d))
@@ -276,17 +281,14 @@ def examine(
                 side = 2.0 * (column % 2) - 1
                 if column // 2 != output:
                     output = column // 2
-                    expand_output(waves[row], boxes.factors[b, output], jet, H)
+                    expand_output(waves[row], boxes.factors[b, output], jet)
+                unpack_derivatives(jet, side, g, H)
                 third = remainder.third[node, output]
                 rounding = remainder.rounding[node, output]
                 missing = model_errors(H, third, rounding, r, bend, slope_error)
-                for i in range(d):
-                    signed_g[i] = side * jet[1 + i]
-                    for j in range(d):
-                        signed_H[i, j] = side * H[i, j]
                 value[item] = side * jet[0]
-                bound[item] = value[item] + separable_bound(signed_g, signed_H, r) + missing
-                faces = rising_faces(signed_g, bend, slope_error, r, boxes.is_outer[b])
+                bound[item] = value[item] + separable_bound(g, H, r) + missing
+                faces = rising_faces(g, bend, slope_error, r, boxes.is_outer[b])
                 aim = target[node * 2 * outputs + column]
                 if faces == INSIDE or bound[item] <= aim:
                     continue
@@ -294,7 +296,7 @@ def examine(
                     code[item] = FACES + faces
                     continue
                 allowed = aim - value[item] - missing
-                if not stays_below(signed_g, signed_H, r, allowed, work, factor):
+                if not stays_below(g, H, r, allowed, work, factor):
                     code[item] = bisection_code(bend, slope_error, r)
     return Examination(code, value, bound)
 

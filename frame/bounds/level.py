@@ -200,16 +200,14 @@ class LevelModels:
                 accelerations = structure.force_accelerations[source]
                 coefficient = (accelerations[None] @ rows.T)[0] * structure.output_factors
                 real_radius = coefficient.deviation()
-                yield (
-                    source,
-                    Response(
-                        sigma=None,
-                        load=self.excitation.loads[source],
-                        order=2,
-                        coefficient=coefficient.value[:, np.newaxis, np.newaxis],
-                        spread=np.stack([real_radius, 0 * real_radius]),
-                    ),
+                response = Response(
+                    sigma=None,
+                    load=self.excitation.loads[source],
+                    order=2,
+                    coefficient=coefficient.value[:, np.newaxis, np.newaxis],
+                    spread=np.stack([real_radius, 0 * real_radius]),
                 )
+                yield source, response
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
         """Yield what a mode adds to outputs by each source, without what forces add at once."""

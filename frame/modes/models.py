@@ -200,7 +200,10 @@ def required_modes(
             response = read_response(source, sigma, sigma**order * rho[0])
             response = response + feedthrough(source, loads, int(order), time)
             # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
-            slope = np.abs(rho[1]).max(axis=1) * omega ** (order + (source == "start")) / 2
+            largest = np.abs(rho[1]).max(axis=1)
+            slope = largest * omega**order / 2
+            if source == "start":  # whose response is not divided by ω
+                slope = slope * omega
             sensitivity[:, o] += np.abs(output_modes[o] * participation[s]) * slope
             errors = [
                 _truncation_error(
