@@ -189,6 +189,18 @@ class ImageStudy:
         first, last = self.phase_ranges(threshold)
         return moduli_images(first, last, moduli)
 
+    def model(self, *, average: str = ISOTROPIC, device: str = "cpu") -> ImageModel:
+        """Return the model of the usual division and accuracy.
+
+        Raises:
+            RefusedError: The image does not fit into memory, or the average is none.
+        """
+        nominal = self.images(None, None)
+        division = usual_division(nominal)
+        require_memory(nominal.shape, division)
+        solver = ConjugateGradient(accuracy=1e-5)
+        return ImageModel(self.image.sides, division, solver, average, device)
+
     @property
     def nominal_phase(self) -> Ints:
         """Number of the phase of each pixel or voxel at the nominal threshold."""
@@ -210,36 +222,39 @@ def _cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, floa
 
 def image_study(
     image: GreyImage,
-    phases: Sequence[ImagePhase],
+    phases: Sequence[ImagePhase | Mapping[str, FuzzyNumber | float]],
     *,
-    thresholds: Sequence[FuzzyNumber] = (),
+    thresholds: Sequence[FuzzyNumber | float] = (),
     labels: Sequence[float] = (),
 ) -> ImageStudy:
     """Return the study of an image whose phases labels or thresholds of its greys tell apart.
 
     Args:
         image: The image.
-        phases: Its phases, dark first.
+        phases: Its phases, dark first; a mapping has modulus (Pa), poisson and, if wanted, loss.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
 
     Raises:
-        RefusedError: A threshold or a label does not fit the image, or its sides are too unlike.
+        RefusedError: A phase lacks a modulus, a threshold or a label does not fit the image, or its
+            sides are too unlike.
     """
     ImageModel(image.sides)  # refuses sides too unlike
     count = len(labels) or len(thresholds) + 1
     has_one = bool(labels) != bool(thresholds)
     require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
     require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
+    listed = tuple(x if isinstance(x, ImagePhase) else ImagePhase.of(x) for x in phases)
     if labels:
-        return _labelled_study(image, tuple(phases), labels)
+        return _labelled_study(image, listed, labels)
 
     grey = image.values
-    require_phases(grey, [number.cut(0.0) for number in thresholds])
-    is_fuzzy = any(number.support.width > 0 for number in thresholds)
+    numbers = [_as_fuzzy(threshold) for threshold in thresholds]
+    require_phases(grey, [number.cut(0.0) for number in numbers])
+    is_fuzzy = any(number.support.width > 0 for number in numbers)
     segmentation = None  # the noise of a volume is not judged
     if grey.ndim == 2:
-        segmentation = segment(grey, [number.nominal for number in thresholds])
+        segmentation = segment(grey, [number.nominal for number in numbers])
         segmentation.require_certain()
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
@@ -247,13 +262,13 @@ def image_study(
         # noise and light leave phases open, unless a fuzzy threshold says all that is not known
         if segmentation is not None and level is not None and not is_fuzzy:
             return segmentation.ranges()
-        return threshold_ranges(grey, [_cut_or_nominal(number, level) for number in thresholds])
+        return threshold_ranges(grey, [_cut_or_nominal(number, level) for number in numbers])
 
-    greys = [f"{number.nominal:g}" for number in thresholds]
+    greys = [f"{number.nominal:g}" for number in numbers]
     between = [f"grey {low} … {high}" for low, high in pairwise(greys)]
     names = (f"grey below {greys[0]}", *between, f"grey above {greys[-1]}")
     is_open = segmentation is not None and segmentation.open_fraction > 0
-    return ImageStudy(image, tuple(phases), names, phase_ranges, is_fuzzy or is_open)
+    return ImageStudy(image, listed, names, phase_ranges, is_fuzzy or is_open)
 
 
 def _labelled_study(
@@ -417,9 +432,7 @@ def fuzzy_image_stiffness(
         RefusedError: A value is not allowed, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other.
     """
-    numbers = [_as_fuzzy(threshold) for threshold in thresholds]
-    listed = [ImagePhase.of(values) for values in phases]
-    study = image_study(image, listed, thresholds=numbers, labels=labels)
+    study = image_study(image, phases, thresholds=thresholds, labels=labels)
     with progress_reporter(progress) as tick:
         return solve_study(
             study, alpha=alpha, average=average, device=device, tick=tick or (lambda done: None)
@@ -435,11 +448,8 @@ def solve_study(
     completed fraction.
     """
     start = perf_counter()
+    model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
-    division = usual_division(nominal)
-    require_memory(nominal.shape, division)
-    solver = ConjugateGradient(accuracy=1e-5)
-    model = ImageModel(study.image.sides, division, solver, average, device)
     solution = model.solve(nominal)
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
@@ -467,7 +477,7 @@ def solve_study(
         fractions=study.fractions,
         proved_losses=_proved_losses(study, model, solution, alpha),
         references=references,
-        division=division,
+        division=model.division,
         seconds=perf_counter() - start,
         phase=study.nominal_phase,
         is_open=first != last,

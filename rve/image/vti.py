@@ -12,14 +12,11 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import require
-from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import SideSolution, modes_of
 from alphacut.rve.image.fields.grid import on_host
-from alphacut.rve.image.memory import require_memory
-from alphacut.rve.image.model import ImageModel, usual_division
-from alphacut.rve.image.study import GreyImage, ImagePhase, image_study
+from alphacut.rve.image.study import GreyImage, image_study
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +77,14 @@ def image_fields(
     Raises:
         RefusedError: A value is not allowed, or the image does not fit into memory.
     """
-    numbers = [x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for x in thresholds]
-    listed = [ImagePhase.of(values) for values in phases]
-    study = image_study(image, listed, thresholds=numbers, labels=labels)
-    moduli = study.images(None, None)  # at nominal thresholds and moduli
-    division = usual_division(moduli)
-    require_memory(study.image.values.shape, division)
-    model = ImageModel(image.sides, division, ConjugateGradient(accuracy=1e-5))
-    solution = model.solve(moduli)
-    phase, _ = study.phase_ranges(None)
+    study = image_study(image, phases, thresholds=thresholds, labels=labels)
+    model = study.model()
+    solution = model.solve(study.images(None, None))  # at nominal thresholds and moduli
     return ImageFields(
         lengths=image.lengths,
-        phase=phase,
-        strain=_pixel_means(element_of(image.sides, stress=False), solution.upper, division),
-        stress=_pixel_means(element_of(image.sides, stress=True), solution.lower, division),
+        phase=study.nominal_phase,
+        strain=_pixel_means(element_of(image.sides, stress=False), solution.upper, model.division),
+        stress=_pixel_means(element_of(image.sides, stress=True), solution.lower, model.division),
     )
 
 
