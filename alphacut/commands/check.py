@@ -250,44 +250,60 @@ def records_text(
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:
-    """Yield rows (key, value, kind) of the quantities of a section, and of sections below it."""
+    """Yield a row of each quantity of a section, and of the sections below it.
+
+    A row has the key with `prefix` before it, the value in SI units with prefixes, and the kind of
+    number. Quantities that the case leaves out are not shown, but columns that are computed.
+    """
     for key, info in type(section).model_fields.items():
-        value, unit = getattr(section, key), quantity_of(info)
-        entries = (
-            {f"[{n}]": x for n, x in enumerate(value, 1)} if type(value) is tuple else {"": value}
-        )
-        if isinstance(value, dict):
-            entries = {f".{name}": x for name, x in value.items()}
+        is_stated = section.has_key(key)
         is_default = key == "columns" and getattr(section, "stiffness", None) is None
-        is_shown = section.has_key(key) or is_default
-        for index, entry in entries.items():
-            row_key = f"{prefix}{key}" + (index if index != "[1]" or len(entries) > 1 else "")
-            match entry:
-                case Section():
-                    yield from rows_of(f"{row_key}.", entry)
-                case FuzzyNumber() if is_shown:
-                    words = _numbers(entry, unit.si if unit else "")
-                    words += " in SI" * (key == "parameters")  # of matrices, in any unit
-                    kind = KINDS.get(type(entry), "fuzzy") if section.has_key(key) else "default"
-                    mark = _mark_of_size(entry, unit.si) if unit else ""
-                    yield row_key, words, kind + mark
-                case (FuzzyNumber() as force, str(si)):
-                    kind = KINDS.get(type(force), "fuzzy") + _mark_of_size(force, si)
-                    yield row_key, _numbers(force, si), kind
-                case ForceHistory(History(frequency=omega)) if omega:
-                    hertz, period = (engineering(x, "") for x in (omega / (2 * pi), 2 * pi / omega))
-                    yield row_key, f"{hertz} Hz, period {period} s", "harmonic"
-                case (Monomial() as factor, np.ndarray() as array):
-                    size, largest = " × ".join(map(str, array.shape)), abs(array).max()
-                    yield row_key, f"{factor} × matrix {size}, largest {largest:.4g}", "in SI"
-                case MaterialDamping(joints):
-                    words = f"of the material, and {_numbers(joints, '')} of joints"
-                    yield row_key, words, "computed"
-                case VoigtPhase(rows):
-                    stiffness = " | ".join(" ".join(f"{x / GPA:g}" for x in row) for row in rows)
-                    yield row_key, stiffness.replace("-", MINUS), "GPa, plane strain"
-                case float() if unit and unit.si and is_shown:
-                    yield row_key, engineering(entry, unit.si), "number"
+        unit = quantity_of(info)
+        si = unit.si if unit else ""
+        for index, entry in _entries(getattr(section, key)).items():
+            row_key = f"{prefix}{key}{index}"
+            if isinstance(entry, Section):
+                yield from rows_of(f"{row_key}.", entry)
+            elif isinstance(entry, FuzzyNumber):
+                if is_stated or is_default:
+                    # Parameters of matrices have any unit, which is converted when it is read.
+                    words = _numbers(entry, si) + (" in SI" if key == "parameters" else "")
+                    kind = KINDS.get(type(entry), "fuzzy") if is_stated else "default"
+                    yield row_key, words, kind + (_mark_of_size(entry, si) if unit else "")
+            elif isinstance(entry, float):
+                if si and (is_stated or is_default):
+                    yield row_key, engineering(entry, si), "number"
+            else:
+                yield from ((row_key, words, kind) for words, kind in _words_and_kind(entry))
+
+
+def _entries(value: object) -> dict[str, object]:
+    """Return the values of a key by what follows the key in a row: an index, a name or nothing."""
+    if isinstance(value, dict):
+        return {f".{name}": entry for name, entry in value.items()}
+    if type(value) is not tuple:  # a named tuple is one value
+        return {"": value}
+    if len(value) == 1:
+        return {"": value[0]}
+    return {f"[{number}]": entry for number, entry in enumerate(value, start=1)}
+
+
+def _words_and_kind(entry: object) -> Iterator[tuple[str, str]]:
+    """Yield text and kind of a quantity that is no single number; nothing of what is none."""
+    match entry:
+        case (FuzzyNumber() as force, str(si)):
+            yield _numbers(force, si), KINDS.get(type(force), "fuzzy") + _mark_of_size(force, si)
+        case ForceHistory(History(frequency=omega)) if omega:
+            hertz = engineering(omega / (2 * pi), "")
+            yield f"{hertz} Hz, period {engineering(2 * pi / omega, '')} s", "harmonic"
+        case (Monomial() as factor, np.ndarray() as array):
+            size = " × ".join(map(str, array.shape))
+            yield f"{factor} × matrix {size}, largest {abs(array).max():.4g}", "in SI"
+        case MaterialDamping(joints):
+            yield f"of the material, and {_numbers(joints, '')} of joints", "computed"
+        case VoigtPhase(matrix):
+            rows = [" ".join(f"{x / GPA:g}" for x in row) for row in matrix]
+            yield " | ".join(rows).replace("-", MINUS), "GPa, plane strain"
 
 
 def _mark_of_size(number: FuzzyNumber, si: str) -> str:
@@ -298,9 +314,11 @@ def _mark_of_size(number: FuzzyNumber, si: str) -> str:
     return "" if is_usual else UNUSUAL
 
 
-def _numbers(number: FuzzyNumber, unit: str) -> str:
-    corners = dict.fromkeys((number.support.lower, *number.cut(1.0), number.support.upper))
-    return " … ".join(engineering(x, unit) for x in corners)
+def _numbers(number: FuzzyNumber, si: str) -> str:
+    """Return the ends of the support and of the highest cut of a number, each once, rising."""
+    support, core = number.support, number.cut(1.0)
+    corners = dict.fromkeys((support.lower, core.lower, core.upper, support.upper))
+    return " … ".join(engineering(corner, si) for corner in corners)
 
 
 def add_folder(parser: argparse.ArgumentParser) -> None:
@@ -313,28 +331,31 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     """Test all proved envelopes in a folder by exact motions; return exit status 0.
 
     Raises:
+        RefusedError: The folder holds no envelope.
         ContradictionError: A motion lies outside an envelope that is proved.
     """
-    path = Path(options.folder)
-    folder, document, text = ResultsFolder.read(path), dict[str, object](), ""
+    folder = ResultsFolder.read(Path(options.folder))
     names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
-    is_suite = any(name.startswith("record_") for name in folder.files)
-    value = f"{path}, of a suite, whose peaks the run tested as it proved them"
-    allowed = "results of a run with an envelope"
-    require(bool(names), "FOLDER", value if is_suite else str(path), allowed)
+    value = str(folder.path)
+    if any(name.startswith("record_") for name in folder.files):
+        value += ", of a suite, whose peaks the run tested as it proved them"
+    require(bool(names), "FOLDER", value, "results of a run with an envelope")
+    document: dict[str, object] = {}
+    text = ""
     for name in names:
-        data, n_motions, verdict = folder.dataset(f"{name}.nc"), 0, "nothing in it is proved"
+        data = folder.dataset(f"{name}.nc")
         peaks = json.loads(folder.content(f"{name}.json"))["result"]["peak"].values()
-        if any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
-            verdict = "its guaranteed peaks were tested by the run, nothing else in it is proved"
+        nature, n_motions = str(data.attrs["nature"]), 0
         if "motion_inputs" in data:  # which proved envelopes alone store
             points, motions = stored_motions(data)
-            trial = Trial(envelope_of(data), *np.moveaxis(data["cut"].values, -1, 0))
-            trial.require_agreement(points, motions)
+            lower, upper = np.moveaxis(data["cut"].values, -1, 0)
+            Trial(envelope_of(data), lower, upper).require_agreement(points, motions)
             n_motions = len(points)
-            is_guaranteed = data.attrs["nature"] == Nature.GUARANTEED
-            verdict = f"{n_motions} exact motions {agreement(is_guaranteed)}"
-        nature = str(data.attrs["nature"])
+            verdict = f"{n_motions} exact motions {agreement(nature == Nature.GUARANTEED)}"
+        elif any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
+            verdict = "its guaranteed peaks were tested by the run, nothing else in it is proved"
+        else:
+            verdict = "nothing in it is proved"
         document[name] = {"nature": nature, "motions_tested": n_motions}
         text += f"{name}: {verdict} ({nature})\n"
     write_answer(options, document, out, text)

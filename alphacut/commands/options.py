@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn, TextIO
+from typing import NamedTuple, NoReturn, TextIO
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
@@ -29,11 +29,12 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that raises in place of printing its usage and leaving."""
 
     def error(self, message: str) -> NoReturn:
-        """Raises the complaint of argparse as the refusal of an argument."""
+        """Raise a complaint of argparse as the refusal of an argument, with its value apart."""
         argument, _, reason = message.removeprefix("argument ").partition(": ")
         cure = f"see {self.prog} --help"
         if match := re.fullmatch(r"invalid choice: '(.*?)' \(choose from (.*)\)", reason):
-            raise RefusedError(argument, match[1], match[2].replace("'", ""), cure)
+            value, choices = match.groups()
+            raise RefusedError(argument, value, choices.replace("'", ""), cure)
         if match := re.fullmatch(r"invalid int value: '(.*)'", reason):
             raise RefusedError(argument, match[1], "whole numbers", cure)
         if reason.startswith("expected"):
@@ -43,31 +44,42 @@ class Parser(argparse.ArgumentParser):
         raise RefusedError(argument, f"refused: {reason}", "", cure)
 
     def refuse(self, word: str) -> NoReturn:
-        """Raises the problem of a word that is no option of this command."""
+        """Raise the problem of a word that is no option of this command."""
         names = [name for name in self._option_string_actions if name.startswith("--")]
-        allowed, cure = ", ".join(names), suggestion(word, names)
-        raise RefusedError(f"{self.prog.removeprefix('alphacut ')}: option", word, allowed, cure)
+        key = f"{self.prog.removeprefix('alphacut ')}: option"
+        raise RefusedError(key, word, ", ".join(names), suggestion(word, names))
 
 
-def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+class CommandLine(NamedTuple):
     """Words of the program's own, and values of PETSc's options, named without ``-rve_``."""
-    words, petsc = list[str](), dict[str, str]()
+
+    words: list[str]
+    petsc: dict[str, str]
+
+
+def split_petsc(arguments: Sequence[str]) -> CommandLine:
+    """Return the words of a command line and the options of PETSc among them.
+
+    The word after an option of PETSc is its value, unless it begins as an option or is a case.
+    """
+    line = CommandLine([], {})
     option = ""  # whose value may follow
     for word in arguments:
         is_value = not re.match(r"--?[A-Za-z_]", word) and not word.endswith(".toml")
         if word.startswith(PETSC_PREFIX):
             option = word.removeprefix(PETSC_PREFIX)
-            petsc[option] = ""
+            line.petsc[option] = ""
         elif option and is_value:
-            petsc[option], option = word, ""
-        else:
-            words.append(word)
+            line.petsc[option] = word
             option = ""
-    return words, petsc
+        else:
+            line.words.append(word)
+            option = ""
+    return line
 
 
 def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) -> None:
-    """Refuses PETSc options, named without their prefix, where a case solves no prisms."""
+    """Refuse PETSc options, named without their prefix, where a case solves no prisms."""
     has_prisms = content is not None and (
         content.mesh_cell is not None
         or (content.particle_cell is not None and content.modulus.method == "prism")
@@ -77,7 +89,7 @@ def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) 
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Adds the arguments of every command on a case: CASE, ``--set``, ``--json``, ``--quiet``."""
+    """Add the arguments of every command on a case: CASE, ``--set``, ``--json``, ``--quiet``."""
     parser.add_argument("case", metavar="CASE", help="case file, for example cases/paper.toml")
     parser.add_argument(
         "--set",
@@ -90,7 +102,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Adds ``--json`` and ``--quiet``."""
+    """Add ``--json`` and ``--quiet``."""
     parser.add_argument(
         "--json",
         metavar="FILE",
@@ -100,7 +112,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 
 
 def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
-    """Adds the arguments of a command that keeps results: ``--out`` and ``--workers`` as well."""
+    """Add the arguments of a command that keeps results: those of a case, and where they go."""
     add_common(parser)
     about = f"folder for results ({default_place} if left out); what is up to date there is taken"
     parser.add_argument("--out", metavar="FOLDER", help=about)
@@ -110,7 +122,11 @@ def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is ke
 def write_answer(
     options: argparse.Namespace, document: Mapping[str, object], out: TextIO, text: str = ""
 ) -> None:
-    """Writes the result: as JSON where it is requested, else `text` on standard output."""
+    """Write the result of a command as its options ask: as JSON, or `text` to be read.
+
+    With ``--json -`` the JSON document alone is written to `out`. With ``--json FILE`` it goes to
+    that file, and the text to `out` unless the command is to be quiet.
+    """
     if options.json == "-":
         out.write(as_json(document))
         return

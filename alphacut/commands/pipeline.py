@@ -55,7 +55,7 @@ from alphacut.stochastic import FittedRadiusMap
 
 
 def read_case(options: argparse.Namespace) -> Case:
-    """The case file that the options name, with the changes of ``--set``."""
+    """Return the case file that the options name, with the changes of ``--set``."""
     case = load(options.case, options.set)
     require_petsc(options.petsc, case.content)
     return case
@@ -65,34 +65,53 @@ def read_case(options: argparse.Namespace) -> Case:
 def open_results(
     options: argparse.Namespace, folder: str = ""
 ) -> Iterator[tuple[Case, StageStore]]:
-    """Yields the case and the store of its results, whose folder is locked during the block.
+    """Yield the case and the store of its results, whose folder is locked during the block.
 
-    `folder` is that of the results where ``--out`` is left out; empty to write nothing.
+    Args:
+        options: Options of a command that keeps results; some of them have no ``--fresh`` or
+            ``--device``.
+        folder: Folder of the results where ``--out`` is left out; empty to write nothing.
+
+    Raises:
+        RefusedError: An option does not fit the case, or the folder holds other files.
     """
     require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
-    case, path, fresh = read_case(options), options.out or folder, getattr(options, "fresh", False)
-    if (device := getattr(options, "device", "cpu")) != "cpu":
-        has_image, allowed = case.content.image_cell is not None, "cpu for a case without an image"
-        require(has_image, "--device", device, allowed)
+    case, path = read_case(options), options.out or folder
+    device = getattr(options, "device", "cpu")
+    if device != "cpu":
+        has_image = case.content.image_cell is not None
+        require(has_image, "--device", device, "cpu for a case without an image")
         device_array(device)  # refuses one that is not there before a folder is made
     if path:
         require_writable("--out", path, folder=True)
-    lock = locked("--out", Path(path)) if path and rank() == 0 else nullcontext()
-    with progress_reporter(not options.quiet and rank() == 0) as tick, lock:
-        results = ResultsFolder.read(Path(path)) if path else None
-        if results is not None:
+    # Under MPI the first rank alone shows progress and writes; the others compute with it.
+    is_first = rank() == 0
+    lock = locked("--out", Path(path)) if path and is_first else nullcontext()
+    with progress_reporter(not options.quiet and is_first) as tick, lock:
+        results, is_fresh = None, getattr(options, "fresh", False)
+        if path:
+            results = ResultsFolder.read(Path(path))
             results.require_own_files("--out")
-        if results is not None and results.is_damaged:
-            say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
-        if results is not None and fresh and rank() == 0:
-            results.clear()
+            if results.is_damaged:
+                say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
+            if is_fresh and is_first:
+                results.clear()
         progress = RunProgress(tick or no_progress)
-        yield case, StageStore(results, case.text, fresh, options.workers, progress)
+        yield case, StageStore(results, case.text, is_fresh, options.workers, progress)
 
 
 @dataclass
 class Pipeline:
-    """A run of the stages of a case; envelopes are computed side by side by `executor`."""
+    """A run of the stages of a case, one after the other.
+
+    Args:
+        results: The case, and what is found, which is added here.
+        store: Where results are taken from, or computed and kept.
+        petsc: PETSc options without their prefix.
+        figures: Whether stages draw figures beside their results.
+        executor: Computes envelopes, and records of a suite, side by side; None in this process.
+        device: Where an image is solved, "cpu" or "cuda".
+    """
 
     results: Results
     store: StageStore
@@ -112,16 +131,9 @@ class Pipeline:
         return CellProblem.of(self.content, self.petsc)
 
     def run(self) -> Results:
-        """Computes every stage of the case; returns their results."""
-        results, stages, content = self.results, self.content.stages, self.content
-        kinds: list[str] = [stage for stage in stages if stage != "envelope"]
-        if "envelope" in stages and content.records is not None:
-            n_records, is_scaled = len(content.records.recordings), content.incremental_question
-            kinds += ["record"] * n_records + ["incremental"] * bool(is_scaled) * n_records
-        elif "envelope" in stages:
-            kinds += ["envelope"] * max(1, len(content.study))
-        kinds += [*content.questions, *["shares"] * content.shares, *["figures"] * self.figures]
-        self.store.progress.foresee(kinds)
+        """Compute every stage of the case; return their results."""
+        results, stages = self.results, self.content.stages
+        self.store.progress.foresee(self._kinds_of_stages())
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
             numbers = results.microstructure.numbers["radius"]
@@ -131,16 +143,30 @@ class Pipeline:
             self.compute_modulus()
         if "envelope" in stages:
             self._compute_motion()
-        cells = self.campaign if results.modulus is not None else None
-        richest_task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        if content.shares:
-            peaks = results.envelopes[richest_task.name].numbers.peak if richest_task else {}
-            stage = shares.stage(cells, results.structure, richest_task, peaks)
-            results.shares = self.store.take(stage)
+        if self.content.shares:
+            self._compute_shares()
         return results
 
+    def _kinds_of_stages(self) -> list[str]:
+        """Return the first word of the name of each stage of the run, for the progress."""
+        content = self.content
+        kinds: list[str] = [stage for stage in content.stages if stage != "envelope"]
+        if "envelope" in content.stages and content.records is not None:
+            of_record = ["record"]
+            if content.incremental_question is not None:
+                of_record.append("incremental")
+            kinds += of_record * len(content.records.recordings)
+        elif "envelope" in content.stages:
+            kinds += ["envelope"] * max(1, len(content.study))
+        kinds += content.questions
+        if content.shares:
+            kinds.append("shares")
+        if self.figures:
+            kinds.append("figures")
+        return kinds
+
     def compute_microstructure(self) -> StageResult[Document]:
-        """Result of stage microstructure: the radius map of the particles."""
+        """Return the result of stage microstructure: the radius map of the particles."""
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
@@ -149,7 +175,7 @@ class Pipeline:
         return self.store.take(stage)
 
     def compute_modulus(self) -> None:
-        """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
+        """Compute stage modulus, of an image or of samples of a cell, and check its errors."""
         results, section = self.results, self.content.modulus
         if self.content.image_cell is not None:
             image_cell = self.content.image_cell
@@ -164,12 +190,13 @@ class Pipeline:
         cell.require_bounds(top, numbers.references, numbers.particles)
 
     def _compute_motion(self) -> None:
-        """Computes the identified inputs, then the suite of records or envelopes, and answers."""
+        """Compute the identified inputs, then the suite of records or envelopes, and answers."""
         results, content, section = self.results, self.content, self.content.envelope
-        assert section is not None
-        data, structure = results.modulus or results.image, content.structure
-        if data is not None:
-            structure = content.structure_of(fuzzy_modulus(data.arrays), fuzzy_loss(data.arrays))
+        assert section is not None  # of stage envelope
+        material, structure = results.modulus or results.image, content.structure
+        if material is not None:
+            young, loss = fuzzy_modulus(material.arrays), fuzzy_loss(material.arrays)
+            structure = content.structure_of(young, loss)
         assert structure is not None
         if content.identify is not None:
             learned = identify.identify_inputs(content.identify, structure, section.alpha)
@@ -188,10 +215,12 @@ class Pipeline:
                 results.answers[kind.key] = self.store.take(stage).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
+        """Compute the envelopes of all studies into the results, and check their errors."""
         results, content = self.results, self.content
         for warning in cut_record_warnings(content, structure):
             say(f"warning: {warning}")
         results.tasks = envelope.tasks(section, content.study, content.limited_outputs)
+        # Side by side the longest ones begin, so that none of them is left to the end alone.
         longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
@@ -203,10 +232,11 @@ class Pipeline:
     def _suite_response(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
     ) -> Response:
-        """Computes peaks under each record of a suite into the results; returns the response."""
+        """Compute peaks under each record of a suite into the results; return the response."""
         records = suite.suite_records(section, task.section, structure)
-        for warning in (warning for record in records for warning in record.warnings):
-            say(f"warning: {warning}")
+        for record in records:
+            for warning in record.warnings:
+                say(f"warning: {warning}")
         limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
         task = replace(task, limited=limited)
         longest_first = sorted(records, key=lambda record: -record.duration)
@@ -214,18 +244,20 @@ class Pipeline:
         outcomes = self.store.take_all(stages, self.executor)
         by_record = {record.name: outcomes[f"record_{record.name}"].numbers for record in records}
         found = suite.suite_peaks(structure, task, records, by_record)
-        self.results.suite, increments = found, dict[str, Increments]()
+        self.results.suite = found
+        increments: dict[str, Increments] = {}
         if (question := self.content.incremental_question) is not None:
             analyses = suite.analyses_of(question, structure, task, longest_first)
             further = [
-                suite.incremental_stage(question, structure, *item) for item in analyses.items()
+                suite.incremental_stage(question, structure, name, analysis)
+                for name, analysis in analyses.items()
             ]
             scaled = self.store.take_all(further, self.executor)
             increments = {x.name: scaled[f"incremental_{x.name}"].numbers for x in records}
         return Response(structure, task, found.peak, found, increments)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Peaks for questions: of the study with [envelope]'s motion, else computed alone."""
+        """Return the peaks for questions: of the study with [envelope]'s motion, or computed."""
         for study in self.results.tasks:
             if study.has_motion_of(task.section):
                 return self.results.envelopes[study.name].numbers.peak
@@ -235,6 +267,16 @@ class Pipeline:
         compute = partial(task.compute_peaks, structure)
         stage = Stage("peaks", inputs, ("fuzzy", "frame"), dict[str, Peak], compute)
         return self.store.take(stage).numbers
+
+    def _compute_shares(self) -> None:
+        """Compute what each input contributes to the widths of E and of the richest study."""
+        results = self.results
+        cells = None if results.modulus is None else self.campaign
+        task, peaks = None, dict[str, Peak]()
+        if results.tasks:
+            task = max(results.tasks, key=lambda task: (len(task.fuzzy), task.duration))
+            peaks = results.envelopes[task.name].numbers.peak
+        results.shares = self.store.take(shares.stage(cells, results.structure, task, peaks))
 
 
 def _draw_microstructure(
@@ -246,25 +288,28 @@ def _draw_microstructure(
 
 
 def require_runnable(content: Content) -> ImageStudy | None:
-    """Reads and builds all that the stages of a case need, so that `check` refuses it too.
+    """Read and build all that the stages of a case need, so that `check` refuses it too.
 
-    Returns the study of the image that stage modulus takes, if it takes one.
+    Returns:
+        The study of the image that stage modulus takes; None where it takes none.
     """
-    stages, study_of_image = content.stages, None
-    if "microstructure" in stages and content.microstructure is not None:
+    study_of_image = None
+    if "microstructure" in content.stages and content.microstructure is not None:
         content.microstructure.require_readable(spheres=content.has_spheres)
-    if "modulus" in stages:
+    if "modulus" in content.stages:
         study_of_image = _require_material(content)
-    if "envelope" in stages:
+    if "envelope" in content.stages:
         _require_motion(content)
     return study_of_image
 
 
 def _require_material(content: Content) -> ImageStudy | None:
-    if "envelope" in content.stages and not content.has_stated_modulus:
+    """Require what stage modulus needs; return the study of the image that it takes, if any."""
+    has_motion = "envelope" in content.stages
+    if has_motion and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:
-        fits = all(content.image_cell.is_solid) or "envelope" not in content.stages
+        fits = all(content.image_cell.is_solid) or not has_motion
         cure = "give a pore a small modulus, a rigid phase a large one, or take stage modulus alone"
         require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
         return image.study_of(content.image_cell)
@@ -309,7 +354,7 @@ def _require_motion_of(content: Content, section: EnvelopeSection, structure: St
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Yields a warning if the structure's record goes on after the end of all motions."""
+    """Yield a warning if the structure's record goes on after the end of all motions."""
     linear = structure.linear
     if linear is None or linear.ground is None or content.envelope is None:
         return
