@@ -129,9 +129,11 @@ class CellContent(Section, defer_build=True):
         has_map = self.radius_map is not None or "microstructure" in self.stages
         require(not has_map, "radius", "a map of radii", "theta alone beside mesh.file")
         # Without a second, finer mesh nothing is known of the error, and a tolerance promises one.
-        tolerance, cure = self.modulus.tolerance, "set mesh.refine = true"
-        has_error, allowed = self.mesh.refine, "none beside mesh.file, whose error nobody knows"
-        require(tolerance is None or has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
+        tolerance = self.modulus.tolerance
+        allowed = "none beside mesh.file, whose error nobody knows"
+        has_error = tolerance is None or self.mesh.refine
+        cure = "set mesh.refine = true"
+        require(has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
         """Refuse stages without the sections that they need, and two sources of a radius."""
@@ -151,13 +153,14 @@ class CellContent(Section, defer_build=True):
         require_alone("radius", has_radius and has_fraction, "cell.fraction")
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
         if self.cell is not None:
-            method, methods = self.modulus.method, self.cell.methods
+            method = self.modulus.method
+            methods = self.cell.methods
             allowed = f"{', '.join(methods)} for this cell"
             require(method in methods, "modulus.method", method, allowed)
 
     def _require_section(self, stage: str, key: str) -> None:
-        is_there, allowed = getattr(self, key) is not None, f"[{key}], which stage {stage} needs"
-        require(is_there, key, None, allowed)
+        is_there = getattr(self, key) is not None
+        require(is_there, key, None, f"[{key}], which stage {stage} needs")
 
 
 class CellCase(CellContent):

@@ -176,7 +176,8 @@ class Content(CellContent):
 
     def _one_structure(self) -> Structure:
         """Return the structure; refuse a case with none or several."""
-        structure, n_sections = self.structure, len(self.structure_sections)
+        structure = self.structure
+        n_sections = len(self.structure_sections)
         if structure is None or n_sections > 1:
             value = None
             if n_sections:
@@ -193,7 +194,8 @@ class Content(CellContent):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
             require(is_possible, "envelope.method", envelope.method, allowed)
-            is_exact, allowed = envelope.integrator != "midpoint", "exact where columns yield"
+            is_exact = envelope.integrator != "midpoint"
+            allowed = "exact where columns yield"
             require(is_exact, "envelope.integrator", envelope.integrator, allowed)
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
@@ -235,10 +237,12 @@ class Content(CellContent):
             require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
         for number, force in enumerate(self.force, start=1):
-            history, allowed = force.history.history, f"a start below {key}.duration"
-            if history is not None:
-                key_of_start, value = f"force[{number}].history", f"from {history.start:g} s"
-                require(history.start < study.duration, key_of_start, value, allowed)
+            history = force.history.history
+            if history is None:
+                continue
+            acts = history.start < study.duration
+            value, allowed = f"from {history.start:g} s", f"a start below {key}.duration"
+            require(acts, f"force[{number}].history", value, allowed)
 
 
 Case = ParsedCase[Content]

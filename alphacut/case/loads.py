@@ -59,7 +59,8 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         if starts:
             start = quantity.parse_number(starts[0], "s")
         if kind == "harmonic":
-            frequency, phase = quantity.parse_number(numbers[0], "Hz"), 0.0
+            frequency = quantity.parse_number(numbers[0], "Hz")
+            phase = 0.0
             if len(numbers) == 2:
                 phase = quantity.parse_number(numbers[1], "rad")
             return ForceHistory(History.harmonic(frequency, phase, start))
@@ -138,8 +139,8 @@ def with_forces(
     for section in sections:
         for place, (amplitude, unit) in section.amplitude.items():
             require_choice("force.amplitude", place, places)
-            index, history = places.index(place), section.history.history
-            forces.append(PlacedForce(index, amplitude.nominal, history))
+            history = section.history.history
+            forces.append(PlacedForce(places.index(place), amplitude.nominal, history))
             amplitudes.append(amplitude)
             units.append(unit)
     # the structure chooses the names of amplitudes: of floors as F3, of unknowns F1, F2 …
@@ -171,8 +172,8 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)
-    step, unit = info.data.get("step"), info.data.get("unit")
-    return read_recordings(paths, channel=channel, step=step, unit=unit or "")
+    unit = info.data.get("unit")
+    return read_recordings(paths, channel=channel, step=info.data.get("step"), unit=unit or "")
 
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
@@ -190,7 +191,8 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
         if equals:
             number = quantity.parse_number(size, "m/s^2")
         else:
-            number, measure = quantity.parse_number(value, ""), ""
+            number = quantity.parse_number(value, "")
+            measure = ""
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     is_known = measure in ("PGA", "Sa(T1)") or not equals

@@ -50,7 +50,8 @@ class ThetaSection(Section):
     @property
     def law(self) -> TruncatedNormal:
         """Law of θ, a normal one cut off at both ends."""
-        return TruncatedNormal(*self.theta)
+        lower, upper = self.theta
+        return TruncatedNormal(lower, upper)
 
     @property
     def nominal(self) -> HermiteMap | TruncatedNormal:
@@ -105,7 +106,8 @@ class PhaseSection(Section):
 
     def require_consistent(self) -> None:
         """Refuse a Poisson's ratio beside a stiffness, and Young's modulus without one."""
-        is_isotropic, has_ratio = isinstance(self.modulus, FuzzyNumber), self.poisson is not None
+        is_isotropic = isinstance(self.modulus, FuzzyNumber)
+        has_ratio = self.poisson is not None
         allowed = "poisson beside Young's modulus, none beside a stiffness"
         require(has_ratio or not is_isotropic, "", "without poisson", allowed)
         require(is_isotropic or not has_ratio, "", "with poisson", allowed)
@@ -275,14 +277,15 @@ class RoundCell(Section):
     def require_consistent(self) -> None:
         """Refuse unknown shapes, keys too few or too many, and touching particles."""
         outline = self.outline or circle  # refuses unknown shapes
-        has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
+        has_ratio = self.inclusion_poisson is not None
+        is_isotropic = self.stiffness is None
         key = "cell.inclusion_poisson"
         allowed = "a number beside Young's modulus, none beside a stiffness"
         require(has_ratio or not is_isotropic, key, "missing", allowed)
         require(is_isotropic or not has_ratio, key, "there", allowed)
         is_solved = is_isotropic or self.particles != "spheres"
-        key, allowed = "cell.inclusion_modulus", "Young's modulus of spheres"
-        require(is_solved, key, "a plane stiffness", allowed)
+        allowed = "Young's modulus of spheres"
+        require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
         # An outline of the reach R (its largest distance from the centre over r) touches the next
         # cell where r is 1/R.
         if self.fraction is not None:
@@ -357,7 +360,8 @@ class ImageCell(Section):
             n_phases = len(self.threshold) + 1
         counts = {"modulus": (n_phases,), "poisson": (1, n_phases), "loss": (0, 1, n_phases)}
         for key, fitting in counts.items():
-            n_values, allowed = len(getattr(self, key) or ()), f"one for each of {n_phases} phases"
+            n_values = len(getattr(self, key) or ())
+            allowed = f"one for each of {n_phases} phases"
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
@@ -367,14 +371,16 @@ class ImageCell(Section):
         cure = "pores in one material leave its loss factor; else take a small modulus for pores"
         require(is_possible, "cell.loss", "there", "none beside a pore or a rigid phase", cure)
         self._require_one("pixel", "voxel")
-        n_sides, allowed = len(self.pixel or ()), "a side, or a width and a height"
-        require(n_sides <= 2, "cell.pixel", n_sides, allowed)
-        n_sides, allowed = len(self.voxel or ()), "a side, or those along x, y and z"
+        n_sides = len(self.pixel or ())
+        require(n_sides <= 2, "cell.pixel", n_sides, "a side, or a width and a height")
+        n_sides = len(self.voxel or ())
+        allowed = "a side, or those along x, y and z"
         require(n_sides in (0, 1, 3), "cell.voxel", n_sides, allowed)
 
     def _require_one(self, key: str, other: str) -> None:
         """Refuse both of two keys, and neither."""
-        is_there, has_other = bool(getattr(self, key)), bool(getattr(self, other))
+        is_there = bool(getattr(self, key))
+        has_other = bool(getattr(self, other))
         allowed = f"one of cell.{key} and cell.{other}"
         require(is_there or has_other, f"cell.{key}", None, allowed)
         require(not (is_there and has_other), f"cell.{key}", f"beside cell.{other}", allowed)
@@ -434,7 +440,8 @@ class Mesh(Section):
 
 def known_method(name: str) -> str:
     """Return a word for a model of the cell, or refuse another one."""
-    require_choice("", name, dict.fromkeys(("auto", *(entry.name for entry in MODELS))))
+    names = dict.fromkeys(entry.name for entry in MODELS)
+    require_choice("", name, ["auto", *names])
     return name
 
 

@@ -52,7 +52,8 @@ class PackingSection(Section):
     def require_readable(self, *, spheres: bool) -> None:
         """Refuse a fraction that does not pack, and radii that are none."""
         shape = SPHERES if spheres else DISCS
-        fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
+        fits = self.fraction <= shape.densest
+        key = "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
         cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
         require(fits, key, self.fraction, allowed, cure)
@@ -141,6 +142,7 @@ class MicrostructureSection(Section):
 
     def require_consistent(self) -> None:
         """Refuse several sources of the particles, or none."""
-        allowed, count = "one of packing, circles and image", len(self.sources)
+        count = len(self.sources)
+        allowed = "one of packing, circles and image"
         require(count > 0, "microstructure", None, allowed)
         require(count == 1, "microstructure", f"with {count} of them", allowed)

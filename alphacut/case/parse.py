@@ -98,10 +98,11 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
         if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
-            names, cure = ", ".join(_sibling_names(model, key)), ""
             if close:
-                names, cure = "", f"did you mean {close}?"
-            yield RefusedError(key, f"an unknown {kind}", names, cure)
+                yield RefusedError(key, f"an unknown {kind}", "", f"did you mean {close}?")
+            else:
+                names = ", ".join(_sibling_names(model, key))
+                yield RefusedError(key, f"an unknown {kind}", names)
         elif key not in suggested.values():
             yield _refusal(model, key, detail)
 
@@ -134,7 +135,8 @@ def _suggested_key(model: type[Section], key: str) -> str:
 def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedError:
     """Return what is wrong with a key whose value is wrong or missing, by the error of Pydantic."""
     context = detail.get("ctx", {})
-    cause, kind = context.get("error"), detail["type"]
+    cause = context.get("error")
+    kind = detail["type"]
     if isinstance(cause, RefusedError):
         return RefusedError(cause.key or key, cause.value, cause.allowed, cause.cure)
     if kind == "missing":

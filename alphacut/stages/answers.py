@@ -144,8 +144,9 @@ ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
 
 def stage(kind: type[Answer], section: QuestionSection, response: Response) -> Stage[Answer]:
     """Return the stage of the answer of a kind to the question of a section."""
-    compute, inputs = partial(_computed, kind, section, response), [section, response]
-    return Stage(kind.key, inputs, ("fuzzy", "frame", "alphacut"), kind, compute)
+    compute = partial(_computed, kind, section, response)
+    packages = ("fuzzy", "frame", "alphacut")
+    return Stage(kind.key, [section, response], packages, kind, compute)
 
 
 def _computed(

@@ -235,7 +235,8 @@ def require_tolerance(
     if task.section.tolerance is None:
         return
     # 1e-9 of the tolerance is left to the rounding of the errors' own computation
-    allowed, data = task.tolerance(structure), result.arrays
+    allowed = task.tolerance(structure)
+    data = result.arrays
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
         peak = result.numbers.peak[name]

@@ -143,7 +143,8 @@ class RunProgress:
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
         """Return the progress of the next stages by their names; `skipped` are up to date."""
         self.seconds_left -= self._seconds_of(skipped)
-        seconds, first = self._seconds_of(names), self.done
+        seconds = self._seconds_of(names)
+        first = self.done
         if seconds:
             self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
         self.seconds_left -= seconds
@@ -195,7 +196,8 @@ class StageStore:
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
         # a stage alone may use all workers itself, and further files need this process
-        total, done = sum(stage.work for stage in stale), 0.0
+        total = sum(stage.work for stage in stale)
+        done = 0.0
         if executor is None or self.folder is None or len(stale) == 1:
             for stage in stale:
                 stage_tick = subprogress(tick, done / total, (done + stage.work) / total)
@@ -220,7 +222,8 @@ class StageStore:
         folder, key = self.folder, stage.key
         if folder is None or self.fresh:
             return None
-        numbers_file, arrays_file = f"{stage.name}.json", f"{stage.name}.nc"
+        numbers_file = f"{stage.name}.json"
+        arrays_file = f"{stage.name}.nc"
         files = folder.made_from(key)
         if numbers_file not in files:
             return None
@@ -260,7 +263,8 @@ class StageStore:
         Raises:
             RefusedError: The run is fresh, and no manifest lists the store that is there.
         """
-        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.files
+        path = folder.path / SAMPLES
+        is_listed = SAMPLES in folder.files
         is_new = not is_listed and not os.path.lexists(path)
         is_allowed = is_listed or is_new or not self.fresh
         cure = "move it away, or leave out --fresh"
@@ -274,7 +278,8 @@ class StageStore:
         """Write a result into the folder, beside the other files of its stage in `files`."""
         assert self.folder is not None
         # all ranks compute the same result, and the first one writes it
-        name, key = f"{stage.name}.json", stage.key
+        name = f"{stage.name}.json"
+        key = stage.key
         if rank() != 0:
             return replace(computed, fingerprint=key)
         provenance = build_provenance(self.case_text, key)

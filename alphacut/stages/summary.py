@@ -103,8 +103,9 @@ class Results:
         structure = self.structure
         if structure is None or structure.linear is None or not structure.floor_masses:
             return None
-        omega, drifts = frequencies(structure.linear), set(structure.outputs)
-        heights = {x: height.nominal for x, height in structure.heights.items() if x in drifts}
+        omega = frequencies(structure.linear)
+        observed = set(structure.outputs)
+        heights = {x: height.nominal for x, height in structure.heights.items() if x in observed}
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),

@@ -81,11 +81,11 @@ class LagrangianSystem(StructureModel):
             self.output(name, eq.v)
         # without inertia a momentum does not tell the velocity; 1e-300 is 0 but for underflow
         q0, v0 = self.start()
-        at_start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
+        at_start = dict(zip(list(eq.q) + list(eq.v), q0 + v0, strict=True))
         nominal = {eq.p[name]: value for name, value in self.parameters.items()}
         has_inertia = abs(eq.mass.subs(at_start).subs(nominal).evalf().det()) >= 1e-300
-        key, allowed = "mass of the lagrangian", "inertia of each coordinate"
-        require(has_inertia, key, value="singular", allowed=allowed)
+        allowed = "inertia of each coordinate"
+        require(has_inertia, "mass of the lagrangian", "singular", allowed)
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """Return the initial state (q0, v0) as expressions in the parameters, n of each."""
@@ -142,8 +142,11 @@ class Equations:
         push = sympy.Matrix([L.diff(x) for x in q])
         if force := system.force:
             push += sympy.Matrix(_expressions("force", lambda: force(*state), p, n))
-        self.q, self.v, self.p = q, v, p
-        self.momentum, self.push = momentum, push
+        self.q = q
+        self.v = v
+        self.p = p
+        self.momentum = momentum
+        self.push = push
         self.mass = momentum.jacobian(v)
 
     def velocity(self, momentum: Matrix) -> Matrix:

@@ -50,7 +50,8 @@ def damping_from_loss(
     upper: list[float] = []
     for level in alpha:
         # ζ rises with both numbers, so that the ends of their α-cuts give its ends
-        loss_cut, joints_cut = fuzzy["loss"].cut(level), fuzzy["joints"].cut(level)
+        loss_cut = fuzzy["loss"].cut(level)
+        joints_cut = fuzzy["joints"].cut(level)
         lower.append(ratio(loss_cut.lower, joints_cut.lower))
         upper.append(ratio(loss_cut.upper, joints_cut.upper))
     return PiecewiseLinear(tuple(alpha), tuple(lower), tuple(upper))

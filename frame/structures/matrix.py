@@ -124,8 +124,8 @@ class MatrixStructure(LinearSystem):
         for force in self.loads:
             self._require_factor("a force", force.amplitude)
             missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
-            what, allowed = f"on unknowns {missing}", "on unknowns that have mass"
-            require(not len(missing), "force", value=what, allowed=allowed)
+            value = f"on unknowns {missing}"
+            require(not len(missing), "force", value, allowed="on unknowns that have mass")
 
     def _require_ratios(self) -> None:
         """Refuse damping ratios outside [0, 1), and a number of them that is not that of modes."""
@@ -173,7 +173,7 @@ class MatrixStructure(LinearSystem):
 
         That is M over the unknowns that have mass, and K over the others, which have no dampers.
         """
-        mass, stiffness = self.nominal_terms("mass").sum(axis=0), self.nominal_terms("stiffness")
+        mass = self.nominal_terms("mass").sum(axis=0)
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
@@ -182,7 +182,7 @@ class MatrixStructure(LinearSystem):
         if (traces < 0).any():
             cure = f"turn the sign of term {int(traces.argmin()) + 1}: it seems to be −M"
         require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
-        total = stiffness.sum(axis=0)
+        total = self.nominal_terms("stiffness").sum(axis=0)
         self._require_stable(total)
         # Condensation divides by K_bb. An eigenvalue below 1e-14 of the largest entry is the
         # rounding of a zero one, of an unknown that no spring holds.
@@ -192,8 +192,8 @@ class MatrixStructure(LinearSystem):
         allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
         require(smallest > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
         damped = [int(k) for k in b if self._arrays["damping"][:, k].any()]
-        what, allowed = f"of unknowns {damped[:5]} without mass", "dampers between those with mass"
-        require(not damped, "damping", value=what, allowed=allowed)
+        value = f"of unknowns {damped[:5]} without mass"
+        require(not damped, "damping", value, "dampers between those with mass")
 
     def _require_stable(self, stiffness: Array) -> None:
         """Refuse a stiffness with a negative eigenvalue to which a term of negative sign adds.
@@ -276,8 +276,8 @@ class MatrixStructure(LinearSystem):
             RefusedError: The term is no such pair, or the array is not symmetric.
         """
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
-        what, allowed = type(term).__name__, "pairs (factor, array)"
-        require(is_pair, f"term of {kind}", value=what, allowed=allowed)
+        value = type(term).__name__
+        require(is_pair, f"term of {kind}", value, allowed="pairs (factor, array)")
         factor, value = term
         self._require_factor(kind, factor)
         if isinstance(factor, Monomial):
@@ -285,10 +285,11 @@ class MatrixStructure(LinearSystem):
         if hasattr(value, "toarray"):
             value = value.toarray()
         array = np.asarray(value)
-        size, key = np.shape(self.mass[0][1])[0], f"array of {kind}"
-        what, allowed = f"of shape {array.shape}", f"({size}, {size})"
+        size = np.shape(self.mass[0][1])[0]
+        key = f"array of {kind}"
         cure = "all matrices have as many rows and columns as there are unknowns"
-        require(array.shape == (size, size), key, value=what, allowed=allowed, cure=cure)
+        is_square = array.shape == (size, size)
+        require(is_square, key, f"of shape {array.shape}", f"({size}, {size})", cure)
         require_numbers(kind, array)
         # Eigenvalue solvers read one triangle alone, and proofs bound entries: so the mean of both
         # triangles is taken, which is symmetric to the last bit. A difference of more than
@@ -297,8 +298,7 @@ class MatrixStructure(LinearSystem):
         i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
         is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-        allowed, cure = "symmetric arrays", "mirror one triangle"
-        require(is_symmetric, key, value=what, allowed=allowed, cure=cure)
+        require(is_symmetric, key, what, "symmetric arrays", cure="mirror one triangle")
         return factor, np.asarray((array + array.T) / 2, float)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
@@ -309,9 +309,10 @@ class MatrixStructure(LinearSystem):
             factor: A number, the name of a parameter, or a function, which is called once with
                 jets.
         """
-        names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
+        names = list(self.parameters)
+        nominal = np.array([list(self.parameters.values())], float)
         try:
-            value = value_of(factor, variables(values, names, names[:1]))
+            value = value_of(factor, variables(nominal, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
             value = failure
         allowed = f"arithmetic to one number, of {', '.join(names)}"
@@ -332,8 +333,9 @@ class MatrixStructure(LinearSystem):
             shapes = [(n,)]
             if name.startswith("observed"):
                 shapes.append((2 * n,))
-            what, allowed = f"of shape {np.shape(value)}", " or ".join(map(str, shapes))
-            require(np.shape(value) in shapes, name, value=what, allowed=allowed)
+            shape = np.shape(value)
+            allowed = " or ".join(map(str, shapes))
+            require(shape in shapes, name, f"of shape {shape}", allowed)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
         """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""

@@ -199,8 +199,8 @@ class StoreyFrame(LinearSystem):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
             if name in sizes and not (is_single and name in SINGLE):
-                what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
-                require(np.size(values) in sizes[name], name, value=what, allowed=allowed)
+                size, allowed = np.size(values), f"{n}, as masses has, from below"
+                require(size in sizes[name], name, f"a list of {size}", allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
         require_choice("rayleigh_of", self.rayleigh_of, ("initial", "tangent"))
 
@@ -221,7 +221,8 @@ class StoreyFrame(LinearSystem):
             cure = f"give {name}, as {examples[name]} in SI{alternative}"
             require(name in given, name, value=None, allowed=SPRING_KEYS, cure=cure)
 
-        has_force, has_drift = bool(len(self.yield_force)), bool(len(self.yield_drift))
+        has_force = bool(len(self.yield_force))
+        has_drift = bool(len(self.yield_drift))
         require(
             not (has_force and has_drift),
             "yield_force",
@@ -230,8 +231,8 @@ class StoreyFrame(LinearSystem):
             cure="leave out yield_drift: it is yield_force over stiffness",
         )
         if len(self.hardening):
-            key, allowed = "yield_force, yield_drift", "one of them beside hardening"
-            require(has_force or has_drift, key, value=None, allowed=allowed)
+            allowed = "one of them beside hardening"
+            require(has_force or has_drift, "yield_force, yield_drift", None, allowed)
 
     @property
     def floors(self) -> int:
@@ -265,7 +266,8 @@ class StoreyFrame(LinearSystem):
             named["E"] = self.modulus
         named |= _named("I{}", self.moments)
         lists = ["stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"]
-        for name in (*lists, "yield_force", "yield_drift", "hardening"):
+        lists += ["yield_force", "yield_drift", "hardening"]
+        for name in lists:
             named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         named["rayleigh_mass"], named["rayleigh_stiffness"] = self.rayleigh
         named |= self.ratios
@@ -381,7 +383,8 @@ class StoreyFrame(LinearSystem):
         """Return matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
         n = self.floors
         identity: Array = np.eye(n)
-        by_floor, by_storey = diagonal(identity), chain_matrix(identity)
+        by_floor = diagonal(identity)
+        by_storey = chain_matrix(identity)
         springs = self.springs(p)
         damper_matrices = by_storey if self.damper_placement == "storey" else by_floor
 
