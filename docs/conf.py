@@ -82,8 +82,10 @@ def with_keys(
 ) -> None:
     """Adds the keys of a section of a case as a table, from the model's own fields."""
     from alphacut.case.parse import allowed_values
+    from alphacut.case.types import Section
 
-    fields = getattr(documented, "model_fields", {})
+    is_section = isinstance(documented, type) and issubclass(documented, Section)
+    fields = documented.described_fields() if is_section else {}
     rows = [
         (f"``{key}``", described(field), allowed_values(field), default(field))
         for key, field in fields.items()

@@ -118,7 +118,7 @@ class CellContent(Section, defer_build=True):
             require(self.mesh_cell is None, "mesh.file", None, allowed)
             require(not self.mesh.refine, "mesh.refine", True, "true beside mesh.file")
             is_complete = self.radius is None or self.radius_map is not None
-            about = RadiusMapSection.model_fields["a1"].description
+            about = RadiusMapSection.described_fields()["a1"].description
             require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
             return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"

@@ -230,7 +230,7 @@ def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
 
 def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
     """Yield full name, field, and whether it is a section, of each key below a class."""
-    for key, info in model.model_fields.items():
+    for key, info in model.described_fields().items():
         name = f"{prefix}{key}"
         parts = [info.annotation, *_annotation_parts(info.annotation)]
         models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]

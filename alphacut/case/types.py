@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import itertools
 import math
+import textwrap
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +24,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic.annotated_handlers import GetCoreSchemaHandler
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from alphacut.base.errors import RefusedError, is_number, require
@@ -36,9 +40,22 @@ class Section(BaseModel):
     What a key is stands in its field, or in the line below it.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, arbitrary_types_allowed=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    @classmethod
+    def described_fields(cls) -> dict[str, FieldInfo]:
+        """Return the fields by key, each with a description of what the key is.
+
+        The description stands in the field, or in the line below the key in its class. Pydantic
+        would read these lines of all classes as they are defined (`use_attribute_docstrings`), for
+        which each command would wait .04 s. Here a message or a page that needs them has them read.
+        """
+        for section in cls.__mro__:
+            for key, line in _lines_below_keys(section).items():
+                info = cls.model_fields[key]
+                if info.description is None:
+                    info.description = line
+        return cls.model_fields
 
     def has_key(self, key: str) -> bool:
         """True if the file gives the key, so that no default stands in."""
@@ -51,6 +68,24 @@ class Section(BaseModel):
     def _validate(self) -> Self:
         self.require_consistent()
         return self
+
+
+def _lines_below_keys(section: type) -> dict[str, str]:
+    """Return the text below each key of a section's class that has one, by key."""
+    if not issubclass(section, Section):
+        return {}
+    try:
+        [definition] = ast.parse(textwrap.dedent(inspect.getsource(section))).body
+    except (OSError, TypeError):  # of a class that no file defines
+        return {}
+    lines: dict[str, str] = {}
+    assert isinstance(definition, ast.ClassDef)
+    for statement, below in itertools.pairwise(definition.body):
+        is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        if isinstance(statement, ast.AnnAssign) and is_text:
+            key = ast.unparse(statement.target)
+            lines[key] = inspect.cleandoc(str(ast.literal_eval(ast.unparse(below))))
+    return lines
 
 
 @dataclass(frozen=True)
