@@ -19,7 +19,7 @@ from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require_choice
 from alphacut.base.number_text import MINUS, Table, engineering, percent_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
-from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, limit_fields, limits_by_name
+from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit, limits_by_name
 from alphacut.frame.analyses.peaks import Peak, Peaks, peaks
 from alphacut.frame.analyses.suites import SuitePeaks
 from alphacut.frame.envelope import Envelope
@@ -286,7 +286,7 @@ def _decide_limit(
     necessity = (1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0])
     lowest_level = float(alpha[0])
     return LimitDecision(
-        **limit_fields(limit, unit),
+        **vars(about_limit(limit, unit)),
         possibility=possibility,
         necessity=necessity,
         margin=Ends(largest_allowed - max_peak.upper, largest_allowed - min_peak.lower),

@@ -33,7 +33,7 @@ from alphacut.frame.analyses.incremental import (
     Increments,
     curve_rows,
 )
-from alphacut.frame.analyses.limits import Limit, LimitResult, limit_fields, limits_by_name
+from alphacut.frame.analyses.limits import Limit, LimitResult, about_limit, limits_by_name
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.frame.analyses.suites import (
@@ -77,6 +77,7 @@ class CriticalMeasures:
     high: Array
 
     def __post_init__(self) -> None:
+        """Make unknown measures infinite, and check the order of all measures."""
         for end in fields(self):
             values = getattr(self, end.name)
             object.__setattr__(self, end.name, np.where(np.isnan(values), np.inf, values))
@@ -713,7 +714,7 @@ def fragility_of(
 
     about: dict[str, LimitResult] = {}
     for name, limit in limits.items():
-        about[name] = LimitResult(**limit_fields(limit, model.unit_of(limit.output)))
+        about[name] = about_limit(limit, model.unit_of(limit.output))
     for event, members in events.items():
         for name in members:
             about[name] = replace(about[name], event_name=event)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypedDict
+from typing import Literal
 
 from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import MINUS, ShownUnit, engineering
@@ -94,7 +94,7 @@ class Limit:
     def __str__(self) -> str:
         """Return the limit as text, in the unit that a storey frame's output of this name has."""
         unit = Output(self.output).unit.removeprefix("SI")  # "SI" stands for an unknown unit
-        return LimitResult(**limit_fields(self, unit)).words
+        return about_limit(self, unit).words
 
 
 def limits_by_name(
@@ -219,22 +219,11 @@ class LimitResult:
         return {"limited output": name, "unit": self.unit, "limit": self.limit}
 
 
-class LimitFields(TypedDict):
-    """Fields of `LimitResult` that follow from a limit."""
+def about_limit(limit: Limit, unit: str) -> LimitResult:
+    """Return the fields of a result about a one-sided limit of an output with an SI unit.
 
-    side: Side
-    output: str
-    unit: str
-    limit: float
-    stated: str
-
-
-def limit_fields(limit: Limit, unit: str) -> LimitFields:
-    """Return the fields of `LimitResult` for a one-sided limit of an output with an SI unit."""
-    return {
-        "side": limit.side,
-        "output": limit.output,
-        "unit": unit,
-        "limit": limit.number,
-        "stated": limit.stated,
-    }
+    Subclasses of `LimitResult` add their own fields to `vars` of it.
+    """
+    return LimitResult(
+        side=limit.side, output=limit.output, unit=unit, limit=limit.number, stated=limit.stated
+    )

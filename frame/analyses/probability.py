@@ -22,7 +22,7 @@ from alphacut.base.errors import require
 from alphacut.base.number_text import MINUS, Table, range_text
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.analyses.answer import Answer, Record, table_of
-from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, limit_fields, limits_by_name
+from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit, limits_by_name
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -229,7 +229,7 @@ def probability(
 
     events = {}
     for k, (name, limit) in enumerate(named.items()):
-        about = LimitResult(**limit_fields(limit, model.unit_of(limit.output)))
+        about = about_limit(limit, model.unit_of(limit.output))
         of_limit = PeakRatios(*(bound[:, :, k] for bound in ratios))
         events[name] = _limit_probability(about, of_limit, level_of_points, is_random=bool(random))
     if len(named) > 1:

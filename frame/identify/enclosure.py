@@ -94,6 +94,7 @@ class LinearRelaxation:
     """
 
     def __init__(self, size: int) -> None:
+        """Begin a program with the constant 1 as its only variable, and without rows."""
         self.lower = np.zeros(size)
         self.upper = np.zeros(size)
         self.lower[0] = self.upper[0] = 1.0
@@ -228,6 +229,7 @@ class ChainRelaxation(LinearRelaxation):
         modes: Sequence[ModeCut],
         known: Mapping[tuple[int, int], tuple[float, float]],
     ) -> None:
+        """Add the variables of the chain, and the inequalities of all modes unless it is empty."""
         n = len(chain.mass)
         # Variables: parameters, stiffnesses and masses; for each mode the amplitudes, λ and three
         # products at each floor.

@@ -46,6 +46,7 @@ class Chain:
     """
 
     def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
+        """Read the exponents of the parameters off their names, such as "k1", "E" or "l2"."""
         n = frame.floors
         values = frame.parameters
         allowed = "none: a storey softened by weight has no stiffness of such a product"
@@ -139,6 +140,7 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
+        """Check that numbers are from 1 on, and that the reference floor is beside the shape."""
         key = f"mode {self.mode}"
         hertz = self.frequency.nominal
         numbers = [self.mode, *self.shape]

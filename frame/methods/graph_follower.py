@@ -60,6 +60,7 @@ class Storage:
     """
 
     def __init__(self, flow: UnitFlow) -> None:
+        """Begin a storage without graphs for the outputs of a problem."""
         d = len(flow.boxes.names)
         shape = (len(flow.time), len(flow.outputs), 2)
         self.flow = flow
@@ -187,6 +188,7 @@ class GraphFollower:
     tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
+        """Check the options."""
         allowed = "1 and 2, the degrees of a Taylor model"
         require(self.order in (1, 2), "order", value=self.order, allowed=allowed)
         checked_number("tolerance", self.tolerance, positive=True)

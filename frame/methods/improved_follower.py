@@ -252,6 +252,7 @@ class _LevelModels:
     def __init__(
         self, storage: Storage, box: tuple[Array, Array], limit: Array, asked: Mask
     ) -> None:
+        """Predict all bounds from the graphs that are stored already."""
         self.storage = storage
         self.box = box
         self.limit = limit

@@ -169,6 +169,7 @@ class _Band:
     """
 
     def __init__(self, flow: UnitFlow, domain: Domain, yielding_flow: YieldingFlow) -> None:
+        """Begin a band that no trajectory attains yet."""
         cuts = flow.boxes
         self.names = cuts.names
         self.outputs = tuple(map(str, flow.outputs))
