@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import os
 import signal
 import sys
@@ -45,8 +46,6 @@ COMMANDS = {
     "verify": "check",
 }
 """Commands by the names that a user writes, each with its file in `alphacut.commands`."""
-SAME_SIGNAL_SECONDS = 1.0
-"""Signals within this time count as one: batch systems signal a process and then its group."""
 STATUSES = """\
 exit status:
   0    done
@@ -58,7 +57,13 @@ exit status:
 
 
 def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
-    """Parser of a program with commands (file by name), and the parser of each command by name."""
+    """Return the parser of a program, and the parser of each of its commands by name.
+
+    Args:
+        program: Name of the program, for its texts.
+        commands: File in `alphacut.commands` of each command, by the command's name. Only these
+            files are imported.
+    """
     parser = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
@@ -74,13 +79,14 @@ def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, di
     for name, file in commands.items():
         command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
         about = f"{command.about[:1].upper()}{command.about[1:]}."
-        by_name[name] = subparsers.add_parser(
+        of_command = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
-        command.arguments(by_name[name])
-        by_name[name].set_defaults(run=command.run)
+        command.arguments(of_command)
+        of_command.set_defaults(run=command.run)
         shown = "log what is done; a traceback with every error"
-        by_name[name].add_argument(DEBUG, action="store_true", help=shown)
+        of_command.add_argument(DEBUG, action="store_true", help=shown)
+        by_name[name] = of_command
     return parser, by_name
 
 
@@ -90,7 +96,7 @@ def main(
     program: str = "alphacut",
     names: Mapping[str, str] = COMMANDS,
 ) -> int:
-    """Runs one command; returns its exit status of `STATUSES`, every error as one line.
+    """Run one command; return its exit status of `STATUSES`, every error as one line.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
@@ -107,11 +113,15 @@ def main(
                 say(line)
             return 2
         except KeyboardInterrupt:
-            number = signals[0] if signals else signal.SIGINT
-            cause = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
+            number, cause = int(signal.SIGINT), "interrupted"
+            if signals:
+                number = signals[0]
+                cause = f"ended by {signal.Signals(number).name}"
             message = f"{cause}; a run continues from the stages and samples that it has finished"
-            return _end_with_message(message, 128 + number)
-        except BrokenPipeError:  # as by `| head`: the interpreter's last flush must not fail
+            return _end_with_message(message, 128 + number)  # as shells report signals
+        except BrokenPipeError:
+            # The reader has gone, as with `| head`. The interpreter flushes standard output at its
+            # end, which must not fail a second time.
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             return 0
         except CampaignError as error:
@@ -120,7 +130,8 @@ def main(
             return _end_with_message(missing(error), 1)
         except (FailedError, OSError, MemoryError, ImportError) as error:
             return _end_with_message(str(error) or type(error).__name__, 1)
-        except Exception as error:  # which no part of this program raises on purpose
+        except Exception as error:
+            # No part of this program raises it on purpose: the user is to report it whole.
             traceback.print_exc()
             what = f"{type(error).__name__} is an error of this program"
             return _end_with_message(f"{what}: report the lines above, and the case", 1)
@@ -128,23 +139,31 @@ def main(
 
 @contextmanager
 def interrupt_on_stop_signals() -> Iterator[list[int]]:
-    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does; ignored ones stay so (nohup).
+    """Let SIGTERM and SIGHUP interrupt the block as Ctrl-C does; ignored ones stay so (nohup).
+
+    Signals within a second of each other count as one: batch systems signal a process and then its
+    group. Only the main thread may set handlers; in another one nothing is changed.
 
     Yields:
         The list of the signal numbers received, which grows while the block runs.
     """
-    received, last_time = list[int](), -SAME_SIGNAL_SECONDS
-    is_main = threading.current_thread() is threading.main_thread()  # others may set no handlers
-    handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS if is_main}
+    received = list[int]()
+    last_time = -math.inf
+    handlers = {}
+    if threading.current_thread() is threading.main_thread():
+        handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    # None: a handler that was not set by Python, and that Python could not set again.
     previous = {k: x for k, x in handlers.items() if x not in (None, signal.SIG_IGN)}
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal last_time
         received.append(number)
-        interrupt, now = signal.getsignal(signal.SIGINT), time.monotonic()
-        if now - last_time >= SAME_SIGNAL_SECONDS:
+        now = time.monotonic()
+        if now - last_time >= 1.0:
             last_time = now
-            (interrupt if callable(interrupt) else signal.default_int_handler)(number, frame)
+            interrupt = signal.getsignal(signal.SIGINT)
+            handler = interrupt if callable(interrupt) else signal.default_int_handler
+            handler(number, frame)
 
     for number in previous:
         signal.signal(number, stop)
@@ -157,7 +176,7 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
 
 @contextmanager
 def show_log(is_on: bool) -> Iterator[None]:
-    """Shows the log of the block, with the traceback of its error, on standard error if `is_on`."""
+    """Show the log of the block, with the traceback of its error, on standard error if `is_on`."""
     logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
     if is_on:
         logger.addHandler(handler)
@@ -173,8 +192,13 @@ def show_log(is_on: bool) -> Iterator[None]:
 
 
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
+    """Read a command line and run its command; return the exit status.
+
+    Raises:
+        RefusedError: An option is unknown or does not fit, or a file cannot be written.
+    """
     words, petsc = split_petsc(arguments)
-    # the parser of the named command alone saves the imports of the others
+    # The parser of the named command alone saves the imports of the others.
     named = {name: names[name] for name in words[:1] if name in names}
     with uninterrupted():  # a signal amid imports is not lost to what they run
         parser, by_name = build_parsers(program, named or names)
@@ -195,7 +219,10 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
 
 
 def _end_with_message(message: str, status: int) -> int:
-    """Prints why a command ended, aborts other ranks under mpirun, and returns `status`."""
+    """Print why a command ended, abort other ranks under mpirun, and return `status`.
+
+    Ranks that wait for this one in a collective operation would otherwise wait forever.
+    """
     say(message)
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:
         print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)
