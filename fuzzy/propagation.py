@@ -102,6 +102,7 @@ def propagate(
     start = perf_counter()
     if alpha is None:
         alpha = levels(4)
+    # Numbers that each hold with P ≥ 1 − α hold together less often: their cuts are widened.
     domain = Domain(joined_inputs(inputs), alpha)
     method = method or Automatic()
     _require_method(method)
@@ -129,6 +130,7 @@ def propagate(
         bounds = method.run(campaign, domain)
         campaign.report(1.0)
     if bounds.encloses:
+        # A point of the box that attains a bound need not belong to the set that the box encloses.
         bounds = bounds.without_attained()
     return replace(
         bounds,
@@ -141,6 +143,7 @@ def propagate(
 
 def _require_method(method: Plan) -> None:
     """Refuse an object that is no plan, such as the class itself or a plan of other samples."""
+    # A class in place of an object, and a plan of another kind, are the usual mistakes.
     is_plan = hasattr(method, "run") and not isinstance(method, type)
     is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
     allowed = "an object such as General() or Signed()"

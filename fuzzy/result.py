@@ -138,6 +138,8 @@ class Bounds:
             if texts:
                 _require_shape("natures, units", (len(texts),), shape[-1:])
         is_finite = np.isfinite(self.lower) & np.isfinite(self.upper)
+        # A gap of NaN is unknown. Only a guarantee holds without it: of other natures the error is
+        # part of the statement.
         has_error = (self.error >= 0) | (np.isnan(self.error) & self._guaranteed)
         require(
             (is_finite & has_error).all(),
@@ -156,7 +158,9 @@ class Bounds:
         over_levels_and_time = tuple(range(magnitudes.ndim - 1))
         rounding = ROUND_OFF * magnitudes.max(axis=over_levels_and_time)  # (outputs,)
         error = np.nan_to_num(self.error)
+        # Estimated ends may cross where the true ends are equal, by no more than their error.
         estimate_error = np.where(self._guaranteed, 0.0, error)
+        # Each of two levels may be off by its own error and its own rounding.
         between_levels = 2 * rounding + error[1:] + error[:-1]
         attained = self.attained
         proved = self.proved
@@ -186,6 +190,8 @@ class Bounds:
         inner = self.inner or Ends(unknown, unknown)
         if self.encloses and self.inner is None:
             return inner
+        # A value that a scheme computes is reached to its error, and so is the end of an estimate:
+        # both are moved inwards by it.
         lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
         upper = np.where(self._guaranteed, inner.upper, self.upper - self.error)
         return Ends(lower, upper)
@@ -226,6 +232,7 @@ class Bounds:
                 coverage, which the number would have.
         """
         ends = self.bounds(output)
+        # The cut of a lower level contains every cut up to the next one, so it is safe in between.
         steps = outer_steps(self.alpha, ends.lower, ends.upper, encloses=self.encloses)
         claim = self.claim.claim
         if claim is not None:
@@ -291,6 +298,7 @@ class Bounds:
         nature = self.nature_of(output)
         extremes = self.extremes_over_time(column)
         for alpha, lower, upper, error in zip(self.alpha, *extremes, strict=True):
+            # Six digits are rounded to the side on which the statement stays true.
             low = rounded(lower, "lower", nature, 6)
             high = rounded(upper, "upper", nature, 6)
             if low > high:  # attained ends of nearly one value were rounded inwards
@@ -347,6 +355,7 @@ class Bounds:
 
         time = {} if self.time is None else {"time": self.time}
         axes = {"alpha": self.alpha, **time, "output": list(self.outputs)}
+        # The order of the axes is that of the arrays: levels, times, outputs, and inputs last.
         coordinates = {**axes, "parameter": list(self.inputs)}
         natures = [str(self.nature_of(output)) for output in self.outputs]
         variables = {

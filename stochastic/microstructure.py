@@ -172,6 +172,7 @@ class FittedRadiusMap:
         triangles = {}
         for name, ends in {"a2": self.pbox.a2, "a4": self.pbox.a4}.items():
             values = np.array(ends)
+            # A support without width becomes a crisp number.
             values[abs(values - ends.nominal) <= tolerance] = ends.nominal
             triangles[name] = SlopeEnds(*(float(f"{value:.8g}") for value in values))
         return triangles
@@ -217,6 +218,8 @@ class FittedRadiusMap:
         radius = np.linspace(fit.a1, fit.a3, 501)
         distribution = fit.distribution
         theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 5001), float)
+        # The distribution function of a map is F_Θ at the θ of the radius: large radii give a small
+        # one.
         smallest_radius, largest_radius = self.pbox.bounds(theta)
         fitted_radius = fit.map(self.pbox.nominal_slopes)(theta)
         probability = distribution.cdf(theta)
@@ -239,6 +242,7 @@ class FittedRadiusMap:
         shape = self.shape
         pbox = self.pbox
         nominal = self.map
+        # The weights are fractions of the area, so this is the mean over the plane or space.
         cell_fraction = float(self.sample.weights @ shape.fractions(self.sample.values))  # eq. 10
         return {
             "particles": shape.particles,
@@ -401,6 +405,7 @@ def _repacked(
         if best_error < 5e-3 or is_last:
             break
         packing = replace(packing, fraction=fraction)
+        # The same seeds: what changes is the fraction alone, and not the choice of radii as well.
         denser = Packings.make(packing, len(packings), seed=packings.seed, executor=executor)
         cells = list(map_function(with_cells, denser))
     return best
@@ -446,6 +451,7 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
     )
     truncated = capped.truncated(lower, upper)
     fit = HermiteFit(lower, upper)
+    # Two streams, so that more resamples of one band do not change the other.
     band_seed, slope_seed = np.random.SeedSequence(seed, spawn_key=(1,)).spawn(2)
     confidence = 0.99  # of both bands
     band_generator = np.random.default_rng(band_seed)

@@ -57,6 +57,7 @@ def require_map(radius_map: RadiusMap) -> None:
     distribution = radius_map.distribution
     require_distribution(distribution)
     require_support(distribution.lower, distribution.upper)
+    # Only the values of a user's map are known, so they are sampled.
     theta = np.linspace(distribution.lower, distribution.upper, 65)
     radii = np.asarray(radius_map(theta), float)
     allowed = f"the shape of θ, {theta.shape}"
@@ -125,6 +126,7 @@ class HermiteMap:
 
         They are at its ends or where dr/dξ = 0.
         """
+        # dr/dξ is a quadratic: its roots are the inner extremes.
         roots = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
         is_real = abs(roots.imag) < 1e-12  # the rounding of a double root
         inner = roots.real[is_real & (roots.real > 0) & (roots.real < 1)]

@@ -53,6 +53,7 @@ def with_cells(particles: Particles) -> ParticleCells:
     Cells near the edge of a window are left out and others weighted instead (`counted_cells`).
     """
     if particles.shape != DISCS:
+        # All cells of a periodic box are whole.
         indices = np.arange(len(particles), dtype=np.intp)
         return ParticleCells(particles, indices, cell_volumes(particles), np.ones(len(particles)))
     diagram = apollonius(particles)
@@ -111,6 +112,7 @@ def cell_volumes(spheres: Particles) -> Array:
     table = np.c_[np.arange(count), spheres.centres / side, spheres.radii / side]
     with TemporaryDirectory() as folder:
         file = Path(folder) / "spheres"
+        # In units of the side, with all digits of a double
         np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
         # -r: radii follow the centres; -p: periodic; -c: print index and volume; box [0, 1]³
         command = [program, "-r", "-p", "-c", "%i %v", "0", "1", "0", "1", "0", "1", str(file)]
@@ -118,6 +120,7 @@ def cell_volumes(spheres: Particles) -> Array:
         output = file.with_suffix(".vol")
         cells = np.loadtxt(output, ndmin=2) if output.is_file() else np.zeros((0, 2))
     volumes = np.zeros(count)
+    # Voro++ writes cells in its own order, and none for a sphere that its neighbours cut off.
     volumes[cells[:, 0].astype(int)] = cells[:, 1]
     # Voro++ prints six digits.
     if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:

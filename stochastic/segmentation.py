@@ -71,6 +71,7 @@ class Segmentation:
 
         The grey value is varied by `CONFIDENT` standard deviations of the noise and by the light.
         """
+        # The light counts in full, as if it had not been fitted: its polynomial may be wrong.
         uncertainty = CONFIDENT * self.noise + np.abs(self.light)
         uncertainty = np.where(self.is_impulse, np.inf, uncertainty)
         first = np.searchsorted(self.thresholds, self.grey - uncertainty, side="right")
@@ -116,6 +117,7 @@ def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
     coordinates = [np.linspace(-1, 1, count) for count in values.shape]
     y, x = np.meshgrid(*coordinates, indexing="ij")
     polynomials = np.stack([x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 5)
+    # A constant would be the same as levels that are all higher.
     polynomials -= polynomials.mean(axis=0)
 
     light = np.zeros_like(values)
@@ -272,6 +274,7 @@ def _inner_pixels(labels: Ints, classes: int) -> Mask:
     counts = np.bincount(labels.ravel(), minlength=classes)
     value = "beyond the grey values of a class"
     require(counts.all(), "threshold", value, allowed="values that leave each class some pixels")
+    # Blurred borders of classes have grey values in between, which would widen the noise.
     for reach in (3, 2, 1):
         inner = _interior(labels, reach)
         if (np.bincount(labels[inner], minlength=classes) >= 0.1 * counts).all():

@@ -155,6 +155,7 @@ class Call:
         if self.shared:
             columns = [self.names.index(name) for name in self.shared]
             groups: dict[bytes, list[int]] = {}
+            # Equal inputs have equal bits, so the bytes serve as the key.
             for row in range(len(points)):
                 groups.setdefault(points[row, columns].tobytes(), []).append(row)
             yield from groups.values()
@@ -176,6 +177,7 @@ class Call:
             require(is_complete, "outputs", value=len(outputs), allowed=f"{expected}")
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample
             if len(points) > 1:
+                # One bad point must not take the others of its batch with it.
                 return [self(point[None])[0] for point in points]
             return [Failure(f"{type(error).__name__}: {error}")]
         return [_outcome(output) for output in outputs]
@@ -216,6 +218,7 @@ def _outcome(output: Any) -> Outcome:
         named = _named(output).items()
         arrays = {str(name): _finite_array(str(name), value) for name, value in named}
         layout = tuple((name, array.shape) for name, array in arrays.items())
+        # An array "a" and a number "a[0]" would have one name.
         columns = Values(layout, np.zeros((0, 0))).columns
         are_distinct = bool(columns) and len(set(columns)) == len(columns)
         allowed = "one number or more, all of different names"
@@ -227,6 +230,8 @@ def _outcome(output: Any) -> Outcome:
 
 def _finite_array(name: str, value: ArrayLike | None) -> Array:
     """Return an output as an array; refuse what is no plain array of finite real numbers."""
+    # A masked entry has no value, and an array with a unit loses it on conversion: both would pass
+    # as plain numbers.
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()

@@ -81,6 +81,7 @@ class Campaign:
     def samples(self) -> Samples:
         """All samples so far in the order of their first use."""
         if self._samples is None:
+            # A dictionary keeps the order in which its keys were added.
             points = np.frombuffer(b"".join(self._rows)).reshape(len(self), -1)
             values = Values(self.layout, np.array(list(self._rows.values())))
             self._samples = Samples(points, values)
@@ -104,6 +105,7 @@ class Campaign:
             CampaignError: Samples failed; raised after all others have been evaluated.
         """
         keys = [point.tobytes() for point in points + 0.0]  # -0.0 + 0.0 is 0.0
+        # A point that is asked for twice in one call is evaluated once.
         new_keys = [key for key in dict.fromkeys(keys) if key not in self._rows]
         if len(new_keys) > self.remaining:
             what = f"{len(self):,} evaluations are done, the next {len(new_keys):,} would pass"
@@ -142,6 +144,7 @@ class Campaign:
         if self.layout:
             return Failure(f"outputs are {outcome.layout} where others have {self.layout}")
         self.layout = outcome.layout
+        # The names of the outputs are known from the first sample on, and no earlier.
         self.knowledge.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
         return outcome
 
@@ -167,6 +170,8 @@ def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
     if campaign.store:
         keys = [point_key(campaign.call.names, point) for point in points]
         for row, key in enumerate(keys):
+            # A stored sample counts for the budget as if it had been evaluated: so a resumed call
+            # takes the same samples as one that ran through.
             sample = campaign.store.get(campaign.model, key)
             if sample:
                 outcomes[row] = campaign.checked(sample)

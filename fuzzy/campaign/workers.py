@@ -78,6 +78,7 @@ def _end_with_parent(parent: int) -> None:
     from threading import Thread
 
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    # Ctrl-C reaches all processes of the group.
     for number in (signal.SIGINT, *_GROUP_SIGNALS):  # sent to all; the parent decides
         signal.signal(number, signal.SIG_IGN)
 
@@ -119,6 +120,8 @@ def completed(
     pending: dict[Future[tuple[list[list[Outcome]], float]], list[Task]] = {}
     try:
         while True:
+            # Each worker has a batch to work on and one that waits for it, so that none is idle
+            # between two.
             while len(pending) < 2 * n_workers(executor):
                 batch = list(islice(queue, batch_size))
                 if not batch:

@@ -62,6 +62,7 @@ def from_data(
     is_allowed = law is None or (law == "normal" and claim == "mean")
     require(is_allowed, "law", value=law, allowed="'normal' for a mean; ranks bound the others")
     data = Observations.from_values(values, bounds)
+    # Ranks do not bound a mean: a rare, far value moves it and may not be among the values.
     if claim != "mean":
         number, decided = rank_cuts(data, quantile)
     elif law is None:
@@ -71,6 +72,7 @@ def from_data(
     drawn = f"{len(data.values)} values drawn alike and independently"
     if law:
         drawn += f" from a {law} law"
+    # The claim rests on what cannot be seen in the values, and so it is stated with it.
     conditions = [drawn]
     if bounds is not None:
         low, high = data.bounds
@@ -178,7 +180,9 @@ def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple
     low, high = bounds
     upper = np.minimum.accumulate(np.clip(upper, low, high))
     lower = np.maximum.accumulate(np.clip(lower, low, high))
+    # Rounding may let the two ends cross at the top.
     lower = np.minimum(lower, upper[-1])  # at α = 1 both are one point, to rounding
+    # With both bounds every cut is decided, the support by the bounds themselves.
     if np.isfinite(bounds).all():
         return _stepwise_at_levels(low, high, lower=lower, upper=upper), 0.0
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())

@@ -54,6 +54,8 @@ def jointly(
     rule = JointRule(tuple(claimed), independent, means or kinds[0], named=bool(means))
     for (first, number), (second, second_number) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
+        # Two numbers with equal cuts almost surely come from the same values, which are not
+        # independent.
         is_allowed = not independent or number.number != second_number.number
         require(is_allowed, "independent", value=True, allowed="False", cure=cure)
     return {**inputs, **{name: _join_levels(number, rule) for name, number in claimed.items()}}
@@ -63,6 +65,7 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
     """Return the inputs as fuzzy numbers whose claims hold jointly; those joined before stay."""
     numbers = fuzzy_inputs(inputs)
     rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
+    # Joined inputs share one rule. Joining them again would widen their cuts twice.
     are_joined = len(rules) == 1 and None not in rules
     if are_joined:
         return numbers
@@ -85,6 +88,7 @@ def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
         tuple(np.asarray(cuts.upper)[kept]),
         cuts.encloses,
     )
+    # The level from which the values decide the cuts moves up with the cuts.
     decided = float(rule.joint_level(np.asarray(number.decided)))
     return replace(number, number=joint_cuts, decided=decided, joint=rule)
 

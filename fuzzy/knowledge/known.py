@@ -63,6 +63,7 @@ class Knowledge:
 
     def stated_signs(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
         """Return the stated signs, shape (outputs, inputs), 0 where none is stated."""
+        # A fact that names no output holds for all of them.
         table = np.zeros((len(outputs), len(inputs)), np.int8)
         for name, sign in self.signs.items():
             column = inputs.index(name)

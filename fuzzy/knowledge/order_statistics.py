@@ -125,8 +125,11 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
             low += 1
         else:
             high -= 1
+        # The level is the probability of all gaps that were removed. Rounding must not let it fall,
+        # nor lift it above 1.
         level = max(level, min(gaps.below[low] + gaps.above[high], 1.0))
         windows_by_level[level] = (low, high)  # of equal levels the last window
+    # At level 1 the cut is the estimate itself, which the caller adds.
     windows_by_level.pop(1.0, None)
     ranges = np.array(list(windows_by_level.values()))
     return Windows(np.array(list(windows_by_level)), low=ranges[:, 0], high=ranges[:, 1])
@@ -145,9 +148,12 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
     low, high = data.bounds
     nested = windows(len(data.values), quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
     levels = np.append(nested.level, 1.0)
+    # Gap k begins at the k-th value, gap 0 at the lower bound; the last gap ends at the upper one.
     lower = np.append(low, data.values)[nested.low]
     upper = np.append(data.values, high)[nested.high]
     centre = float(np.quantile(data.values, 0.5 if quantile is None else quantile))
+    # A window that holds a gap at an end without a bound has an infinite end: the values do not
+    # decide it.
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
         return Stepwise((0.0,), (centre,), (centre,)), 1.0

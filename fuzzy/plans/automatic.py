@@ -130,6 +130,7 @@ class _AutomaticSearch:
         linkage = self.linkage
         if linkage is None:
             return self.is_monotone
+        # Descents that may have passed over waves leave an output attained, whatever the rule says.
         is_found = np.array([linkage.is_estimate(output) for output in self.outputs], bool)
         return np.asarray(self.is_monotone | (is_found & ~self.is_rough))
 
@@ -219,6 +220,7 @@ def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
     walk = _changed_in_turn(turns)
     values = campaign(widest.points(walk)).array
     tolerance = negligible(campaign.samples.values.array)
+    # A step may go up or down along its input: differences are taken as if it went up.
     directions = np.sign(np.diff(walk, axis=0).sum(axis=1))
     differences = np.diff(values, axis=0) * directions[:, None]
     by_input = differences.reshape(SEARCH.walk_points, inputs, -1)  # (steps, inputs, outputs)
@@ -240,6 +242,7 @@ def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
     # same extreme corners, and share them.
     is_monotone = has_signs.copy()
     turns_once = np.zeros_like(is_monotone)
+    # Relative to the first input, an output and its negative have the same pattern.
     patterns = signs * signs[:, :1]
     for pattern in np.unique(patterns[has_signs], axis=0):
         columns = np.flatnonzero(has_signs & (patterns == pattern).all(axis=1))
@@ -336,6 +339,8 @@ def _climb_staircases(
         keeps_signs &= ~contradicts.any(axis=0)
         by_input = contradicts.reshape(count, inputs, -1)
         n_turns = (by_input[1:] != by_input[:-1]).sum(axis=0)
+        # An effect that turns once is that of a hump, which descents find. Waves and jumps turn
+        # back.
         turns_once &= (n_turns <= 1).all(axis=0)
     for cut in cuts_with_width(campaign, widest.domain):
         extremes = corners[:, np.isin(widest.uncertain_inputs, cut.uncertain_inputs)]

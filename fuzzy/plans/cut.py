@@ -149,6 +149,7 @@ class CutSearch:
         def change_and_gradient(unit: Array) -> tuple[float, Array]:
             """Return the change of sign · output from the start, in ranges, and its gradient."""
             difference = SEARCH.difference
+            # Differences go to the inside: the model need not exist beyond the cut.
             steps = np.where(unit + difference > 1, -difference, difference)
             values = self.values(np.concatenate([unit[None], unit + np.diag(steps)]), bound)
             changes = (values - start_value) / output_range
@@ -230,6 +231,7 @@ class Optimum:
         It stays an optimum of a narrower cut (higher α) that contains it. In a wider cut (lower α)
         it stays one unless it lies on a face of its own cut that the wider cut moves outwards.
         """
+        # Levels rise, and so the cut with the lower level is the wider one.
         if self.cut.level <= cut.level:
             return bool(cut.contains(self.point[None])[0])
         is_at_lower_face = self.point <= self.cut.lower + self.cut.near

@@ -44,6 +44,7 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
     """
     values = samples.values.array
     rows_by_level = [np.flatnonzero(is_inside) for is_inside in domain.inside(samples.points)]
+    # A sample counts on every level whose cut holds it, not only on that for which it was taken.
     min_rows = np.array([rows[values[rows].argmin(axis=0)] for rows in rows_by_level])
     max_rows = np.array([rows[values[rows].argmax(axis=0)] for rows in rows_by_level])
     columns = np.arange(values.shape[1])
@@ -88,6 +89,7 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
     is_exceeded = np.asarray((is_below | is_above).any(axis=0))
     signs = campaign.knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
     for column in np.flatnonzero(proved):
+        # Two tests: pairs of samples that contradict a sign, and samples beyond the bounds.
         pair = contradiction(samples.points, values[:, column], signs[column])
         cure = "samples contradict it"
         if pair is not None:

@@ -77,6 +77,7 @@ def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -
     """
     from scipy.spatial import cKDTree
 
+    # Of two neighbours the worse one is left out. Of equal ones both stay.
     pairs = cKDTree(unit).query_pairs(distance, output_type="ndarray")
     first_rows = pairs[:, 0]
     second_rows = pairs[:, 1]
@@ -221,6 +222,7 @@ class BoundSearch:
         n_optima = len(self.optima)
         present = self.samples + self.plateau_samples
         if self.plateau_samples:
+            # With the present fraction of samples on plateaus, and 1 % more so that they suffice
             needed = ceil(1.01 * SEARCH.max_on_plateaus * present / self.plateau_samples)
         else:  # the positive root N of N (N − 1) = W (W + 1) / fraction
             product_needed = n_optima * (n_optima + 1) / SEARCH.max_uncovered
@@ -416,6 +418,8 @@ class SingleLinkage:
                 continue
             distance = critical_distance(len(rows), len(cut.uncertain_inputs), sigma)
             for start in rows_without_better_neighbour(unit, values, distance):
+                # One descent for each plateau: it goes nowhere, but counts as the optimum of its
+                # value.
                 if is_tied[start]:
                     value = float(values[start])
                     if any(abs(value - plateau) <= tolerance for plateau in state.plateaus):
@@ -442,6 +446,7 @@ class SingleLinkage:
             return
         optimum = cut.descend(start, bound)
         self._record(optimum)
+        # A hump on the straight line says that the descent has passed from one basin to another.
         step = cut.unit(optimum.point[None])[0] - start
         if np.abs(step).max() <= SEARCH.careful_first_step:
             return
@@ -462,6 +467,7 @@ class SingleLinkage:
             elif optimum.value < optima[index].value:
                 optima[index] = optimum
             if self.has_kinks:
+                # A new optimum may show that an earlier one was a stall.
                 optima[:] = [x for x in optima if not self._is_stall(cut, x, optima)]
 
     def _is_stall(self, cut: CutSearch, optimum: Optimum, optima: Sequence[Optimum]) -> bool:
@@ -531,6 +537,8 @@ class SingleLinkage:
         missing = count - len(rows)
         if missing <= 0:
             return
+        # The seed of each cut and round is its own, so that samples do not depend on the other
+        # cuts.
         rng = np.random.default_rng([SEED, 1 + cut.level, seed])
         unit = rng.random((missing, len(cut.uncertain_inputs)))
         states = [self.states[cut.level, bound] for bound in bounds]

@@ -56,6 +56,7 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = T
         level_points = [lower]
         if lower < upper:
             if by_level and inner:
+                # Hanss (2005): with them level j has one point more than the level above.
                 level_points += [(left + right) / 2 for left, right in pairwise(by_level[-1])]
             level_points.append(upper)
         by_level.append([_listed_point(x, points, number.support.width) for x in level_points])
@@ -86,6 +87,7 @@ def level_grids(domain: Domain, *, inner: bool) -> list[Grid]:
 
 def bounds_at(campaign: Campaign, domain: Domain, points: Array, method: str) -> Bounds:
     """Evaluate points (n, inputs), equal ones once, and return the bounds that they attain."""
+    # Levels may share points, and each is evaluated once.
     distinct = np.unique(points, axis=0)
     return bounds_of_samples(domain, Samples(distinct, campaign(distinct)), method)
 
@@ -209,6 +211,7 @@ def _sample_count(signs: Signs, grids: list[Grid]) -> float:
     for level_signs, grid in zip(signs, grids, strict=True):
         counts = np.array([len(points) for points in grid], float)
         has_no_sign = np.unique(level_signs == 0, axis=0)
+        # Two opposite corners of the inputs with a sign, times all points of the inputs without
         total += 2 * np.where(has_no_sign, counts, 1.0).prod(axis=1).sum()
     return total
 
@@ -292,6 +295,7 @@ def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -
     for level in range(len(lowers)):
         lower: Array = lowers[level]
         upper: Array = uppers[level]
+        # A crisp input has one point, whatever its sign.
         signs = np.where(upper == lower, np.int8(1), signs)
         if (signs == 0).any():
             observed = _observed_signs(model, lower, upper, nominal=domain.nominal, stated=signs)
@@ -336,6 +340,8 @@ def _observed_signs(
     """
     free = np.flatnonzero((stated == 0).any(axis=0))
     nominal_slopes = _slopes(model, lower, upper, points=nominal[None], inputs=free)[0]
+    # The corners are a guess from the slopes at one point; a wrong guess shows in slopes of both
+    # signs.
     first = np.sign(nominal_slopes).astype(np.int8)
     corners = _extreme_corners(np.where(stated != 0, stated, first), lower, upper)
     inside = lower + quasi_random_points(len(lower), 4) * (upper - lower)
@@ -344,6 +350,7 @@ def _observed_signs(
     smallest = slopes.min(axis=0)
     largest = slopes.max(axis=0)
     margin = 0.05 * (largest - smallest)
+    # The margin: slopes that vary much over the probes may change their sign between them.
     rises = (smallest > 0) & (smallest >= margin)
     falls = (largest < 0) & (-largest >= margin)
     has_no_effect = (smallest == 0) & (largest == 0)  # either end will do

@@ -40,6 +40,7 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
     for _ in range(64):  # the fixed-point iteration g = (1 + g)^(1/(d + 1)) converges to g
         root = (1 + root) ** (1 / (dimension + 1))
     step = root ** -np.arange(1.0, dimension + 1)
+    # The multiples of irrational steps, taken modulo 1, never repeat, and leave no large gap.
     k = np.arange(skip + 1, skip + count + 1)[:, None]
     return np.asarray((0.5 + k * step) % 1.0)
 
@@ -99,6 +100,8 @@ class Domain:
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():
             if isinstance(number, ClaimedNumber):
+                # The cut of the lowest level is the widest: if the values decide it, they decide
+                # all.
                 number.cut(alpha[0])  # raises where the values do not decide the cut
                 inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
@@ -129,6 +132,7 @@ class Domain:
         """
         lower, upper = self.boxes
         tolerance = 1e-12 * (upper[0] - lower[0])
+        # All boxes and points at once: the arrays have the shape (levels, points, inputs).
         above = (points >= (lower - tolerance)[:, None]).all(axis=2)
         below = (points <= (upper + tolerance)[:, None]).all(axis=2)
         return np.asarray(above & below)

@@ -105,6 +105,7 @@ class ClaimedNumber(FuzzyNumber):
 
     def cut(self, alpha: float) -> Cut:
         """Return the α-cut at `alpha` in [0, 1]; refused below `decided`, where it has no end."""
+        # Below this level an end lies beyond all values, where nothing is known.
         if checked_level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"
             cure = "give bounds=(lower, upper), what is physically possible, or measure more"

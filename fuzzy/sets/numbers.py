@@ -225,6 +225,7 @@ class _Nested(FuzzyNumber):
         levels = checked_levels(self.alpha)
         lower = tuple(float(end) for end in self.lower)
         upper = tuple(float(end) for end in self.upper)
+        # The cut at 0 is the support, without which no number is bounded.
         is_complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
         is_complete = is_complete and len(levels) == len(lower) == len(upper)
         last = "to" if self.to_one else "up to"
@@ -290,6 +291,7 @@ class Stepwise(_Nested):
 
     def cut(self, alpha: float) -> Cut:
         """The cut that holds at `alpha` in [0, 1]."""
+        # The last level that is not above α
         at = bisect_right(self.alpha, checked_level(alpha)) - 1
         return Cut(self.lower[at], self.upper[at])
 
@@ -318,6 +320,8 @@ def outer_steps(
         upper: Upper ends of the cuts, shape (A,).
         encloses: Name of a set as of `FuzzyNumber.encloses`.
     """
+    # A level such as 0.1 + 0.2 lies above 0.3 by rounding. The cut at 0.3 would then be the wider
+    # one of the level below.
     levels = [min(float(level), round(float(level), 12)) for level in alpha]
     levels[0] = 0.0
     return Stepwise(tuple(levels), tuple(lower), tuple(upper), encloses)

@@ -93,6 +93,7 @@ class AreaWeighted:
         Args:
             fraction: Fractions in [0, 1], any shape; 1e-12 is rounding of the cumulated weights.
         """
+        # The first value at which the cumulated weight reaches the fraction
         row = np.searchsorted(self.cumulated, np.asarray(fraction) - 1e-12)
         return np.asarray(self.values[np.minimum(row, len(self.values) - 1)])
 
@@ -138,6 +139,7 @@ class AreaWeighted:
         """
         count = int(self.groups.max()) + 1
         for _ in range(number):
+            # Whole groups are drawn: cells of one packing are not independent of each other.
             repetitions = np.bincount(generator.integers(count, size=count), minlength=count)
             weights = self.weights * repetitions[self.groups]
             yield weights / weights.sum()
@@ -165,6 +167,8 @@ class AreaWeighted:
         )
         distances = []
         for weights in self.bootstrap_weights(number, generator):
+            # Both functions are constant between the values, and step up at the last of equal
+            # values.
             differences = (np.cumsum(weights) - self.cumulated)[self._is_step]
             distances.append(np.abs(differences).max())
         return float(np.quantile(distances, level))

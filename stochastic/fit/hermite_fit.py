@@ -66,6 +66,7 @@ class HermiteFit:
         if weights is not None:
             cumulated = np.minimum(np.cumsum(weights), 1.0)
         probability = np.append(0.0, cumulated)
+        # Rounding of the sum must not cut off the end of the last step.
         probability[-1] = 1.0
 
         # The normal equations have the right-hand sides ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ for h2 and
@@ -89,6 +90,7 @@ class HermiteFit:
             sample: Reduced radii between the limits.
             slopes: Slopes (a2, a4) of the map.
         """
+        # Midpoints of equal probabilities: the mean over θ is the mean over them.
         probability = (np.arange(20_000) + 0.5) / 20_000
         fitted = self.map(slopes)(self.distribution.quantile(probability))
         return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
@@ -172,9 +174,11 @@ class HermiteFit:
         """
         from scipy.optimize import nnls
 
+        # In the norm of the Gram matrix |slopes − best| is the distance of the maps.
         L = np.linalg.cholesky(self._gram)
         G_transposed = np.linalg.solve(L, self.slope_derivatives)
         h = -self.base_slopes - self.slope_derivatives.T @ best
+        # Rows of unit length keep the problem well scaled.
         scale = np.linalg.norm(G_transposed, axis=0)
         system = np.vstack([G_transposed / scale, h / scale])
         target = np.array([0.0, 0.0, 1.0])
@@ -203,6 +207,7 @@ class SlopeBand:
         lower, fitted, upper = np.array([self.a2, self.a4]).T
         lower = np.minimum(np.clip(lower, min_end, max_end), fitted)
         upper = np.maximum(np.clip(upper, min_end, max_end), fitted)
+        # At 0 only the fitted slopes are left, which are monotone.
         for fraction in np.linspace(1, 0, 201):
             low = fitted + fraction * (lower - fitted)
             high = fitted + fraction * (upper - fitted)
@@ -240,6 +245,7 @@ def slope_band(
     all_weights = sample.bootstrap_weights(resamples, generator)
     resampled_slopes = [fit.slopes(sample, weights) for weights in all_weights]
     standard_errors = np.std(resampled_slopes, axis=0, ddof=1)
+    # Groups are numbered from 0.
     degrees_of_freedom = sample.groups.max()
     quantile = float(stdtrit(degrees_of_freedom, 1 - (1 - level) / 4))
     a2_half = quantile * float(standard_errors[0])
@@ -285,6 +291,8 @@ class PBox:
         """
         steps = sample.steps
         distribution = self.fit.distribution
+        # The functions are inverted by a table of radii, whose spacing is about 1e-4 in
+        # probability.
         theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 20_001), float)
         smallest_radius, largest_radius = self.bounds(theta)
         probability = distribution.cdf(theta)
@@ -332,6 +340,7 @@ def least_pbox(
     for corner, (a2_end, a4_end) in enumerate(product((0, 1), (2, 3))):
         is_monotone[corner, :, a2_end] = -derivatives[0]
         is_monotone[corner, :, a4_end] = -derivatives[1]
+    # 1e-9 allows for the rounding of slopes that lie on the limit.
     base_slopes = np.tile(fit.base_slopes + 1e-9, 4)
 
     contains, bounds = _containment(fit, sample, band)

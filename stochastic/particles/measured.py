@@ -133,6 +133,7 @@ def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
     not_round_area = 0.0
     for piece in measure.regionprops(_label_particles(phase)):  # type: ignore[no-untyped-call]
         top, left, bottom, right = piece.bbox
+        # The circle of a piece that the edge cuts is not known.
         if min(top, left) == 0 or bottom == rows or right == columns:
             continue
         if piece.area < np.pi * MIN_RADIUS**2 or piece.solidity < 0.9:
@@ -186,6 +187,7 @@ def _particle_mask(picture: Array, name: str) -> Mask:
         allowed="images of two greys, 3 standard deviations apart",
         cure="average the image before",
     )
+    # A matrix fills little of its convex hull: it has holes where the particles are.
     phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
     unevenness = _unevenness(smooth, ~phase) / contrast
     require(
@@ -206,6 +208,7 @@ def _label_particles(phase: Mask) -> NDArray[np.int_]:
     from scipy import ndimage
     from skimage import feature, measure, segmentation
 
+    # Smoothing by a pixel removes the false peaks of a ragged outline.
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(phase), 1.0)
     parts = measure.label(phase)  # type: ignore[no-untyped-call]
     peaks = feature.peak_local_max(depth, round(MIN_RADIUS), labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]

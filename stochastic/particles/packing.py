@@ -112,10 +112,12 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
         Centres in m, shape (n, d), of particles without overlap; None if one of them was proposed
         1,000 times in vain.
     """
+    # Small particles still find gaps when the large ones are placed; the reverse would fail early.
     order = np.argsort(-radii, kind="stable")
     sorted_radii = radii[order]
     placed: Array = np.zeros((0, len(box)))
     while len(placed) < len(order):
+        # Blocks of one and a half times the placed number keep the count of blocks logarithmic.
         block = slice(len(placed), min(len(order), max(64, int(1.5 * len(placed)))))
         obstacles = _Obstacles(placed, sorted_radii[: len(placed)], box)
         added = _add_block(obstacles, sorted_radii[block], generator)
@@ -239,6 +241,7 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
     # While they repel, the particles are larger, so that none touch in the end: their fraction is
     # three tenths nearer to the densest packing. With more headroom the relaxation takes longer.
     grown_fraction = fraction + 0.3 * (particles.shape.densest - fraction)
+    # The radii grow by the root of the fraction, and by 1e-4 at least, so that a gap is left.
     growth = max(1 + 1e-4, float((grown_fraction / fraction) ** (1 / len(box))))
     return _shake(_push(particles, growth), generator)
 
@@ -359,6 +362,7 @@ def _shake(particles: Particles, generator: np.random.Generator) -> Array:
             length = reach * generator.random(len(radii)) ** (1 / dimensions)
             proposal = centres + length[:, None] * direction
             is_rejected = np.zeros(len(radii), bool)
+            # Each pair is seen from either side.
             for mover, neighbour in ((first, second), (second, first)):
                 for positions in (centres, proposal):
                     offset = nearest_image(positions[neighbour] - proposal[mover], box)

@@ -90,6 +90,7 @@ def size_classes(radii: Array) -> Iterator[Ints]:
     number = np.zeros(len(radii))
     largest = radii.max(initial=0.0)
     if largest > 0:
+        # In one search of all sizes the largest radius would decide how many pairs are looked at.
         number = np.floor(np.log2(np.maximum(radii, largest * 2.0**-20) / largest))
     for value in np.unique(number):
         yield np.flatnonzero(number == value)
@@ -223,6 +224,7 @@ def _periodic_images(discs: Particles, margin: float) -> tuple[Ints, Array]:
             continue
         shift = discs.size * tile
         image = discs.centres + shift
+        # Farther images are out of reach of every disc in the box.
         is_near = ((image > -margin) & (image < discs.size + margin)).all(axis=1)
         indices.append(originals[is_near])
         shifts.append(np.broadcast_to(shift, (int(is_near.sum()), 2)))

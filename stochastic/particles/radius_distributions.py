@@ -64,6 +64,7 @@ class LogNormalRadii:
     def __call__(self, theta: ArrayLike) -> Array:
         """Return the radius at `theta` (any shape), in m."""
         radius = np.exp(self.mu + self.sigma * np.asarray(theta, float))  # eq. 11
+        # Rounding of exp must not pass the ends, which packings rely on.
         return np.clip(radius, self.smallest, self.largest)
 
     def cdf(self, radius: ArrayLike) -> Array:

@@ -201,6 +201,7 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
+        # Else the one disc lies within the other, and there is no wall.
         walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
         pairs = walls.joined(_bounding_pairs(discs, portion))
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
@@ -263,6 +264,7 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     to_upper = inner - place
     columns = [place[:, 0], to_upper[:, 0], place[:, 1], to_upper[:, 1]]
     edge_distance = np.stack(columns, axis=1)  # D of the four edges
+    # A cell with a wall at the edge of the window is cut.
     is_cut = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
     disc = np.flatnonzero((reach <= edge_distance).all(axis=1) & ~is_cut)
     value = discs.size.tolist()

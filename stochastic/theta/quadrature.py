@@ -77,6 +77,7 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
         0.9733
     """
     checked_number("points", points, whole=True, least=1)
+    # An object that is compared by identity would keep its place in the cache for itself alone.
     if isinstance(distribution, Hashable) and type(distribution).__hash__ is not object.__hash__:
         return _cached_rule(distribution, points)
     return _stieltjes_rule(distribution, points)
