@@ -96,7 +96,9 @@ class StiffnessBounds:
         min_shear, max_shear = self.shear(average)
         softest = [min_shear]
         stiffest = [max_shear]
-        low, high = 0.0, np.inf  # where there is no bound
+        # where there is no bound
+        low = 0.0
+        high = np.inf
         if self.dimension == 2:
             top = float(np.clip(1.5 * max_bulk, min_shear, max_shear))
             softest = stiffest = [min_shear, top, max_shear]
@@ -175,7 +177,8 @@ class StiffnessBounds:
     def _hill(self, modulus: int) -> Enclosure:
         """Return bounds of K (modulus 0) or G (1) of Hill's average of a stiffness of space."""
         min_compliance, max_compliance = self._compliance
-        low, high = 0.0, float("inf")
+        low = 0.0
+        high = float("inf")
         if self.has_lower:
             low = hill_mean(self.lower, max_compliance, modulus, side=-1)
         if self.has_upper:

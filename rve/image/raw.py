@@ -18,13 +18,6 @@ from alphacut.rve.image.spacing import require_spacing
 
 HEADS = (".mhd", ".mha", ".nhdr", ".nrrd")
 """Endings of files with such a head."""
-TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
-    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-    "float": "f4", "double": "f8",
-}  # fmt: skip
-"""NumPy's types by the names of MetaImage and NRRD without "MET_" and spaces."""
-YES = ("true", "t", "1", "yes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +103,16 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     entries = _Entries.of_file(path)
     name = path.name
     data = data_of_head(path)
+    yes = ("true", "t", "1", "yes")
+    # NumPy's types by the names of MetaImage and NRRD without "MET_" and spaces
+    types = {
+        "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+        "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+        "float": "f4", "double": "f8",
+    }  # fmt: skip
     type_name = entries.value("elementtype", "type").lower()
     type_name = type_name.removeprefix("met_").removeprefix("signed ")
-    kind = TYPES.get(type_name.replace("unsigned ", "u").removesuffix("_t"))
+    kind = types.get(type_name.replace("unsigned ", "u").removesuffix("_t"))
     require(kind is not None, name, "a type that is not known", "whole numbers or floats")
 
     sizes = entries.value("dimsize", "sizes").split()
@@ -125,8 +125,9 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
 
     encoding = entries.value("encoding").lower() or "raw"
     is_gzip = encoding in ("gzip", "gz")
-    is_packed = entries.value("compresseddata").lower() in YES or is_gzip
-    is_text = entries.value("binarydata").lower() not in ("", *YES)
+    is_packed = entries.value("compresseddata").lower() in yes or is_gzip
+    binary = entries.value("binarydata").lower()
+    is_text = binary != "" and binary not in yes
     is_read = (encoding == "raw" or is_gzip) and not is_text
     cure = "save it without compression"
     require(is_read, name, f"data in encoding {encoding}", "raw or gzip", cure)
@@ -138,8 +139,9 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     lengths = layout.lengths[np.argsort(layout.axes)]  # along x, y, z
     require_spacing(name, [float(length) for length in lengths], sides)
     keys = "binarydatabyteordermsb", "elementbyteordermsb", "endian"
-    is_big = entries.value(*keys).lower() in (*YES, "big")
-    byte_order: Literal[">", "<"] = ">" if is_big else "<"
+    byte_order: Literal[">", "<"] = "<"
+    if entries.value(*keys).lower() in ("big", *yes):
+        byte_order = ">"
     offset = entries.size
     if data != path:
         offset = _skipped(name, entries, is_packed=is_packed)

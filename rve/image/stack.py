@@ -21,8 +21,6 @@ from alphacut.rve.image.white import as_shown, stored_values
 if TYPE_CHECKING:
     from tifffile import TiffFile
 
-SAVE_AGAIN = "save the volume meant, one number a voxel, with axes ZYX or as .npy"
-
 
 def read_stack(path: Path, sides: Sequence[float]) -> Array:
     """Return the pages of a TIFF file along (z, y, x), bright as large numbers.
@@ -49,6 +47,7 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     # tifffile calls pages that belong together a series. Pages that are alike but are not said to
     # belong together are a series each.
     name = path.name
+    cure = "save the volume meant, one number a voxel, with axes ZYX or as .npy"
     series = list(file.series)
     kinds = {(one.axes, one.shape, one.dtype.str) for one in series}
     are_pages = len(series) > 1 and len(kinds) == 1 and series[0].axes == "YX"
@@ -69,7 +68,7 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     is_colour = any(a == "S" or (a == "C" and n <= 4) for a, n in pages)
     is_volume = len(pages) == 1 and not is_colour
     what = f"axes {axes} of {' × '.join(map(str, shape))}"
-    require(is_volume, name, what, "pages along z, rows, columns", SAVE_AGAIN)
+    require(is_volume, name, what, "pages along z, rows, columns", cure)
 
     # Sizes are held against memory and the file before anything is read.
     require_memory([n for n in spatial if n > 1])
@@ -89,11 +88,11 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     values = np.squeeze(values)
     if has_colours:
         is_grey = bool((values == values[..., :1]).all())
-        require(is_grey, name, f"{what}, in colours", "one number a voxel", SAVE_AGAIN)
+        require(is_grey, name, f"{what}, in colours", "one number a voxel", cure)
         values = values[..., 0]
     photometrics = {one.keyframe.photometric for one in series}
     is_alike = len(photometrics) == 1
-    require(is_alike, name, "pages of unlike brightness", "pages alike", SAVE_AGAIN)
+    require(is_alike, name, "pages of unlike brightness", "pages alike", cure)
     return as_shown(name, values, photometrics.pop())
 
 
@@ -132,7 +131,8 @@ def _spacing(file: TiffFile) -> tuple[float, float, float]:
     # Without a unit of length ImageJ's spacing is in pixels.
     has_unit = str(head.get("unit", "")).lower() not in ("", "pixel", "pixels", "null")
     if not has_unit and (math.isnan(x) or x == y == 1):
-        x, y = 1.0, 1.0
+        x = 1.0
+        y = 1.0
     return x, y, float(head["spacing"])
 
 

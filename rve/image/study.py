@@ -364,7 +364,8 @@ class FuzzyImageStiffness:
         rows = []
         for name, bounds in {"E": self.young, **self.constants}.items():
             for row, alpha in enumerate(self.alpha):
-                lower, upper = float(bounds[row, 0]), float(bounds[row, 1])
+                lower = float(bounds[row, 0])
+                upper = float(bounds[row, 1])
                 rows.append((name, f"{alpha:g}", f"{lower!r}", f"{upper!r}", str(GUARANTEE)))
         text = csv_text(("constant", "alpha", *SIDES, "guarantee"), rows)
         Path(path).write_text(text, encoding="utf-8")

@@ -99,7 +99,8 @@ def _pixel_means(element: Element, side: SideSolution | None, division: int) -> 
     if side is None:
         return None
     fields = side.fields
-    n_loads, fine_grid = fields.shape[0], fields.shape[2:]
+    n_loads = fields.shape[0]
+    fine_grid = fields.shape[2:]
     uniform_modes = element.mean_modes(np.eye(n_loads))
     # The modes are coefficients of orthonormal polynomials, and those of a uniform field belong to
     # the constant polynomial alone. So the least squares that give the uniform field nearest to the

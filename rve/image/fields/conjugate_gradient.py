@@ -10,14 +10,11 @@ field comes out; stopping early only widens them.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from alphacut.base.errors import FailedError
 from alphacut.rve.image.fields.grid import Fields, namespace, slabs
-
-LOG = logging.getLogger(__name__)
 
 LinearMap = Callable[[Fields], Fields]
 """A symmetric linear map of a field, shape (1, unknowns, *grid)."""
@@ -76,10 +73,9 @@ class ConjugateGradient:
         # The energy error is at most error_factor · gamma: gamma is the energy that the field lacks
         # in the constant material.
         error_factor = 1 / system.min_energy_ratio
-        for iteration in range(max_iterations):
+        for _ in range(max_iterations):
             self.watch()
             if error_factor * gamma <= self.accuracy * system.scale:
-                LOG.debug("a field on %s points: %d iterations", x.shape[2:], iteration)
                 return x
             forces = system.operator(direction)
             curvature = inner(direction, forces)

@@ -62,19 +62,24 @@ class Basis:
     places: tuple[Place, ...] = (Place(),)
 
 
-LINEAR = Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
-B_SPLINES = Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2)))
-QUADRATIC = Basis(  # with the values at 0, 1/2 and 1 as unknowns
-    functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
-    owners=((0, 0), (1, 0), (0, 1)),
-    places=(Place(), Place(0.5)),
-)
-HERMITE = Basis(  # with value and slope at 0, and value and slope at 1, as unknowns
-    functions=((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1)),
-    owners=((0, 0), (1, 0), (0, 1), (1, 1)),
-    places=(Place(), Place(is_odd=True)),
-)
-BASES = {(2, False): QUADRATIC, (2, True): HERMITE, (3, False): LINEAR, (3, True): B_SPLINES}
+BASES = {
+    # values at both ends
+    (3, False): Basis(((1, -1), (0, 1)), ((0, 0), (0, 1))),
+    # quadratic B-splines, which sum to 2
+    (3, True): Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2))),
+    # values at 0, 1/2 and 1
+    (2, False): Basis(
+        functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
+        owners=((0, 0), (1, 0), (0, 1)),
+        places=(Place(), Place(0.5)),
+    ),
+    # Hermite's functions, with value and slope at 0, and value and slope at 1
+    (2, True): Basis(
+        functions=((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1)),
+        owners=((0, 0), (1, 0), (0, 1), (1, 1)),
+        places=(Place(), Place(is_odd=True)),
+    ),
+}
 """Basis by the dimension and by whether it is that of stresses."""
 SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}
 """Indices of the shear components in Voigt's order, by the dimension: 12, or 23, 13, 12."""

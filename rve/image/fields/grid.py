@@ -22,8 +22,6 @@ from alphacut.rve.image.fields.kernels import apply_by_rows
 
 SLAB_CELLS = 6144
 """Cells times fields that are worked on at once: what the second cache holds. More are slower."""
-DEVICE_SLAB_CELLS = 1 << 20
-"""The same on a device, which works on more at once; a larger number takes more than a few GB."""
 
 Fields = Any
 """Array of NumPy or of a device."""
@@ -126,7 +124,9 @@ class Operator:
 def slabs(fields: Fields) -> Iterator[slice]:
     """Yield slices of the first axis of the grid, each of about `SLAB_CELLS` cells times fields."""
     layers = fields.shape[2]
-    size = SLAB_CELLS if isinstance(fields, np.ndarray) else DEVICE_SLAB_CELLS
+    size = SLAB_CELLS
+    if not isinstance(fields, np.ndarray):
+        size = 1 << 20  # a device works on more at once; a larger number takes more than a few GB
     cells_of_layer = fields.shape[0] * math.prod(fields.shape[3:])
     count = max(1, size // cells_of_layer)
     for start in range(0, layers, count):

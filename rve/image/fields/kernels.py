@@ -96,7 +96,8 @@ def _apply(
     strips = np.zeros((len(terms), n, n, n * nx))  # (term, mode along z, y % n, modes along x)
     sums = np.zeros((len(terms), n, n, n * nx))  # (term, y % n, mode along z, modes along x)
     modes = np.zeros((6, n, n, n * nx))
-    lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
+    lines = np.zeros((n, n * nx))
+    shifted = np.empty((n, n, nx))
     for z in range(nz):
         # A row of voxels takes the strips of n rows of unknowns, from y to y + n − 1. They are kept
         # in a ring of n, so that each further row of voxels computes one.
@@ -111,13 +112,18 @@ def _apply(
             for c in range(6):
                 modes[c, 0, 0, :nx] += uniform[c]
             # from modes of the strain to those of its conjugate, in place
-            of_trace, of_deviator = trace[z, y], deviator[z, y]
+            of_trace = trace[z, y]
+            of_deviator = deviator[z, y]
             for i in range(n):
                 for j in range(n):
                     for k in range(n):
                         row = slice(k * nx, (k + 1) * nx)
-                        xx, yy, zz = modes[0, i, j, row], modes[1, i, j, row], modes[2, i, j, row]
-                        yz, xz, xy = modes[3, i, j, row], modes[4, i, j, row], modes[5, i, j, row]
+                        xx = modes[0, i, j, row]
+                        yy = modes[1, i, j, row]
+                        zz = modes[2, i, j, row]
+                        yz = modes[3, i, j, row]
+                        xz = modes[4, i, j, row]
+                        xy = modes[5, i, j, row]
                         for x in range(nx):
                             twice = 2.0 * of_deviator[x]
                             mean = (of_trace[x] - twice / 3.0) * (xx[x] + yy[x] + zz[x])
@@ -153,10 +159,12 @@ def _fill_modes(
 
     `modes` is changed in place; its shape is (component and its modes, fields, voxels).
     """
-    n, nx = tables.shape[-1], fields.shape[-1]
+    n = tables.shape[-1]
+    nx = fields.shape[-1]
     strips = np.zeros((len(terms), n, n, n * nx))
     by_component = np.zeros((6, n, n, n * nx))
-    lines, shifted = np.zeros((n, n * nx)), np.empty((n, n, nx))
+    lines = np.zeros((n, n * nx))
+    shifted = np.empty((n, n, nx))
     for a in range(len(fields)):
         for y in range(first + 1 - n, last):
             _fill_strips(
@@ -238,15 +246,18 @@ def _add_forces(
     nz, ny, nx = result.shape[1:]
     for start, stop in groups:
         _, u, _, _, dx = terms[start]
-        shifted[:], lines[:] = 0.0, 0.0
+        shifted[:] = 0.0
+        lines[:] = 0.0
         for term in range(start, stop):
-            dz, row_sums = terms[term, 2], sums[term, y % n]
+            dz = terms[term, 2]
+            row_sums = sums[term, y % n]
             for a in range(n):
                 weights = tables[0, dz, :, a]
                 _add_combination(lines[a], (n - dx) * nx, n - dz, factors[term], weights, row_sums)
             row_sums[:] = 0.0
         for a in range(n):
-            row, by_mode = result[u, (z + a) % nz, y % ny], lines[a].reshape(n, nx)
+            row = result[u, (z + a) % nz, y % ny]
+            by_mode = lines[a].reshape(n, nx)
             for f in range(n):
                 _add_combination(shifted[a, f], nx, n - dx, 1.0, tables[2, dx, :, f], by_mode)
                 for x in range(nx - f):
@@ -265,7 +276,8 @@ def _add_combination(
     """
     a = factor * weights[0]  # sources are indexed in the loops: a view of a row takes as long
     if taps == 3:
-        b, c = factor * weights[1], factor * weights[2]
+        b = factor * weights[1]
+        c = factor * weights[2]
         for x in range(size):
             out[x] += a * sources[0, x] + b * sources[1, x] + c * sources[2, x]
     elif taps == 2:

@@ -112,7 +112,9 @@ def _unwrapped_pieces(
         is_link = (other >= 0) & ((other != label) | period.any(axis=1))
         rows.append(np.column_stack([label, other, period])[is_link])
     links = np.unique(np.concatenate(rows), axis=0)
-    first, second, periods = links[:, 0], links[:, 1], links[:, 2:]
+    first = links[:, 0]
+    second = links[:, 1]
+    periods = links[:, 2:]
 
     # Breadth first from a root that is linked to the first piece of each pore
     graph = csr_array((np.ones(len(links)), (first, second)), (count, count))
