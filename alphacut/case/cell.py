@@ -37,7 +37,7 @@ class CellContent(Section, defer_build=True):
     stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)]
     """stages that `alphacut run` computes"""
     shares: bool = True
-    """whether to compute each input's share of the widths"""
+    """whether to compute the fraction of the widths that each input causes"""
     microstructure: object = None
     radius: AnyLaw | None = None
     cell: Cell | None = None

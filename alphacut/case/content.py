@@ -188,7 +188,7 @@ class Content(CellContent):
 
     def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
         """Refuse studies and questions that the structure cannot answer."""
-        # the motion of columns that yield has kinks where they do, and proofs and followers need
+        # the response of columns that yield has kinks where they do, and proofs and followers need
         # derivatives by the inputs
         if yields(structure.model):
             allowed = "auto or quasi-monte-carlo where columns yield"

@@ -93,7 +93,7 @@ Amplitude = Annotated[tuple[FuzzyNumber, str], text(_parse_amplitude)]
 
 
 class ForceSection(Section):
-    """Forces with one course over time; the amplitude on floor 3 is parameter F3.
+    """Forces with one history over time; the amplitude on floor 3 is parameter F3.
 
     A second force on a floor is F3_2, an impulse J3. Of a structure from matrices forces act on
     unknowns, and their parameters are F1, F2 … in their order.
@@ -152,7 +152,12 @@ def with_forces(
 
 @dataclass(frozen=True)
 class Scale:
-    """Scale of every record: a factor, or the value in m/s² of the measure "PGA" or "Sa(T1)"."""
+    """Scale of every record.
+
+    Args:
+        value: A factor or, with a measure, the value in m/s² that each record is scaled to.
+        measure: Intensity measure, "PGA" or "Sa(T1)"; empty for a factor.
+    """
 
     value: float = 1.0
     measure: str = ""
@@ -206,7 +211,7 @@ Files = Annotated[tuple[Recording, ...], text(_read_recordings)]
 class RecordsSection(Section):
     """Suite of records of the ground's acceleration: each moves the structure by itself.
 
-    Each record is corrected, then scaled. A motion lasts as long as its record and
+    Each record is corrected, then scaled. A response lasts as long as its record and
     five natural periods, and at most envelope.duration.
     """
 

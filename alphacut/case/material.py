@@ -42,21 +42,21 @@ Theta = Annotated[float, Quantity(minimum=-10, maximum=10)]
 
 
 class ThetaSection(Section):
-    """Law of θ alone, where a mesh from a file has the geometry."""
+    """Distribution of θ alone, where a mesh from a file has the geometry."""
 
     theta: Annotated[tuple[Theta, Theta], after(rising)] = (-3.0, 3.0)
     """support of θ"""
 
     @property
-    def law(self) -> TruncatedNormal:
-        """Law of θ, a normal one cut off at both ends."""
+    def distribution(self) -> TruncatedNormal:
+        """Distribution of θ, a normal one that is cut off at both ends."""
         lower, upper = self.theta
         return TruncatedNormal(lower, upper)
 
     @property
     def nominal(self) -> HermiteMap | TruncatedNormal:
-        """The law of θ, as that of a mesh from a file."""
-        return self.law
+        """The distribution of θ, as that of a mesh from a file."""
+        return self.distribution
 
 
 class RadiusMapSection(ThetaSection):
@@ -81,7 +81,7 @@ class RadiusMapSection(ThetaSection):
         """Return the map at crisp values of its parameters, by their names."""
         # eq. 12: r = Σ a_i H_i(ξ) with the four Hermite functions on −1 ≤ ξ ≤ 1
         a1, a2, a3, a4 = [values[name] for name in self.numbers]
-        return HermiteMap(a1, a2, a3, a4, self.law)
+        return HermiteMap(a1, a2, a3, a4, self.distribution)
 
     def require_consistent(self) -> None:
         """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""

@@ -42,7 +42,7 @@ class PackingSection(Section):
 
     @property
     def radii(self) -> RadiusDistribution:
-        """The law of the radii."""
+        """Distribution of the radii."""
         if self.file is not None:
             return MeasuredRadii.read(self.file)
         assert self.smallest_radius is not None

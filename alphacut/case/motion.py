@@ -1,4 +1,4 @@
-"""Sections on the motion of a structure: envelopes, studies, limits, measured modes."""
+"""Sections on the response of a structure: envelopes, studies, limits, measured modes."""
 
 from __future__ import annotations
 

@@ -384,7 +384,7 @@ class Frame(StructureSection):
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"
         require(has_columns, "frame.damping_ratio", value, allowed)
-        # undamped motions are unusual: whoever wants one says so, as "0 %"
+        # undamped responses are unusual: whoever wants one says so, as "0 %"
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
         is_damped = any(map(self.has_key, DAMPING))

@@ -259,7 +259,7 @@ class Pipeline:
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Return the peaks for questions: of the study with [envelope]'s motion, or computed."""
         for study in self.results.tasks:
-            if study.has_motion_of(task.section):
+            if study.has_response_of(task.section):
                 return self.results.envelopes[study.name].numbers.peak
         if not task.limited:
             return None

@@ -39,7 +39,7 @@ from alphacut.stages.store import Stage, StageContext, StageResult
 
 
 class Times(TypedDict):
-    """Length of a motion and distance of its nodes, in s."""
+    """Length of a response and distance of its time nodes, in s."""
 
     duration: float
     step: float
@@ -70,7 +70,7 @@ class Response:
 
     @property
     def times(self) -> Times:
-        """Length of the motion and distance of its nodes, by the names of arguments."""
+        """Length of the response and distance of its time nodes, by the names of arguments."""
         return {"duration": self.task.duration, "step": self.task.section.step}
 
 

@@ -1,4 +1,4 @@
-"""The cell of a case: its nominal parts and fuzzy inputs, and the model that it asks for."""
+"""The cell of a case: its nominal phases and fuzzy inputs, and the model that it asks for."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class CellProblem:
 
     Args:
         radius: Radius map of a round particle as its section, the map of particles of one size, or
-            the law of θ of a mesh from a file.
+            the distribution of θ of a mesh from a file.
         cell: Its phases.
         mesh: Discretisation.
         modulus: What is computed, and by which model.
@@ -103,7 +103,7 @@ class CellProblem:
 
     @property
     def nominal_radius(self) -> RadiusMap | ThetaDistribution:
-        """Radius map at the nominal values; of a mesh the law of θ."""
+        """Radius map at the nominal values; of a mesh the distribution of θ."""
         if isinstance(self.radius, FractionMap):
             return self.radius
         return self.radius.nominal

@@ -105,7 +105,7 @@ class EnvelopeTask:
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
         return tolerance
 
-    def has_motion_of(self, section: EnvelopeSection) -> bool:
+    def has_response_of(self, section: EnvelopeSection) -> bool:
         """Return whether it has the inputs and the duration of [envelope]."""
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
@@ -165,9 +165,9 @@ class EnvelopeTask:
     def arguments(self, structure: Structure) -> Document:
         """Return the arguments of `frame.envelope` and `frame.require_envelope` from the case."""
         section, method = self.section, self.section.method
-        arguments = {**self._motion(structure), "model": structure.model, "method": method}
+        arguments = {**self._response(structure), "model": structure.model, "method": method}
         arguments["integrator"] = section.integrator
-        # without a tolerance in the case, method auto takes any gap that is proved
+        # without a tolerance in the case, method auto takes any guaranteed gap
         takes_any_gap = method == "auto" and section.tolerance is None
         if not takes_any_gap and hasattr(frame.METHODS[method], "tolerance"):
             tolerance = self.tolerance(structure).value
@@ -178,10 +178,11 @@ class EnvelopeTask:
     def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
         """Return the peaks of the limited outputs, by the method that bounds them most closely."""
         structure.require_quantities("limits", outputs_of(self.limited))
-        motion = self._motion(structure)
-        return close_peaks(structure.model, names=self.limited, progress=progress, **motion)
+        response = self._response(structure)
+        return close_peaks(structure.model, names=self.limited, progress=progress, **response)
 
-    def _motion(self, structure: Structure) -> dict[str, Any]:
+    def _response(self, structure: Structure) -> dict[str, Any]:
+        """Return the arguments that say which response is meant, by name."""
         return {
             "inputs": structure.inputs(self.fuzzy),
             "duration": self.duration,
@@ -209,7 +210,7 @@ def tasks(
     if not found:
         found = [EnvelopeTask("all", section.fuzzy, section.duration, section)]
     return tuple(
-        replace(task, limited=limited) if task.has_motion_of(section) else task for task in found
+        replace(task, limited=limited) if task.has_response_of(section) else task for task in found
     )
 
 

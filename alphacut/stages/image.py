@@ -1,4 +1,4 @@
-"""Stage modulus of an image: proved bounds of its stiffness, in the units of results."""
+"""Stage modulus of an image: guaranteed bounds of its stiffness, in the units of results."""
 
 from __future__ import annotations
 

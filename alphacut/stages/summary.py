@@ -115,7 +115,7 @@ class Results:
 
     @property
     def damping(self) -> dict[str, tuple[float, float, float]]:
-        """Least, nominal and greatest damping ratios that the material gives, by name."""
+        """Smallest, nominal and largest damping ratios that the material gives, by name."""
         if self.structure is None or not self.content.has_material_damping:
             return {}
         return {

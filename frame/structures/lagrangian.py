@@ -39,7 +39,7 @@ class LagrangianSystem(StructureModel):
     Raises:
         RefusedError: A name or unit is out of alphabet, L is not quadratic in v, a coordinate has
             no inertia, or a function asks for what is not there or gives a list of another length.
-            Functions that are not smooth are refused by a motion.
+            Functions that are not smooth are refused when a trajectory is computed.
 
     Example:
         >>> oscillator = LagrangianSystem(

@@ -383,7 +383,7 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     # An eigenvalue below the rounding of the largest one, some n 1e-16 of it, is arbitrary, and the
     # derivative of √λ in D is infinite at 0.
     ratio = (squared / largest).min()
-    what = f"such that a squared frequency is {ratio:.1e} of the greatest"
+    what = f"such that a squared frequency is {ratio:.1e} of the largest"
     cure = "support what moves freely, join storeys that are too stiff, or give dampers"
     require(ratio > 1e-12, "stiffness", value=what, allowed="more than 1e-12 of it", cure=cure)
 
@@ -450,7 +450,7 @@ class _DividedDifferences(NamedTuple):
 
 
 def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
-    """Return f[λ_i, λ_j] and f[λ_i, λ_k, λ_j], by [i, j] and [i, k, j], of a part of f = 2 √λ.
+    """Return f[λ_i, λ_j] by [i, j] and f[λ_i, λ_k, λ_j] by [i, k, j], of f = 2 √λ at some modes.
 
     Args:
         omega: ω = √λ of n modes at S parameter sets, shape (S, n). Modes inside may have equal

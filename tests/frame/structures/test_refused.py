@@ -134,7 +134,7 @@ def test_a_lagrangian_system_refuses(changes, message):
         (lambda: COLUMNS.group("zeta"), "parameter is zeta; allowed: m, l, c, d"),
         (
             lambda: LinearFlow(FLOATING, ("m",), 1.0, 0.1).values(ONE),
-            "squared frequency is .* of the greatest; allowed: more than 1e-12",
+            "squared frequency is .* of the largest; allowed: more than 1e-12",
         ),
         (lambda: pendulum(length=-1.0), "length is -1.0; allowed: finite numbers greater"),
         (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
