@@ -76,7 +76,7 @@ class Answer(ABC):
         rows = self.records()
         # An empty cell is an unknown number in every spreadsheet.
         cells = [["" if x is None else str(x) for x in row.values()] for row in rows]
-        Path(path).write_text(csv_text([*rows[0]], cells), encoding="utf-8")
+        Path(path).write_text(csv_text(_titles(rows), cells), encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the rows of numbers as an xarray dataset.
@@ -87,12 +87,19 @@ class Answer(ABC):
 
         rows = self.records()
         variables = {}
-        for title in rows[0]:
+        for title in _titles(rows):
             column = [row[title] for row in rows]
             # A column of unknown numbers alone is one of numbers.
             is_text = any(isinstance(value, str) for value in column)
             variables[title] = ("row", np.array(column, str if is_text else float))
         return xarray.Dataset(variables, attrs={"title": self.title, "notes": self.all_words()})
+
+
+def _titles(rows: Sequence[Record]) -> list[str]:
+    """Return the titles of the columns of rows; none if there are no rows."""
+    if not rows:
+        return []
+    return list(rows[0])
 
 
 def enclosing_box_words(encloses: str) -> str:

@@ -44,6 +44,15 @@ def test_records_have_exact_numbers():
     assert "1234560.0" in rows.getvalue()
 
 
+def test_a_csv_file_has_the_rows_and_none_of_a_refuted_frame(tmp_path):
+    for answer in (LEARNED, REFUTED):
+        answer.to_csv(tmp_path / "learned.csv")
+        with (tmp_path / "learned.csv").open(encoding="utf-8", newline="") as file:
+            _, *rows = csv.reader(file)
+        assert [row[0] for row in rows] == [row["input or mode"] for row in answer.records()]
+        assert answer.to_dataset().sizes.get("row", 0) == len(answer.records())
+
+
 @pytest.mark.parametrize("answer", [LEARNED, REFUTED])
 def test_a_document_gives_the_same_answer(answer):
     document = json.loads(as_json(to_document(answer)))
