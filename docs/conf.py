@@ -84,8 +84,9 @@ def with_keys(
     from alphacut.case.parse import allowed_values
     from alphacut.case.types import Section
 
-    is_section = isinstance(documented, type) and issubclass(documented, Section)
-    fields = documented.described_fields() if is_section else {}
+    fields: dict[str, FieldInfo] = {}
+    if isinstance(documented, type) and issubclass(documented, Section):
+        fields = documented.described_fields()
     rows = [
         (f"``{key}``", described(field), allowed_values(field), default(field))
         for key, field in fields.items()
