@@ -1,85 +1,121 @@
-"""Numbers of the frame's methods that were tuned: they decide time and width, never validity.
+"""Tuned numbers of the methods of this room.
 
-Each has its reason; a test halves and doubles them and sees the same bounds hold.
+They decide how long a method takes and how wide its bounds are, never whether the bounds hold:
+`tests/frame/test_numbers.py` halves and doubles each of them and checks the same bounds. Each says
+what a larger number would do.
 """
 
+# Branch and bound over boxes of inputs (`bounds.spatial_branch_and_bound`).
+
 WIDE = 0.1
-"""Gap of a peak, as a fraction of it, above which bounds elsewhere are worth little either: all
-nodes are bounded anew on its halves. Peaks lie within a few per cent where the models are good."""
+"""Gap of a peak, as a fraction of the peak, above which all nodes of a sub-box are bounded anew
+after a bisection, because bounds elsewhere are worth little either. A larger number saves time and
+leaves wider bounds below the peaks. Peaks lie within a few per cent where the models are good."""
 GRACE = 8
-"""Boxes that are bounded before the progress of a gap counts: the first bisections of several
-inputs close little."""
+"""Sub-boxes of a peak that are bounded before the progress of its gap is judged. A larger number
+spends more time on hopeless gaps; a smaller one gives up too early, because the first bisections of
+several inputs close little."""
 MIN_GAP_PROGRESS = 0.8
-"""A gap is left where it has fallen by less than this fraction of an even fall over all boxes."""
+"""Fraction of an even fall of the gap over all sub-boxes below which a gap is left as it is. A
+larger number gives up earlier."""
 GAP_POWER = 3.0
-"""Power of the inputs' widths with which gaps fall at least; remainders are of fourth degree."""
+"""Power of the widths of the inputs with which gaps are taken to fall. The remainders fall with the
+fourth power; a larger number expects more of bisections and gives up later."""
 NARROWED = 0.5
-"""Fractions pruned from all inputs, in sum, from which a box is bounded anew, not bisected."""
+"""Sum over the inputs of the pruned fractions of a box from which on the rest is bounded anew
+instead of being bisected. A larger number bisects more often."""
+
+# The dual bound (`bounds.level`, `bounds.node_bounds`, `bounds.pruning`, `bounds.least_peaks`).
 
 TABLE_SPACING = 0.07
-"""Distance of the points of a mode's table along ω and g, as a fraction of its decay."""
+"""Distance of neighbouring points of the table of a mode along ω and g, as a fraction of the decay
+of the mode. A larger number makes tables smaller and bounds wider."""
 PATIENCE = 12
-"""Subgradient steps without a third of the expected fall of D after which less is expected."""
+"""Subgradient steps without a third of the expected fall of the dual function after which less is
+expected. A larger number takes more steps for slightly lower bounds."""
 ASCENTS = 6
-"""Most steps of the model's ascent from one point; with 20 peaks of 13 inputs are 0.01 % lower."""
+"""Largest number of steps of an ascent of the model from one point. With 20 the peaks of 13 inputs
+are 0.01 % lower."""
 CELL_GRACE = 8
-"""Cells of a node after which the fall of its gap counts."""
+"""Cells of a node after which the fall of its gap is judged, as `GRACE` for sub-boxes."""
 MIN_CELL_PROGRESS = 0.5
-"""The effort for a node ends where its gap has fallen by less than this fraction of an even fall
-to what suffices."""
+"""Fraction of an even fall of the gap of a node, to the gap that suffices, below which its effort
+ends. A larger number ends it earlier."""
 EXPECTED_CUBIC = 0.5
-"""Fraction of the cubic parts' sizes that is expected of their sum, in which they partly cancel."""
+"""Sum of the cubic parts over the sum of their magnitudes that is expected: they partly cancel.
+With 1 they are not expected to cancel at all."""
 
 PRUNING_CELLS, PRUNING_STEPS = 24, 40
-"""Most cells of a bound over an end of an input's range, and evaluations of D for each."""
+"""Largest numbers of cells of a bound over an end of the range of an input, and of evaluations of
+the dual function for each cell. Larger numbers prune a little more in more time."""
 LEAST_PEAK_BISECTIONS = 48
-"""Most bisections of cells; three times as many raise the bounds of six storeys by 2 %."""
+"""Largest number of bisections of cells for the smallest peak. Three times as many raise the bounds
+of six storeys by 2 %."""
 LEAST_PEAK_NODES, LEAST_PEAK_STEPS, LEAST_PEAK_PATIENCE = 4, 40, 5
-"""Nodes that are tried in a cell, evaluations of D for each, and `PATIENCE` of them: they begin at
-multipliers of a cell before, so that twice as many steps raise the bounds by less than 0.1 %."""
+"""Nodes that are tried in a cell, evaluations of the dual function for each of them, and their
+`PATIENCE`. The evaluations begin at the multipliers of an earlier cell, so that twice as many steps
+raise the bounds by less than 0.1 %."""
 LEAST_PEAK_DESCENTS = 3
-"""Steps of the descent over corners to a motion that peaks low."""
+"""Steps of the descent over corners to a response with a small peak. More hardly lower it."""
 PEAK_CELLS, PEAK_STEPS = 240, 40
-"""Most cells of a bound above a peak over a sub-box, and evaluations of D for each."""
+"""Largest numbers of cells of a bound above a peak over a sub-box, and of evaluations for each
+cell. Larger numbers close gaps by cells that bisections of the inputs close faster."""
 CELLS_ABOVE_PEAK = 3
-"""Multiple of the cells that nodes are worth whose bounds lie above the peak; twice as many lower
-peaks of 13 inputs by 0.05 %."""
+"""Number of cells of nodes whose bounds lie above the peak, as a multiple of that of other nodes.
+Twice as many lower the peaks of 13 inputs by 0.05 %."""
 FIRST_CELLS = 6
-"""Most cells of a node before those with the highest bounds alone get more, where these alone
-count; four times as many lower peaks of 13 inputs by less than 0.02 %."""
+"""Largest number of cells of a node in the first pass, if only the highest bounds count, which get
+more afterwards. Four times as many lower the peaks of 13 inputs by less than 0.02 %."""
 REMAINDER_MULTIPLE, REMAINDER_MULTIPLE_AT_PEAKS = 1.0, 0.25
-"""Multiples of the remainders' own part of a bound below which no gap is worth any effort."""
+"""Gaps that are not worth any effort, as multiples of what the remainders add to a bound, below and
+at peaks. Larger numbers save time and leave wider gaps."""
 TRUNCATION = 0.1
-"""Fraction of a gap that modes may take which are not enclosed."""
+"""Fraction of a gap that the modes may take that are not enclosed. A larger number encloses fewer
+modes and leaves less of the gap to the search."""
+
+# The modal model and branch and bound over it (`methods.proof`, `bounds.branch_and_bound`).
 
 MAX_ERROR_FRACTION = 0.2
-"""Fraction of the gap that the error of the modal model may take on either side."""
+"""Fraction of the gap that the error of the modal model may take on either side. A larger number
+needs a lower degree and leaves less of the gap to the search."""
 LEFT_OUT_MODES = 1 / 120
-"""Fraction of the gap that modes may be worth that are left out; their energy counts as error."""
+"""Fraction of the gap that modes may contribute that are left out. Their energy counts as error; a
+larger number leaves out more modes and increases the error."""
 BOXES_OF_INPUT = 4.0
-"""Factor by which one more input multiplies the boxes of a branch and bound, about."""
+"""Factor by which one more input multiplies the boxes of a branch and bound, roughly (measured). A
+larger number prefers the dual bound."""
 FIRST_DEGREE, MAX_DEGREE = 3, 20
-"""Degrees of the modal model that are tried."""
+"""Smallest and largest degree of the modal model. A larger first degree is wasted on narrow boxes;
+beyond the largest one rounding dominates."""
 MAX_TERMS = 3100
-"""Monomials of a polynomial: degree 13, 10 and 8 of 4, 5 and 6 inputs."""
+"""Largest number of monomials of a polynomial: the degrees 13, 10 and 8 for 4, 5 and 6 inputs. More
+take more time than bisections do."""
 FIRST_DECAY = 0.1
-"""Factor by which a degree more multiplies the error, before any is seen."""
+"""Factor by which one more degree is taken to multiply the error before any is known. A larger
+number goes up in larger steps."""
 DEGREE_CAUTION = 0.8
-"""Fraction of the degrees that the errors ask for which is taken at once."""
+"""Fraction of the degrees which the errors ask for that is taken at once. A larger number more
+often takes a degree that is higher than necessary."""
 DEVIATION_POINTS = 24
-"""Points along ω of each mode at which its straying from lines between nodes is read."""
+"""Points along ω of each mode at which its distance from straight lines between the nodes is
+computed. More narrow the bound between the nodes slightly."""
 NEWTON_GAP = 0.02
-"""Fraction of the gap that Newton's method may leave."""
+"""Fraction of the gap that Newton's method may leave. A larger number saves steps and leaves less
+of the gap to the search."""
 NEWTON_SAMPLES = 256
-"""Trajectories of the model that the first optima begin at."""
+"""Trajectories of the model at which the first optima begin. More find better optima in more
+time."""
 NEWTON_PIECE = 6000
-"""Most problems solved together, of six inputs; more would leave the cache."""
+"""Largest number of problems of six inputs that are solved together. More would not fit into the
+cache of the processor."""
 NEWTON_LOCAL_STEPS = 6
-"""Newton steps by local maxima of the quadratic models; problems that need more lie on ridges, and
-their models are maximised over all faces of the box."""
+"""Newton steps by local maxima of the quadratic models. Problems that need more lie on ridges, and
+their models are maximised over all faces of the box, which takes longer."""
 NEWTON_RADIUS = 0.4
-"""First radius of the trust region, in unit coordinates."""
+"""First radius of the trust region in unit coordinates. With a larger one more first steps fail."""
 NEWTON_SOUND = 0.1
-"""Relative error of a predicted gain up to which the radius grows five times in place of twice."""
+"""Relative error of a predicted gain up to which the radius grows five times instead of twice. A
+larger number trusts the models more."""
 NEWTON_STEPS = 300
-"""Newton steps after which a problem that has not converged is left as it is."""
+"""Newton steps after which a problem that has not converged is left as it is; its optimum is still
+attained. More are almost never needed."""
