@@ -234,7 +234,7 @@ class Trial:
             for level in map(int, np.flatnonzero(is_inside.all(axis=1))):
                 self.require_inside(level, tested)
                 self.require_attained(level, tested)
-            self.require_line_deviation(tested)
+            self.require_interpolation_error(tested)
 
     def require_inside(self, level: int, motion: _TestedMotion) -> None:
         """Check that a response does not leave the guaranteed bounds, at nodes or between them.
@@ -275,7 +275,7 @@ class Trial:
             words = f"other than the attained {side} bound of α = {envelope.alpha[level]:g}"
             self._require(excess, attained, words, at_nodes)
 
-    def require_line_deviation(self, motion: _TestedMotion) -> None:
+    def require_interpolation_error(self, motion: _TestedMotion) -> None:
         """Check that a response is no farther from straight lines between nodes than is guaranteed.
 
         In a step at whose end a force jumps it must not lie farther beyond its values at both ends.

@@ -88,11 +88,14 @@ def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
 
 
 @pytest.mark.parametrize(
-    ("change", "check"), [(smaller, "require_inside"), (straight, "require_line_deviation")]
+    ("change", "check"), [(smaller, "require_inside"), (straight, "require_interpolation_error")]
 )
 def test_each_check_alone_sees_its_fault(change, check):
     found = motion(frame(), INPUTS, method=METHODS[0])
-    faulty, others = change(found), {"require_inside", "require_line_deviation", "require_attained"}
+    faulty, others = (
+        change(found),
+        {"require_inside", "require_interpolation_error", "require_attained"},
+    )
     cuts, points = boxes(found.inputs, found.alpha), self_test.inputs_at_peaks(found, 0)
     with pytest.MonkeyPatch.context() as patch:
         for other in others - {check}:
@@ -164,7 +167,7 @@ def test_a_fault_far_below_all_tolerances_is_seen_by_its_check(change, check, wo
     (exact,) = self_test.structures_at(system, found, point)
     faulty, others = change(found, exact), {"require_inside", "require_attained"}
     with pytest.MonkeyPatch.context() as patch:
-        for other in (others | {"require_line_deviation"}) - {check}:
+        for other in (others | {"require_interpolation_error"}) - {check}:
             patch.setattr(Trial, other, lambda *_: None)
         with pytest.raises(ContradictionError, match=words):
             Trial(faulty, point, point).require_agreement(point, [exact])
