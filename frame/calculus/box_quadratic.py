@@ -81,11 +81,14 @@ def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: in
                 # at the upper end less that at the lower end
                 slope = _slope(g[n], H[n], x[n], i) - curvature * x[n, i]
                 rise = slope * (high - low) + 0.5 * curvature * (high**2 - low**2)
+                # along an axis that curves upwards the maximum lies at an end; else at the
+                # stationary point, or at the end next to it
                 x[n, i] = high if rise > 0 else low
                 if curvature < 0:
                     x[n, i] = min(max(-slope / curvature, low), high)
             for _ in range(2):
                 value = _newton_step(g[n], H[n], lower[n], upper[n], x[n])
+            # also where the gain is NaN, so that the loop ends
             if not value - before > 1e-10 * (1e-6 + abs(before)):
                 break
 
@@ -154,6 +157,7 @@ def solve_in_place(matrix: Array, b: Array) -> None:
     n = len(matrix)
     m = b.shape[1]
     A = matrix.copy()
+    # elimination below the diagonal, with the largest entry of each column as the pivot
     for k in range(n):
         pivot = k
         for i in range(k + 1, n):
@@ -169,6 +173,7 @@ def solve_in_place(matrix: Array, b: Array) -> None:
                 A[i, j] -= factor * A[k, j]
             for j in range(m):
                 b[i, j] -= factor * b[k, j]
+    # back substitution
     for k in range(n - 1, -1, -1):
         for j in range(m):
             for i in range(k + 1, n):

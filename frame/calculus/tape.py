@@ -45,6 +45,8 @@ def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequen
     results = np.array([writer.place(e) for e in components], np.int64)
     operations = np.array(list(writer.operations), np.int64).reshape(-1, 3)
     first_number = writer.arguments + len(operations)
+    # numbers stand at the end in reverse, since their places were counted from there before the
+    # number of operations was known
     places = np.zeros(first_number + len(writer.numbers))
     places[first_number:] = list(writer.numbers)[::-1]
     return operations, results, places

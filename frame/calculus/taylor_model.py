@@ -215,6 +215,7 @@ class TaylorModel:
         for degree, part in enumerate(self.parts):
             kept = places(inputs[monomials(fewer, degree)], self.inputs)
             parts.append(part[kept])
+        # a rising list of kept inputs stays a rising list, so that no monomial is met twice
         return TaylorModel(tuple(parts), self.remainder, fewer, self.order)
 
     def embedded(self, inputs: Ints, d: int) -> TaylorModel:
@@ -475,7 +476,7 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
         singular.
     """
     n = len(matrix.value)
-    C = np.linalg.inv(matrix.value)
+    C = np.linalg.inv(matrix.value)  # any C would do; a good one makes the bound tight
     # |I − C A(0)|, which is not zero by rounding alone: n products and a difference
     defect = np.abs(np.eye(n) - C @ matrix.value)
     defect += gamma(n + 1) * (np.abs(C) @ np.abs(matrix.value))
@@ -524,6 +525,7 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     Raises:
         UnprovedError: A may be singular somewhere in the box.
     """
+    # any matrix serves as a preconditioner, so that the rounding of this inverse needs no bound
     midpoint_inverse: Any = np.linalg.inv(matrix.value)
     matrix = midpoint_inverse @ matrix
     right = midpoint_inverse @ right

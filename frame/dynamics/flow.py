@@ -47,6 +47,7 @@ def time_nodes(duration: float, step: float) -> Array:
             a whole number of steps from 1 to `MAX_STEPS`.
     """
     checked_number("step", step, positive=True)
+    # durations are given in decimal numbers, whose quotients are whole but for rounding
     count = round(checked_number("duration", duration) / step)
     is_multiple = 1 <= count <= MAX_STEPS and abs(count * step - duration) <= 1e-9 * duration
     require(
@@ -149,6 +150,7 @@ class Flow(ABC):
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
         """Return trajectories at points (S, d), and raise errors that name the point at fault."""
+        # overflow and NaN are looked for in the result, so that the error can name time and point
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
@@ -262,6 +264,7 @@ class LinearFlow(Flow):
             x = states[:, half]
             row = rows.value[0, :, half]
             energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
+            # a pseudo-inverse, since massless unknowns make M singular
             inverse = np.linalg.pinv(matrix, hermitian=True)
             squared_size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
         largest_energy = max(float(energy.max()), 0.0)

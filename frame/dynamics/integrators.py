@@ -74,6 +74,8 @@ class Midpoint:
         q_by_v = implicit_inverse @ m.mass
         # the load of a step is the mean of its values at both ends, with a weight of h/2
         q_by_load = q_by_v @ (concatenate([pushes, pushes], -1) * (h / 4))
+        # both rows of x[k+1] = T x[k] + G load[k]; the velocity follows from the mean of both
+        # velocities, which is (q[k+1] − q[k])/h
         eye = np.eye(m.mass.value.shape[-1])
         upper = concatenate([q_by_q, q_by_v], -1)
         lower = concatenate([(q_by_q - eye) * (2 / h), q_by_v * (2 / h) - eye], -1)
@@ -121,6 +123,7 @@ class Exact:
             require(substeps <= most_substeps, "step", value=f"{step:g} s", allowed=allowed)
         h = step / substeps
 
+        # (A h)^k b / k!, each from the one before
         term = concatenate([pushes * 0.0, pushes], -2)
         series = [term]
         for k in range(1, terms):
@@ -163,6 +166,7 @@ def state_matrix(m: Matrices) -> Jet:
 
 def exponential(z: Jet) -> Jet:
     """Return the exponentials of matrices (…, N, N), with derivatives, by scaling and squaring."""
+    # exp(z) = exp(z/2^s)^(2^s), with s such that the 1-norm of z/2^s is at most .25
     norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
     squarings = 0
     if norm > 0:

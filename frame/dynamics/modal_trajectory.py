@@ -63,6 +63,7 @@ def modal_trajectory(
         by_mode = found.reshape(3, len(time), *rate.value.shape)
         waves.append(by_mode.transpose(2, 0, 3, 1))
     table = np.concatenate(waves, 1).reshape(len(weight), -1, len(time))
+    # Re(a ρ) = Re a Re ρ − Im a Im ρ by one real product, half the work of a complex one
     real_table = np.concatenate([table.real, -table.imag], -2)
 
     factors_by_column = []
@@ -179,6 +180,7 @@ def classical_trajectory(
     except np.linalg.LinAlgError:
         return None
     transposed = shapes.swapaxes(-1, -2)
+    # ΦᵀDΦ is diagonal if the modes are uncoupled (classical damping), with entries 2 δ
     damping = transposed @ matrices.damping.value @ shapes
     decay = np.einsum("skk->sk", damping) / 2
     coupling = np.abs(damping - 2 * decay[:, None] * np.eye(decay.shape[-1]))
@@ -228,6 +230,7 @@ def _is_linear(load: History, interval: float) -> bool:
     if load.frequency:
         return False
     ratios = np.array([load.step, load.start]) / interval
+    # decimal steps are whole multiples but for rounding; a load shorter than an interval is none
     is_multiple = np.abs(ratios - np.round(ratios)).max() < 1e-9 * max(1.0, ratios.max())
     return bool(is_multiple) and bool(ratios[0] > 0.5)
 

@@ -245,6 +245,7 @@ def _march(
         x = start[:size]
         x1 = start[size : size + size * d].reshape(size, d)
         x2 = start[size + size * d :].reshape(size, d, d)
+        # node by node: a step, then the outputs of the state and their derivatives by the inputs
         for t in range(out.shape[1]):
             if t and not _midpoint_step(newton, step, n, inputs[s], h, x, x1, x2):
                 return False
@@ -294,7 +295,7 @@ def _midpoint_step(
             residual[i, 0] = flat[i] - x[n + i]
             for j in range(n):
                 jacobian[i, j] = flat[n + i * n + j]
-        solve_in_place(jacobian, residual)
+        solve_in_place(jacobian, residual)  # `residual` becomes the change of the coordinates
         change = 0.0
         size = 0.0
         for i in range(n):
@@ -306,7 +307,9 @@ def _midpoint_step(
         if change <= 1e-12 * (1 + size):
             break
     else:
+        # not converged: the step is too long, or there is no motion
         return False
+    # momenta after the step, and derivatives of both momenta, at the new coordinates
     a = m + d
     flat = np.empty(m + (m * a + m * a * a if d else 0))
     _evaluate(step, arguments, flat)
@@ -352,6 +355,8 @@ def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     _chain_rule(flat, inner1, inner2, out1, out2)  # while the new coordinates are held
     new_first[:] = x1[n:] - out1[:n]
     solve_in_place(J, new_first)
+    # The second derivatives need the first ones of the new coordinates. Their own part, J new_ij,
+    # is what remains when all other terms are taken from the state's.
     inner1[:n] = new_first
     _chain_rule(flat, inner1, inner2, out1, out2)
     for c in range(n):

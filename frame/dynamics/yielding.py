@@ -280,12 +280,15 @@ def _march(
     v = start[n:].copy()
     # plastic drift, dissipated energy, and direction of yielding: ±1, or 0 of an elastic storey
     plastic, dissipated, direction = np.zeros((3, n))
-    for z in range(n):  # as if the start was reached by loading in one direction
+    # The start counts as reached by loading in one direction: a drift beyond the yield drift has
+    # left the plastic drift that keeps |d − p| at the yield drift.
+    for z in range(n):
         d = _drift(q, z)
         plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
     before = _energy(storeys, q, v, plastic)
     works = np.zeros(2)
     node = 0
+    # `damping` changes while storeys yield; the caller's array must not
     elastic_damping = damping
     damping = damping.copy()
     for e in range(len(edges)):
@@ -294,14 +297,17 @@ def _march(
             node += 1
         if e == len(edges) - 1:
             break
+        # forces of the loads at the beginning of the substep, and their rise until its end
         h = edges[e + 1] - edges[e]
         for i in range(n):
             load[i] = rise[i] = 0.0
             for c in range(pushes.shape[1]):
                 load[i] += mass[i] * pushes[i, c] * first[e, c]
                 rise[i] += mass[i] * pushes[i, c] * (last[e, c] - first[e, c])
-        for event in range(MAX_EVENTS + 1):  # h is what remains of the substep
-            # net force of a storey: tangent · drift + constant
+        # from event to event; h is what remains of the substep
+        for event in range(MAX_EVENTS + 1):
+            # The net force of a storey is tangent · drift + constant. The weight takes `softening`
+            # from the stiffness of an elastic and of a yielding storey alike (P-Delta).
             for i in range(n):
                 if direction[i] != 0:
                     spring = direction[i] * yield_drift[i]
@@ -314,6 +320,9 @@ def _march(
             terms = _expand(inverse_mass, damping, tangent, constant, load, rise, h, q, v, series)
             at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
             _add_works(damping, load, rise, series, terms, at, h, works)
+            # move the state to the event (or to the end); the plastic drift of a yielding storey
+            # follows its drift, and what it dissipates is the yield force of its plastic spring
+            # times this flow
             for i in range(n):
                 q[i] = _value(series[0, i], terms, at)
                 v[i] = _value(series[1, i], terms, at)
@@ -327,6 +336,8 @@ def _march(
             h *= 1 - at
             if z < 0:
                 break
+            # A yielding storey turns elastic. An elastic one begins to yield, and collapses if its
+            # tangent stiffness is not positive then: nothing would turn it.
             if direction[z] != 0:
                 direction[z] = 0.0
             elif softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
@@ -342,8 +353,11 @@ def _march(
                         damping[i - 1, i - 1] -= lost_damping[i]
                         damping[i, i - 1] += lost_damping[i]
                         damping[i - 1, i] += lost_damping[i]
+            # so many events in one substep are those of a motion that is computed wrongly
             if event == MAX_EVENTS:
                 return MotionEnd(FAILED, edges[e + 1] - h, z, 0.0)
+    # Work of the loads less changes of energy and dissipation vanishes for the exact motion. The
+    # sum of all magnitudes is the scale against which it is judged.
     after = _energy(storeys, q, v, plastic)
     dissipation = works[1] + dissipated.sum()
     exchanged = abs(before) + abs(after) + abs(works[0]) + dissipation
@@ -388,11 +402,15 @@ def _expand(
             drifts[i, term] = Q[i, term] - below
             below = Q[i, term]
             size += abs(Q[i, term]) + h * abs(V[i, term])
+        # The series ends at two small terms in a row, since in free vibration every other one
+        # may vanish.
         scale = max(scale, size)
         if term == MAX_TERMS or (term > 1 and max(size, previous) <= TERM_ROUNDING * scale):
             return term + 1
         previous = size
         above = 0.0
+        # from the top storey down: the force on a floor is that of the storey above less its own.
+        # Constants act on the first coefficient alone, the rise of the loads on the second.
         for i in range(n - 1, -1, -1):
             column = tangent[i] * drifts[i, term]
             if term == 0:
@@ -432,12 +450,14 @@ def _first_event(
             variation += (term if sign != 0 else 1) * abs(drifts[z, term])
         # Σ |c_k| bounds the variation of a polynomial Σ c_k τ^k: mostly there is no event
         if sign != 0:
+            # the velocity of the drift cannot change its sign within the substep
             if 2 * sign * drifts[z, 1] > variation:
                 continue
             for term in range(1, terms):
                 margin[term - 1] = sign * term * drifts[z, term]
             margin[0] += EVENT_ROUNDING * variation
             at = _first_root(margin, terms - 1, first)
+        # a storey whose hardening is 1 never yields
         elif abs(elastic) + variation < yield_drift[z] or hardening[z] == 1:
             continue
         else:
@@ -475,6 +495,7 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
     low = 0.0
     width = end
     left = polynomial[0]
+    # `left` and `right` are the values at the ends of the interval [low, low + width]
     while low < end and left >= 0:
         width = min(width, end - low)
         right = _value(polynomial, terms, low + width)

@@ -239,6 +239,7 @@ def responses_at_nodes(
         t = times[:, None]
         angle = omega * (t - history.start) + history.phase
         phasor = np.exp(1j * angle)
+        # the sum and its factors have 8 roundings, besides that of the angle
         size = np.abs(minus[0]) + np.abs(plus[0])
         # rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ
         slope = np.exp(np.maximum(sigma.real * t, 0.0)) * history.extremes[0] * t**2
@@ -257,6 +258,7 @@ def responses_at_nodes(
             places = np.arange((len(samples) - 1) * divisions + 1) / divisions
             resampled = np.interp(places, np.arange(len(samples)), samples)
             history = replace(history, step=history.step / divisions, samples=resampled)
+    # a mode that grows is integrated over a window, or over an interval if that is longer
     require_in_range(sigma, history.step, max(history.step, longest))
     out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
     error = np.empty(out.shape[1:])
@@ -391,6 +393,8 @@ def _respond(
         r1 = slope * P[2] - a * P[1]
         r2 = slope * P[3] - a * P[2]
         rounding = roundings[j, 1] * (abs(a) + abs(slope) * since / 2)
+    # ρ(t + h) = exp(σ h) ρ(t) + a J₀ − slope J₁; derivatives by σ follow from the product rule, in
+    # which ∂J_n/∂σ = J_{n+1}
     for i in range(begin, interval[-1] + 1):
         slope = (load.last[i] - load.first[i]) / h
         while node < len(interval) and interval[node] == i:
@@ -483,6 +487,7 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
                 total += term / (n + 1 + k)
             out[n] = total * h ** (n + 1)
         return
+    # the recurrence φ_n = (exp(z) − n φ_{n−1}) / z, from φ_0 = (exp(z) − 1) / z
     grown = np.exp(z)
     integral = (grown - 1.0) / z
     out[0] = integral * h

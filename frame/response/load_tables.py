@@ -61,6 +61,7 @@ class LoadTable:
             raise UnprovedError(what, "take a smaller step, or narrower inputs")
         # radius in x of a circle around all eigenvalues; a smaller one would amplify rounding
         radius = max(deviation * length * h, 1.0)
+        # tuned: the terms |z|ⁿ/n! fall from n = e |z| on, and what is left out is `truncation`
         order = ceil(2.72 * radius + 18)
         self.midpoint = midpoint
         self.scale = 1 / (length * h)
@@ -203,6 +204,7 @@ def _responses(
     start = 0
     window = 0
     for p in range(len(rate)):
+        # another eigenvalue, or an earlier node: nothing of the last point can be used
         if p == 0 or rate[p] != rate[p - 1] or node[p] < node[p - 1]:
             R = 0j
             slope = 0j
@@ -222,6 +224,7 @@ def _responses(
                 h = h * x + g
                 g = g * x + f
                 f = f * x + moment[end, i]
+            # what earlier windows left goes on freely: exp(λ τ) R, and its derivatives by λ
             propagator = np.exp(rate[p] * tau)
             f += propagator * R
             g = g / scale + propagator * (slope + tau * R)

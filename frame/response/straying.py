@@ -304,6 +304,7 @@ def narrowed_straying(
     if ((at_added + between_added).max(0) <= 1.25 * largest).all():
         substeps = few
     at_added, between_added = _at_and_between_added(responses, time, substeps)
+    # no step ends at the first node
     narrowed = np.vstack([np.zeros(at_added.shape[1]), at_added + between_added])
     return np.fmin(bound, narrowed + unresolved)
 
@@ -590,6 +591,7 @@ def load_excess(load: History, time: Array) -> Array:
     high = np.maximum(pieces.first, pieces.last) + pieces.bend
     low = np.minimum(pieces.first, pieces.last) - pieces.bend
     value = load.values(time)
+    # the largest and the least value in each step, over all its segments
     above = np.maximum.reduceat(high, first) - np.maximum(value[1:], value[:-1])
     below = np.minimum(value[1:], value[:-1]) - np.minimum.reduceat(low, first)
     return np.append(0.0, np.maximum(np.maximum(above, below), 0.0))
@@ -654,7 +656,7 @@ def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
     samples = load.start + np.arange(len(load.samples)) * load.step
     samples = samples[(samples > time[0]) & (samples < time[-1])]
     # samples that lie on a node but for rounding make no segment
-    later = np.searchsorted(time, samples)
+    later = np.searchsorted(time, samples)  # all samples lie between two nodes
     distance = np.minimum(samples - time[later - 1], time[later] - samples)
     times = np.union1d(time, samples[distance > 1e-9 * load.step])
     if load.frequency:

@@ -252,6 +252,7 @@ def converged_means(
     means: dict[int, Mean] = {}
     while True:
         counts = [count, finer_count(count), finer_count(finer_count(count))]
+        # each finer rule is the first one of the next round, so that none is solved twice
         for n in counts:
             if n not in solved:
                 rule = gauss_rule(distribution, points=n)
@@ -302,6 +303,7 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     values = _rule_energies(series, cell, rule, mean.terms)
     node_radii = cell.radius_map(rule.nodes)
     order = np.argsort(node_radii)
+    # larger radii never need fewer terms, whatever single nodes happened to need
     rising_terms = np.maximum.accumulate(mean.terms[order])
     distances = []
     finer = rule
@@ -332,6 +334,7 @@ def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Ints) -> 
     energies = np.zeros((2, 2, 3))
     for phase in range(2):
         for kind in range(2):
+            # Im c(X (1 + iε)) / ε is X ∂c/∂X to rounding, without differences that cancel
             stepped = moduli.astype(complex)
             stepped[phase, kind] *= 1 + 1j * STEP
             bulk, shear = stepped.T
@@ -351,6 +354,7 @@ def _mean_moduli(
     radii = cell.radius_map(rule.nodes)
     total = np.zeros(3, complex)
     materials = [ComplexMaterial(moduli) for moduli in zip(bulk, shear, strict=True)]
+    # nodes with equally many terms are one batch
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)
         total += rule.weights[nodes] @ series.solve(radii[nodes], materials, int(count))[:, 0]
