@@ -3,11 +3,16 @@
 An effective constant c that is a least energy over fields is concave in the moduli of the phases.
 So with the moduli of one phase times 1 + t,
 
-    [c(t) − c(0)]/t ≤ c′(0) ≤ [c(0) − c(−t)]/t   for any 0 < t < 1,
+    [c(t) − c(0)]/t ≤ c′(0) ≤ [c(0) − c(−t)]/t   for any 0 < t < 1.
 
-and bounds of c bound c′(0)/c(0), the fraction of the energy that belongs to the phase. The loss
-factor is the mean of those of the phases by these fractions, to first order in the loss factors;
-their squares are left out.
+The fraction of the energy that belongs to the phase is c′(0)/c(0). Divided by c(0), the left side
+falls with c(0) and the right side rises with it. So with lower bounds of c(t) and c(−t) and the
+upper bound C of c(0)
+
+    [c(t)/C − 1]/t ≤ c′(0)/c(0) ≤ [1 − c(−t)/C]/t.
+
+The loss factor is the mean of those of the phases by these fractions, to first order in the loss
+factors; their squares are left out.
 """
 
 from __future__ import annotations
@@ -60,13 +65,10 @@ def energy_fractions(
     for k in range(n_phases):
         stiffer = _lower_bounds_with(1 + t, k, model, solution, images, phase)
         softer = _lower_bounds_with(1 - t, k, model, solution, images, phase)
-        for name, (low, high) in unchanged.items():
-            # c′(0) is between these slopes, and c(0) between low and high
-            min_slope = (stiffer[name] - high) / t
-            max_slope = (high - softer[name]) / t
-            lower = min(min_slope / low, min_slope / high)
-            upper = max(max_slope / low, max_slope / high)
-            fractions[name][k] = np.clip((lower - ROUNDING / t, upper + ROUNDING / t), 0, 1)
+        for name, ends in unchanged.items():
+            lower = (stiffer[name] / ends.upper - 1 - ROUNDING) / t
+            upper = (1 - softer[name] / ends.upper + ROUNDING) / t
+            fractions[name][k] = np.clip((lower, upper), 0, 1)
     return fractions
 
 
