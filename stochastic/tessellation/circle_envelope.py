@@ -85,14 +85,12 @@ class Arcs:
 
     @classmethod
     def joined(cls, parts: list[Arcs]) -> Arcs:
-        """Return the arcs of all parts in their order; none of no part."""
-        no_indices = np.zeros(0, np.intp)
-        empty = np.zeros(0)
+        """Return the arcs of all parts, of which there is one or more, in their order."""
         return cls(
-            owner=np.concatenate([no_indices, *(part.owner for part in parts)]),
-            function=np.concatenate([no_indices, *(part.function for part in parts)]),
-            start=np.concatenate([empty, *(part.start for part in parts)]),
-            end=np.concatenate([empty, *(part.end for part in parts)]),
+            owner=np.concatenate([part.owner for part in parts]),
+            function=np.concatenate([part.function for part in parts]),
+            start=np.concatenate([part.start for part in parts]),
+            end=np.concatenate([part.end for part in parts]),
         )
 
 
@@ -103,7 +101,8 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
         a: Coefficients of cos φ, shape (k,), the groups one after the other; b and c likewise.
         b: Coefficients of sin φ.
         c: Constants.
-        counts: Number of functions in each group, shape (n,), sum k; a group of none has no arcs.
+        counts: Number of functions in each group, shape (n,), sum k > 0; a group of none has no
+            arcs.
 
     Raises:
         FailedError: A sweep around the circle does not end.
