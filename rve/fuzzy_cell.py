@@ -178,12 +178,12 @@ class FuzzyStiffness:
     __repr__ = __str__
 
     def to_csv(self, path: str) -> None:
-        """Write a row for each constant and level: bounds in SI, and what they promise."""
+        """Write a row for each constant and level: bounds in SI, and their guarantee."""
         lines = ["constant,alpha,lower,upper,guarantee"]
         for name in self.constants:
-            guarantee, cuts = self.bounds.nature_of(name), self.cuts(name)
-            for row, alpha in enumerate(self.bounds.alpha):
-                lower, upper = float(cuts[row, 0]), float(cuts[row, 1])
+            guarantee = self.bounds.nature_of(name)
+            bounds = self.cuts(name).tolist()
+            for alpha, (lower, upper) in zip(self.bounds.alpha, bounds, strict=True):
                 lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{guarantee}")
         with open(path, "w", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n")

@@ -30,26 +30,30 @@ def end_on_second(number: int) -> None:
 def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
     """Context that delays Ctrl-C to its end, and restores the signal handlers there.
 
-    With `second_ends` a second Ctrl-C, SIGTERM or SIGHUP ends the process at once.
-
     PETSc loses exceptions that Python raises below it; basix and DOLFINx abort while they are
-    imported, and MPI replaces handlers. Does nothing outside the main thread.
+    imported, and MPI replaces handlers. Outside the main thread the context does nothing.
+
+    Args:
+        second_ends: Whether a second Ctrl-C, SIGTERM or SIGHUP ends the process at once.
     """
-    handler_before, received = signal.getsignal(signal.SIGINT), list[int]()
+    handler_before = signal.getsignal(signal.SIGINT)
     stop_handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     in_main_thread = threading.current_thread() is threading.main_thread()
     if not in_main_thread or handler_before in (None, signal.SIG_DFL):
         yield
         return
+    received: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: received.append(number))
-    for number in [signal.SIGINT, *STOP_SIGNALS] if second_ends else []:
-        end_on_second(number)
+    if second_ends:
+        for number in (signal.SIGINT, *STOP_SIGNALS):
+            end_on_second(number)
     try:
         yield
     finally:
         for number, handler in {signal.SIGINT: handler_before, **stop_handlers}.items():
             if handler is not None:
                 signal.signal(number, handler)
+        # What came meanwhile is handed to the handler that would have had it.
         is_ignored = not callable(handler_before) and received[-1:] == [signal.SIGINT]
         if received and not is_ignored:
             interrupt = handler_before if callable(handler_before) else signal.default_int_handler

@@ -214,17 +214,27 @@ def require_compressible(*phases: AnyPhase) -> None:
 def require_solve_arguments(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
-    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases."""
-    kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
-    phases = (matrix, *inclusions) if isinstance(inclusions, Sequence) else ()
-    has_phases = len(phases) > 1 and all(isinstance(phase, kinds) for phase in phases)
+    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases.
+
+    Args:
+        radius_map: First argument.
+        matrix: Second argument.
+        inclusions: Third argument.
+        isotropic: Whether the model takes isotropic phases alone.
+    """
     is_map = callable(radius_map) and hasattr(radius_map, "distribution")
-    if not (is_map and has_phases):
-        parts = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
-        empty = " (empty)" if inclusions in ([], ()) else ""
-        raise RefusedError(
-            "parts of the cell",
-            f"{parts}{empty}",
-            "the radius map, the matrix's phase and a list of the inclusions' phases",
-            "any stiffness is for slices and prism; write solve(radius, Phase(3e9), [Phase(70e9)])",
-        )
+    has_phases = False
+    if isinstance(inclusions, Sequence) and len(inclusions) > 0:
+        kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
+        has_phases = all(isinstance(phase, kinds) for phase in (matrix, *inclusions))
+    if is_map and has_phases:
+        return
+    given = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
+    if inclusions in ([], ()):
+        given += " (empty)"
+    raise RefusedError(
+        "parts of the cell",
+        given,
+        "the radius map, the matrix's phase and a list of the inclusions' phases",
+        "any stiffness is for slices and prism; write solve(radius, Phase(3e9), [Phase(70e9)])",
+    )

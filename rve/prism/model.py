@@ -337,7 +337,8 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
     Both are more accurate than prisms. The accuracy of the series and the nodes in θ of the slices
     are chosen so that the reference's own error, which is added, hardly counts.
     """
-    matrix, inclusion = cell.matrix, cell.inclusion
+    matrix = cell.matrix
+    inclusion = cell.inclusion
     if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
         series = SeriesModel(accuracy=1e-9, energies=True)
         return series.solve(cell.radius_map, matrix, [inclusion])[0]

@@ -223,12 +223,15 @@ def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
     if not isinstance(phases, Mapping):
         value = type(phases).__name__
         raise RefusedError("phases of the mesh", value, f"{{name: phase}} for the groups {listed}")
-    for name in (*phases, *names):
-        if name not in phases or name not in names:
-            value = repr(name) if name in phases else f"without {name!r}"
-            raise RefusedError("phase", value, f"one for each physical group: {listed}")
-        if not isinstance(phases[name], Phase | VoigtPhase):
-            raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
+    allowed = f"one for each physical group: {listed}"
+    for name, phase in phases.items():
+        if name not in names:
+            raise RefusedError("phase", repr(name), allowed)
+        if not isinstance(phase, Phase | VoigtPhase):
+            raise RefusedError(f"phase {name!r}", repr(phase), "a Phase or a VoigtPhase")
+    for name in names:
+        if name not in phases:
+            raise RefusedError("phase", f"without {name!r}", allowed)
     require_compressible(*phases.values())
     return {name: phases[name] for name in names}
 
