@@ -182,8 +182,9 @@ class FuzzyStiffness:
         lines = ["constant,alpha,lower,upper,guarantee"]
         for name in self.constants:
             guarantee = self.bounds.nature_of(name)
-            bounds = self.cuts(name).tolist()
-            for alpha, (lower, upper) in zip(self.bounds.alpha, bounds, strict=True):
+            for alpha, cut in zip(self.bounds.alpha, self.cuts(name), strict=True):
+                lower = float(cut[0])
+                upper = float(cut[1])
                 lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{guarantee}")
         with open(path, "w", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n")
