@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,7 @@ from alphacut.stages.store import Stage, StageContext, no_progress
 
 PARTS = (1 / 64, 1 / 64, 1 / 32, 1 / 16)
 """Fractions of a work that are timed, one after the other; the first part compiles as well."""
+T = TypeVar("T")
 LONG_ENOUGH = 2.0
 """Seconds of parts, or of work that was begun, after which no more is timed: more of it would tell
 more, but let the user of `check` wait."""
@@ -125,7 +126,7 @@ class InterruptedWorkError(Exception):
     """Work that was only begun; its argument is the time that all of it would take, in s."""
 
 
-def begun_seconds(stage: Stage[Any], *, has_setup: bool = False, power: float = 1.0) -> float:
+def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.0) -> float:
     """Return about how many seconds a stage takes: it is begun, and interrupted by its progress.
 
     Args:

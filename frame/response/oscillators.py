@@ -95,8 +95,8 @@ def grid_over(
         highest_quotient = lowest_quotient + 1e-12
     along_omega, along_quotient = points
     return Grid(
-        np.linspace(lowest_omega, highest_omega, along_omega),
-        np.linspace(lowest_quotient, highest_quotient, along_quotient),
+        np.asarray(np.linspace(lowest_omega, highest_omega, along_omega), float),
+        np.asarray(np.linspace(lowest_quotient, highest_quotient, along_quotient), float),
     )
 
 

@@ -165,7 +165,7 @@ class MatrixStructure(LinearSystem):
         Args:
             kind: "mass", "damping" or "stiffness".
         """
-        factors = [float(value_of(factor, self.parameters)) for factor, _ in getattr(self, kind)]
+        factors = [float(_value_of(factor, self.parameters)) for factor, _ in getattr(self, kind)]
         return np.array(factors)[:, None, None] * self._arrays[kind]
 
     def _require_definite(self) -> None:
@@ -256,7 +256,7 @@ class MatrixStructure(LinearSystem):
             # the array is nonnegative but for the rounding of its eigenvalues
             eigenvalues = np.linalg.eigvalsh(array)
             is_definite = eigenvalues[0] >= -1e-14 * np.abs(eigenvalues).max()
-            if value_of(factor, lowest) < 0 or not is_definite:
+            if _value_of(factor, lowest) < 0 or not is_definite:
                 raise UnprovedError(
                     "a term of the damping has a negative factor or an indefinite array: it may"
                     " feed energy into the structure"
@@ -312,7 +312,7 @@ class MatrixStructure(LinearSystem):
         names = list(self.parameters)
         nominal = np.array([list(self.parameters.values())], float)
         try:
-            value = value_of(factor, variables(nominal, names, names[:1]))
+            value = _value_of(factor, variables(nominal, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
             value = failure
         allowed = f"arithmetic to one number, of {', '.join(names)}"
@@ -400,14 +400,14 @@ def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
     """Return the value of a factor at parameters, as a number of their type, shape (…)."""
-    value = value_of(factor, p)
+    value = _value_of(factor, p)
     like: Number = next(iter(p.values()))
     if isinstance(value, type(like)):
         return value
     return like.like(np.full(like.value.shape, float(value)))
 
 
-def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
+def _value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     """Return the value of a factor: a number, the name of a parameter, or a function of them."""
     if isinstance(factor, str):
         return p[factor]
