@@ -22,11 +22,6 @@ from alphacut.frame.structures.model import PlacedForce
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 
-HISTORY = (
-    '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'
-    ' "static"'
-)
-
 
 class ForceHistory(NamedTuple):
     """Time history of a force (None: impulse), and SI unit of its amplitudes, empty of factors."""
@@ -41,19 +36,23 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     Its first word is a kind or the name of a file. Then come a frequency and perhaps a phase, of a
     harmonic force alone, and one of "from TIME" and "static".
     """
+    allowed = (
+        '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'
+        ' "static"'
+    )
     kind, *words = [word.strip() for word in str(value).split(",")]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
     numbers = [word for word in words if word != "static" and not word.startswith("from ")]
     is_static = "static" in words
     n_options = len(words) - len(numbers)
     if kind == "impulse":
-        require(not words, "", value, HISTORY)
+        require(not words, "", value, allowed)
         return ForceHistory(None, "N*s")
     if kind == "harmonic":
         fits = len(numbers) in (1, 2) and n_options <= 1 and not is_static
     else:
         fits = not numbers and n_options <= 1
-    require(fits, "", value, HISTORY)
+    require(fits, "", value, allowed)
     try:
         start = 0.0
         if starts:
@@ -67,12 +66,12 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         if kind == "step":
             return ForceHistory(History.constant(start, is_static=is_static))
     except ValueError as error:
-        raise RefusedError("", value, HISTORY, str(error)) from None
+        raise RefusedError("", value, allowed, str(error)) from None
     # any other first word is the name of a file
     try:
         path = case_file(kind, info)
     except RefusedError as error:
-        raise RefusedError("", kind, f"{HISTORY}; {error.allowed}") from None
+        raise RefusedError("", kind, f"{allowed}; {error.allowed}") from None
     force = read_force_history(path)
     # A file with a unit has forces, and amplitudes are factors of them; one without has numbers,
     # and amplitudes are forces.

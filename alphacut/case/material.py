@@ -162,8 +162,6 @@ class MeshedCell(Section):
             require(is_complete, key, None, allowed)
 
 
-ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
-
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
 )
@@ -214,7 +212,7 @@ class RoundCell(Section):
         """
         if self.particles in ("cylinders", "spheres"):
             return None
-        match = ELLIPSES.match(self.particles)
+        match = re.fullmatch(r"ellipses\(([^,]*),([^,]*)\)", self.particles)
         if match is None:
             raise RefusedError("cell.particles", self.particles, SHAPES)
         try:

@@ -44,7 +44,6 @@ RATIO_WORDS = (
     ' ["2 %", "[2, 3, 4] %", "5 %"]; "material" takes that of the loss factors of the'
     ' cell, "material + 1 %" adds that of joints'
 )
-DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
 STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 LOSS_STAND_IN = Crisp(0.02)
@@ -52,8 +51,6 @@ LOSS_STAND_IN = Crisp(0.02)
 MAX_RATIO_OF_STOREYS = 300.0
 """Ratio of masses, stiffnesses … of two storeys up to which no unit is doubted; k, M and G of units
 are thousands, and an isolator is some 50 times softer than a storey."""
-NEGLIGIBLE_WEIGHT = 0.1
-"""Stability coefficient of a storey up to which EN 1998-1, 4.4.2.2, neglects P-Delta."""
 
 
 @dataclass(frozen=True)
@@ -309,7 +306,7 @@ class Frame(StructureSection):
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
         for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
-            if coefficient > NEGLIGIBLE_WEIGHT:
+            if coefficient > 0.1:  # up to which EN 1998-1, 4.4.2.2, neglects P-Delta
                 what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
                 yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
 
@@ -387,8 +384,9 @@ class Frame(StructureSection):
         # undamped responses are unusual: whoever wants one says so, as "0 %"
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
-        is_damped = any(map(self.has_key, DAMPING))
-        require(is_damped, "frame.dampers", None, " or ".join(DAMPING), cure='"0 %" for none')
+        keys = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
+        is_damped = any(map(self.has_key, keys))
+        require(is_damped, "frame.dampers", None, " or ".join(keys), cure='"0 %" for none')
         _ = self.nominal  # refuses values that make no frame
 
 

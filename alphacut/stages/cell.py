@@ -43,13 +43,10 @@ class References(TypedDict, total=False):
     hashin_shtrikman_E_GPa: tuple[float, float]
 
 
-ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 UPPER_BOUND = "C is an upper bound of this mesh: that of a finer one is smaller"
 """Of a mesh of one's own by Galerkin's method, whose fields have more energy than the true ones."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
-NODES = 40
-"""Nodes in θ of a mean fraction."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +195,7 @@ class CellProblem:
             return {}
         radius_map = self.nominal.radius_map
         # the mean over θ of a fraction that is smooth in θ: Gauss quadrature with its distribution
-        rule = gauss_rule(radius_map.distribution, points=NODES)
+        rule = gauss_rule(radius_map.distribution, points=40)
         is_space = self.cell.particles == "spheres"
         if is_space:
             fractions = self.cell.shape.fractions(radius_map(rule.nodes))
@@ -257,9 +254,10 @@ def constant_label(key: str) -> str:
 
 def isotropic_label(average: str) -> str:
     """Return the label of the Hashin–Shtrikman bounds beside E of an average, in words."""
+    label = "Hashin–Shtrikman bounds of an isotropic E"
     if average == AVERAGES[AXES]:
-        return f"{ISOTROPIC}, which that of {average} is not"
-    return ISOTROPIC
+        label += f", which that of {average} is not"
+    return label
 
 
 def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:

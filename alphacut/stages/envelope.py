@@ -32,8 +32,6 @@ from alphacut.stages.store import Stage, StageContext, StageResult
 if TYPE_CHECKING:
     import xarray
 
-DEFAULT_TOLERANCE = Tolerance(1e-3, "")
-"""Tolerance where none is named: a fraction of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 
@@ -99,7 +97,7 @@ class EnvelopeTask:
             RefusedError: It is in the unit of no output.
         """
         units = {Output(x).unit for x in structure.outputs}
-        tolerance = self.section.tolerance or DEFAULT_TOLERANCE
+        tolerance = self.section.tolerance or Tolerance(1e-3, "")  # a fraction of each peak
         value = f"{tolerance.value:g} {tolerance.unit}"
         allowed = f"a fraction, or {', '.join(sorted(units))}"
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)

@@ -14,9 +14,6 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.stages.cell import CellProblem
 
-SERIES_TOLERANCE = 1e-4
-"""Relative error of E in a check, which is far below what a period or a step is judged by."""
-
 
 class Material(NamedTuple):
     """What a structure takes from its cell; None of what the case states itself.
@@ -28,10 +25,6 @@ class Material(NamedTuple):
 
     modulus: FuzzyNumber | None = None
     loss: FuzzyNumber | None = None
-
-
-POSSIBLE = (Material(Crisp(1e12), Crisp(1e-3)), Material(Crisp(1e9), Crisp(0.3)))
-"""Diamond with the losses of steel, and a soft polymer with those of rubber."""
 
 
 def foreseen_material(content: Content) -> Material | None:
@@ -48,7 +41,8 @@ def foreseen_material(content: Content) -> Material | None:
     has_map = cell is not None and bool(content.radius_map or cell.fraction_map)
     if cell is None or "series" not in cell.methods or not has_map:
         return None
-    section = content.modulus.model_copy(update={"method": "auto", "tolerance": SERIES_TOLERANCE})
+    # an error of E of 1e-4 is far below what a period or a step is judged by
+    section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
     result = replace(CellProblem.of(content), modulus=section).solve()
     loss = None
     if content.has_material_damping:
@@ -80,9 +74,11 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
     known = foreseen_material(content)
     if known is not None:
         return (known,)
+    small_loss, large_loss = Crisp(1e-3), Crisp(0.3)  # steel, rubber
     if content.has_stated_modulus:
-        return tuple(Material(loss=material.loss) for material in POSSIBLE)
-    return POSSIBLE
+        return Material(loss=small_loss), Material(loss=large_loss)
+    diamond, polymer = Crisp(1e12), Crisp(1e9)
+    return Material(diamond, small_loss), Material(polymer, large_loss)
 
 
 def structure_as_computed(content: Content, material: Material) -> Structure:

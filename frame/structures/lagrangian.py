@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 Symbols = Sequence[Any]
 Named = Mapping[str, Any]
 Function = Callable[[Symbols, Symbols, Named], Any]
-SMOOTH = "arithmetic and the smooth functions of SymPy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +170,8 @@ def _expressions(
     """
     import sympy
 
-    allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
+    allowed = f"functions of {', '.join(parameters)} and the coordinates by arithmetic and the"
+    allowed += " smooth functions of SymPy"
     # The function is the user's: names that it asks for and operations that symbols do not have are
     # refused with what it may use. Other errors are its own, and are not caught.
     try:

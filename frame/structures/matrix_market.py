@@ -19,8 +19,6 @@ HEAD = re.compile(
     rb"(general|symmetric)\s*",
     re.IGNORECASE,
 )
-NO_NUMBER = re.compile(rb"[^-+.0-9eE\s]")
-"""A letter that numbers and blanks do not have."""
 
 
 def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
@@ -86,7 +84,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
 def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
     """Refuse lines with a letter that numbers and blanks do not have."""
     for line in lines:
-        if found := NO_NUMBER.search(line):
+        if found := re.search(rb"[^-+.0-9eE\s]", line):
             value = f"with {line[:40].decode('latin-1')!r}"
             cures = {b",": "write decimal points", b"d": "write 1e3 in place of 1D3"}
             cure = cures.get(found[0].lower(), "mend this line, or load the file anew")

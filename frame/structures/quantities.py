@@ -26,9 +26,6 @@ OUTPUTS = {  # unit and words, by names without the floor
 }
 NAME = re.compile(r"[^\W\d]\w{0,63}")
 """A name that texts of limits and peaks ("max roof"), files and tables can have."""
-NAME_WORDS = "names of a letter, then letters, digits or _, up to 64"
-UNIT = re.compile(r"[\w%°*/^·. ()+-]{0,32}")
-UNIT_WORDS = "units of letters, digits and % ° * / ^ · . ( ) + -, up to 32, as N*m"
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
 UP_TO_ONE = "0 to 1"
@@ -86,10 +83,12 @@ def require_names(key: str, names: Iterable[str]) -> None:
     """
     for name in names:
         is_name = isinstance(name, str) and NAME.fullmatch(name) is not None
-        require(is_name, key, value=repr(str(name)), allowed=NAME_WORDS)
+        allowed = "names of a letter, then letters, digits or _, up to 64"
+        require(is_name, key, value=repr(str(name)), allowed=allowed)
         if isinstance(name, Output):
-            is_unit = UNIT.fullmatch(name.unit) is not None
-            require(is_unit, f"unit of {name}", value=repr(name.unit), allowed=UNIT_WORDS)
+            is_unit = re.fullmatch(r"[\w%°*/^·. ()+-]{0,32}", name.unit) is not None
+            allowed = "units of letters, digits and % ° * / ^ · . ( ) + -, up to 32, as N*m"
+            require(is_unit, f"unit of {name}", value=repr(name.unit), allowed=allowed)
 
 
 def output_of(peak: str) -> str:

@@ -46,10 +46,7 @@ SYMBOLS = {
     "hardening": "hardening{}",
 }
 """Names of the parameters of each list, {} for the number of the floor or storey."""
-SINGLE = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
-"""Names of the parameters of arguments that may be one number."""
 MOMENT = "overturning_moment"
-SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
 class _Storeys(NamedTuple):
@@ -185,7 +182,8 @@ class StoreyFrame(LinearSystem):
         checked_number("gravity", self.gravity, least=0)
         # lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys
         sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
-        for name, symbol in {**SYMBOLS, **SINGLE}.items():
+        single = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
+        for name, symbol in (SYMBOLS | single).items():
             values = getattr(self, name)
             if values is None:
                 continue
@@ -198,7 +196,7 @@ class StoreyFrame(LinearSystem):
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
-            if name in sizes and not (is_single and name in SINGLE):
+            if name in sizes and not (is_single and name in single):
                 size, allowed = np.size(values), f"{n}, as masses has, from below"
                 require(size in sizes[name], name, f"a list of {size}", allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
@@ -219,7 +217,8 @@ class StoreyFrame(LinearSystem):
                 needed = ["lengths"]
         for name in needed:
             cure = f"give {name}, as {examples[name]} in SI{alternative}"
-            require(name in given, name, value=None, allowed=SPRING_KEYS, cure=cure)
+            allowed = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
+            require(name in given, name, value=None, allowed=allowed, cure=cure)
 
         has_force = bool(len(self.yield_force))
         has_drift = bool(len(self.yield_drift))
