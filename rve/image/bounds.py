@@ -120,6 +120,7 @@ class StiffnessBounds:
         min_shear, max_shear = self.shear(average)
         max_ratio = self._ratio(max_shear, min_bulk)
         min_ratio = self._ratio(min_shear, max_bulk)
+        # ν falls with x, which rises with G and falls with K
         low = (1 - max_ratio) / 2 - 4 * UNIT * (1 + max_ratio)
         return Enclosure(low, (1 - min_ratio) / 2 + 4 * UNIT * (1 + min_ratio))
 
@@ -139,6 +140,7 @@ class StiffnessBounds:
         """
         low, high = self._compliance
         n = self.dimension
+        # A quotient is off by one unit; the factors themselves are rounded.
         outwards = np.array([1 - 4 * UNIT, 1 + 4 * UNIT])
         with np.errstate(divide="ignore"):
             moduli = outwards / np.diagonal([high, low], 0, 1, 2).T
@@ -176,6 +178,7 @@ class StiffnessBounds:
 
     def _hill(self, modulus: int) -> Enclosure:
         """Return bounds of K (modulus 0) or G (1) of Hill's average of a stiffness of space."""
+        # Voigt's modulus rises with the stiffness, Reuss's falls with the compliance.
         min_compliance, max_compliance = self._compliance
         low = 0.0
         high = float("inf")

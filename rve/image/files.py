@@ -150,6 +150,7 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     Raises:
         RefusedError: A name has no number.
     """
+    # Names also hold bits of a pixel, widths or dates, as in "rec_0012_8bit.tif".
     numbers = [re.findall(r"\d+", file.stem) for file in files]
     for file, found in zip(files, numbers, strict=True):
         require(bool(found), file.name, "no number", "a number in the name of each slice")
@@ -216,6 +217,7 @@ def _grey_of_colours(name: str, values: Array) -> Array:
     Raises:
         RefusedError: It has colours, or is transparent somewhere.
     """
+    # Programs save grey values as colours; weights of red, green and blue would be a guess.
     red = values[..., 0]
     is_grey = (values[..., 1] == red).all() and (values[..., 2] == red).all()
     cure = "save it as grey values"

@@ -107,6 +107,7 @@ def _min_mean(fractions: Array, losses: Array) -> float:
     It is attained where phases take as much as they can in the order of rising loss, and the others
     their smallest fraction.
     """
+    # a linear program of one equation: the greedy order is optimal, as of the fractional knapsack
     used = fractions[:, 0].copy()
     remaining = 1 - used.sum()
     for k in np.argsort(losses):

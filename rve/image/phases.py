@@ -165,6 +165,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
         grey: Grey values of pixels or voxels, of any shape.
         thresholds: Lower and upper end of each threshold, both rising.
     """
+    # Thresholds surely at most the grey value have their upper end there, possible ones the lower.
     lower, upper = np.array(thresholds).reshape(-1, 2).T
     first = np.searchsorted(upper, grey, side="right")
     last = np.searchsorted(lower, grey, side="right")
@@ -181,6 +182,8 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
     """
     lower = np.array([(phase.lower.bulk, phase.lower.shear) for phase in phases])
     upper = np.array([(phase.upper.bulk, phase.upper.shear) for phase in phases])
+    # Few pairs of a first and a last phase exist: their extremes are looked up by pixel. Phases
+    # need not be ordered by their moduli.
     lowest = np.zeros((2, len(phases), len(phases)))  # (bulk or shear modulus, first, last)
     highest = np.zeros_like(lowest)
     for a, b in combinations_with_replacement(range(len(phases)), 2):

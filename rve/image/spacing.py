@@ -21,6 +21,7 @@ def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) 
     Raises:
         RefusedError: A stated distance is not above 0, or the ratios differ by more than 1 %.
     """
+    # The case's sides are those of the array's axes (z, y, x), a file states x, y, z.
     expected = list(reversed(sides))
     pairs = zip(stated, expected, strict=True)
     known = [(length, side) for length, side in pairs if not math.isnan(length)]
@@ -50,6 +51,7 @@ def ome_spacing(head: str) -> tuple[float, float, float]:
         unit = re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head)
         lengths.append(_length(size))
         factors.append(1.0 if unit is None else micrometres.get(unit[1], math.nan))
+    # Ratios need no unit, if all lengths have the same unknown one.
     if any(math.isnan(factor) for factor in factors):
         factors = [1.0] * 3
     x, y, z = (length * factor for length, factor in zip(lengths, factors, strict=True))

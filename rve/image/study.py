@@ -92,6 +92,7 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
         RefusedError: The file is none of these, too large for memory, or states other sides.
     """
     file = Path(path)
+    # Three sides tell a volume in a TIFF file, which may as well be a picture.
     lengths = (float(spacing),) if isinstance(spacing, float | int) else tuple(spacing)
     dimension = len(lengths) if len(lengths) > 1 else _dimension_of(file)
     require(len(lengths) in (1, dimension), "spacing", spacing, f"one length, or {dimension}")
@@ -276,6 +277,7 @@ def _labelled_study(
 ) -> ImageStudy:
     """Return the study of a labelled image; RefusedError where labels and values are not alike."""
     grey = image.values
+    # Labels are compared as they are, whatever the order of the numbers.
     phase = np.full(grey.shape, -1)
     for number, label in enumerate(labels):
         phase[grey == label] = number
@@ -452,6 +454,7 @@ def solve_study(
     model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     solution = model.solve(nominal)
+    # progress by solutions, which take about the same time
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
     images = [study.images(level, level) for level in alpha]

@@ -50,6 +50,7 @@ def as_shown(name: str, values: Array, photometric: object) -> Array:
     """
     if photometric != WHITE_IS_ZERO:
         return values
+    # Programs disagree on masks: a guess would exchange the phases without a word.
     if len(np.unique(values)) == 2:
         bright_fraction = np.mean(values == values.max())
         what = f"two-valued with white as zero, bright on {bright_fraction:.4g}"

@@ -77,6 +77,8 @@ class ConjugateGradient:
             self.watch()
             if error_factor * gamma <= self.accuracy * system.scale:
                 return x
+            # Hestenes and Stiefel (1952) with a preconditioner: the step along the direction that
+            # gains most energy, then a direction that is conjugate to those before.
             forces = system.operator(direction)
             curvature = inner(direction, forces)
             step = gamma / curvature if curvature > 0 else 0.0  # 0 by rounding alone

@@ -153,6 +153,7 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
         slab: Slice of the first axis of the grid.
     """
     xp = namespace(result)
+    # One local unknown after another: of an index that repeats, an array adds one force alone.
     for k, (unknown, offset) in enumerate(element.local):
         layers = _layers(slab, offset[0], result.shape[2])
         result[:, unknown, layers] += _roll(xp, forces[k], offset[1:])
@@ -160,6 +161,7 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
 
 def _layers(slab: slice, offset: int, size: int) -> slice | list[int]:
     """Return the layers of a slab moved along a periodic axis: a slice where none wraps."""
+    # a slice is a view, a list of indices a copy
     start = slab.start + offset
     stop = slab.stop + offset
     return slice(start, stop) if stop <= size else [k % size for k in range(start, stop)]
