@@ -36,8 +36,8 @@ def require_memory(shape: Sequence[int], division: int = 1) -> None:
     """
     available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     needed = needed_memory(shape, division)
-    # The memory of the machine counts, so that the answer is the same at every run; what is free now
-    # counts where a file is read.
+    # The memory of the machine counts, so that the answer is the same at every run. What is free
+    # now counts where a file is read.
     if needed > available:
         n = len(shape)
         side = int((available / BYTES_PER_ELEMENT[n]) ** (1 / n) / division)
