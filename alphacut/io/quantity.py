@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from alphacut.base.errors import cure_of
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity_cures import CONFUSED_PREFIXES, NUMBER_CURES, unit_cure
+from alphacut.io.quantity_cures import CONFUSED_PREFIXES, FORM_CURES, NUMBER_CURES, unit_cure
 
 if TYPE_CHECKING:
     import pint
@@ -245,6 +245,20 @@ def _parse_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
     return midpoint - half_width, midpoint + half_width
 
 
+def _parse_decimals(text: str, si: str) -> list[Decimal]:
+    """Return the numbers of a list, both ends of a spread, or one number, in the SI unit `si`.
+
+    Raises:
+        ValueError: A number or a unit is wrong.
+    """
+    if match := re.fullmatch(r"\[(.*)\]\s*(.*)", text, re.DOTALL):
+        items, unit = match.groups()
+        return [_parse_decimal(f"{item.strip()} {unit}", si) for item in items.split(",")]
+    if match := re.fullmatch(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)", text):
+        return [*_parse_spread(match, si)]
+    return [_parse_decimal(text, si)]
+
+
 def parse_numbers(value: object, si: str) -> tuple[float, ...]:
     """Return all numbers of a quantity in the SI unit `si`.
 
@@ -266,13 +280,12 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
         text = "[" + ", ".join(map(str, value)) + "]"
     if len(text) > 1000:  # regular expressions of texts take the square of their length
         raise ValueError("this is too long")
-    if match := re.fullmatch(r"\[(.*)\]\s*(.*)", text, re.DOTALL):
-        items, unit = match.groups()
-        values = [_parse_decimal(f"{item.strip()} {unit}", si) for item in items.split(",")]
-    elif match := re.fullmatch(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)", text):
-        values = [*_parse_spread(match, si)]
-    else:
-        values = [_parse_decimal(text, si)]
+    try:
+        values = _parse_decimals(text, si)
+    except ValueError as error:
+        if cure := cure_of(text, FORM_CURES):
+            raise ValueError(f'"{text}" is no quantity as it stands; {cure}') from None
+        raise error from None
     floats = tuple(float(x) for x in values)
     if any(x != 0 and not MIN_MAGNITUDE <= abs(x) <= MAX_MAGNITUDE for x in floats):
         raise ValueError(_out_of_range())
@@ -300,8 +313,10 @@ def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     values = parse_numbers(value, si)
     if isinstance(value, list) and len(value) == 1 and isinstance(value[0], str):
         raise ValueError("a list of one text, as if of a matrix; without brackets it is a value")
-    if len(values) > len(SHAPES) or list(values) != sorted(values):
+    if len(values) > len(SHAPES):
         raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
+    if list(values) != sorted(values):
+        raise ValueError("values must rise: write the smallest first and the largest last")
     return SHAPES[len(values) - 1](*values)
 
 

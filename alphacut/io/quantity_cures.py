@@ -25,6 +25,13 @@ NUMBER_CURES = {
     r"^0[xX]": "write a decimal number",
 }
 """Cure by a pattern in the text of a quantity; the first that fits holds."""
+FORM_CURES = {
+    r"^\[[^\]]*(?:±|\+/-)": 'write a spread without brackets, as "5 m ± 1 m" or "5 m ± 10 %"',
+    r"^\[[-+\d.eE,\s]*[A-Za-zµμ°%][^,\]]*\]$": 'write the unit behind the bracket, as "[5, 6] m"',
+    r"^[-+\d.eE]+\s*(?:±|\+/-)": 'write the unit behind the first number, as "5 m ± 10 %"',
+    r"(?:±|\+/-)\s*[\d.]+$": 'write a spread with % or a unit, as "5 m ± 10 %" or "5 m ± 1 m"',
+}
+"""Cure by a pattern in the text of several values or a spread whose units stand elsewhere."""
 UNIT_CURES = {
     r"(?i)^(?:(?:us |short |long |metric )?tons?|to)$": "write t (1000 kg), short_ton or long_ton",
     r"(?i)^(?:per ?cent|pct\.?|perc\.?|prozent)$": "write %",
