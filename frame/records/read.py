@@ -71,6 +71,9 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
             return read(file, unit)
     if is_table(file, is_described=bool(channel or (step and unit))):
         return read_table(file, step, unit, channel)
+    if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
+        cure = "this is a page of the web, perhaps of a login: load the record itself anew"
+        raise RefusedError(path.name, "no record but a page in HTML or XML", READ, cure)
     cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'
     raise RefusedError(path.name, "of no format that is read", READ, cure)
 

@@ -21,6 +21,7 @@ from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
     MAX_STEP,
+    MIN_STEP,
     TextFile,
     choose_channel,
     read_bytes,
@@ -213,6 +214,7 @@ def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
         r"\d\s*[a-zA-Z%]+\s*(?:[,;]|$)": "write numbers alone: units stand in the head",
         r"[A-Za-z]{2}": "text stands among the numbers: cut it off",
         r"\d,\d": "write decimal points if these are decimal commas",
+        r"[-+.eE]$": "the row ends within a number: load the file anew, or delete this row",
     }
     text = file.lines[line].strip()
     allowed = f"rows of {width} numbers such as 1.25 or 1e-3"
@@ -443,6 +445,8 @@ def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[floa
         cure = "the head states another unit of times than s: if they are in s, write time [s]"
     elif steps.step >= MAX_STEP:
         cure = "times in ms have the head time [ms]"
+    elif steps.step < MIN_STEP:
+        cure = "times of a spreadsheet are in days: multiply them by 86400"
     require_step(table.file.location(table.start), steps.step, cure)
     remarks = [steps.remark] if steps.remark else []
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:

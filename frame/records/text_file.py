@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.errors import RefusedError, cure_of, printable, require
 from alphacut.base.memory import require_text
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
@@ -26,6 +26,15 @@ MIN_STEP = 4e-5
 MAX_STEP = 0.5
 """Smallest step of a record, and the one that all are below, in s. Instruments take 10 to 20,000
 samples in a second; another step is a mistake in its unit, or a count of samples."""
+
+NO_TEXT_CURES = {
+    r"^PK(?s:.*)(?:\[Content_Types\]|xl/)|^\xd0\xcf\x11\xe0": "this is a workbook of a"
+    " spreadsheet: save its sheet as CSV",
+    r"^PK|^\x1f\x8b": "this is an archive: unpack it, and name the file inside",
+    r"^(?:\xff\xfe|\xfe\xff|(?:[ -~]\0){4}|(?:\0[ -~]){4})": "this is text in UTF-16: save it"
+    " in UTF-8",
+}
+"""Cure by the first bytes of a file, decoded as Latin-1, that holds zero bytes."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +51,9 @@ class TextFile:
         Raises:
             RefusedError: The content has zero bytes, or a line of more than 10,000 letters.
         """
-        require(b"\0" not in content, name, "no text", "a text file with a record")
+        start = content[:100].decode("latin-1")
+        cure = cure_of(start, NO_TEXT_CURES, "load it anew, or export its record as text")
+        require(b"\0" not in content, name, "no text", "a text file with a record", cure)
         file = cls(name, tuple(re.split(r"\r\n|\r|\n", decoded(content))))
         # Searches in a line take the square of its length; formats have about 80 letters a line.
         length, longest = max((len(line), number) for number, line in enumerate(file.lines))

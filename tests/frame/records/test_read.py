@@ -262,11 +262,23 @@ def test_a_wrong_row_of_a_csv_file_is_named(tmp_path, old, new, line):
     assert caught.value.key == f"record.csv, line {line}"
 
 
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\0", b"time [s],acceleration [g]\n", b"a\0b"])
-def test_a_file_that_is_no_record_is_refused(tmp_path, content):
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "load it anew"),
+        (b"\xff\xfet\0", "text in UTF-16: save it in UTF-8"),
+        (b"t\0i\0m\0e\0,\0", "text in UTF-16: save it in UTF-8"),
+        (b"time [s],acceleration [g]\n", "record.csv"),
+        (b"a\0b", "export its record as text"),
+        (b"<!DOCTYPE html>\n<html>\n", "a page of the web, .*load the record itself"),
+        (b"PK\3\4\0[Content_Types].xml", "a spreadsheet: save its sheet as CSV"),
+        (b"PK\3\4\0a.AT2", "an archive: unpack it"),
+    ],
+)
+def test_a_file_that_is_no_record_is_refused(tmp_path, content, words):
     path = tmp_path / "record.csv"
     path.write_bytes(content)
-    with pytest.raises(RefusedError):
+    with pytest.raises(RefusedError, match=words):
         read_recording(path)
 
 

@@ -139,6 +139,7 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
         (",0.1", "cells are empty"),
         ("max,0.3", "text stands among the numbers"),
         ("0.01s,0.3", "units stand in the head"),
+        ("0.01,-", "ends within a number: load the file anew"),
     ],
 )
 def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
@@ -233,6 +234,7 @@ def test_times_in_a_unit_of_something_else_are_told_which_there_are(tmp_path):
     [
         ("acceleration [g],time [s]", 0.01, "times stand in the first column"),
         ("sample,acceleration [g]", 1, "leave the count of samples out"),
+        ("time [s],acceleration [g]", 1e-7, "spreadsheet are in days: multiply them by 86400"),
         ("time [s],acceleration [g]", 10, r"times in ms have the head time \[ms\]"),
     ],
 )
