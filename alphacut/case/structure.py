@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, PlainValidator, ValidationInfo
 
+from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, StoreyFrame, damping_from_loss, pendulum, read_record
@@ -301,11 +302,33 @@ class Frame(StructureSection):
             if max(sizes) > MAX_RATIO_OF_STOREYS * min(sizes):
                 ratio = max(sizes) / min(sizes)
                 yield f"frame.{key} of two storeys differ {ratio:,.0f}-fold: is a unit wrong?"
+        tallest = max((height.nominal for height in self.lengths or ()), default=0.0)
+        if tallest > 100:  # m, ten times the height of a tall storey
+            yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
+            return
         if self.gravity or self.lengths is None or structure is None:
             return
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
-        for z, coefficient in enumerate(frame.stability_coefficients(ends), start=1):
+        yield from self._weight_warnings(frame.stability_coefficients(ends))
+
+    def _weight_warnings(self, coefficients: Array) -> Iterator[str]:
+        """Yield a sentence for each storey whose weight should not be left out.
+
+        Args:
+            coefficients: Weight over stiffness and height of each storey, shape (floors,). From 1
+                on the storey buckles, so that a weight in the case would be no cure.
+        """
+        lightest = 1e-5  # those of buildings are above 1e-4
+        largest = coefficients.max()
+        doubt = "are the units of stiffness, masses and lengths right?"
+        if largest >= 1:
+            what = f"the weight on storey {coefficients.argmax() + 1} is up to {largest:.3g} times"
+            yield f"{what} its stiffness times its height, and would buckle it: {doubt}"
+            return
+        if largest < lightest:
+            yield f"weights over stiffness and height of storeys are below {lightest:g}: {doubt}"
+        for z, coefficient in enumerate(coefficients, start=1):
             if coefficient > 0.1:  # up to which EN 1998-1, 4.4.2.2, neglects P-Delta
                 what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
                 yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'

@@ -69,6 +69,26 @@ def test_check_warns_of_a_weight_that_the_case_leaves_out(tmp_path, capfd):
     assert "warning" not in capfd.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        ("2.1] MN/m", "2.1] kN/m", "the weight on storey 1 is up to 150 times its stiffness"),
+        ('"3 m"', '"3000 m"', "frame.lengths has a storey of 3000 m: is its unit right"),
+        ('"60 t", "30 t"', '"60 g", "30 g"', "storeys are below 1e-05: are the units"),
+    ],
+)
+def test_check_asks_for_units_where_a_weight_is_far_from_a_storey(
+    tmp_path, capfd, old, new, warning
+):
+    path = written(tmp_path, "")
+    text = path.read_text(encoding="utf-8").replace("5 MN/m", "[1.96, 2.1] MN/m")
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    said = capfd.readouterr().out
+    assert warning in said
+    assert "say frame.gravity" not in said
+
+
 def test_check_warns_of_a_storey_whose_unit_seems_wrong(tmp_path, capfd):
     path = written(tmp_path, 'gravity = "1 g"')
     path.write_text(path.read_text(encoding="utf-8").replace("5 MN/m", "5 GN/m"), encoding="utf-8")
