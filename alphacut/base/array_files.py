@@ -67,6 +67,8 @@ class ArrayHead:
         cure = "save numbers, as array.astype(float)"
         if self.dtype.kind == "c":
             cure = "save its real part, array.real"
+        elif self.dtype.kind == "O":
+            cure = "save numbers, as array.astype(float), a sparse matrix by scipy.sparse.save_npz"
         require(is_known, name, f"{self.dtype} of shape {self.shape}", ALLOWED, cure)
         is_shape = len(self.shape) <= 8 and all(n >= 0 for n in self.shape)
         require(is_shape, name, f"of shape {self.shape}", ALLOWED)

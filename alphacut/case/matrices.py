@@ -205,4 +205,7 @@ class MatricesSection(StructureSection):
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
         is_moved = bool(self._ground_pattern().any())
-        require(is_moved, "matrices.direction", self.direction or None, allowed)
+        cure = ""
+        if not any("." in name for name in self.unknowns):
+            cure = "name the unknowns NODE.DIRECTION, as 1.x, or write a table as { NAME = 1.0 }"
+        require(is_moved, "matrices.direction", self.direction or None, allowed, cure)

@@ -90,7 +90,10 @@ class EnvelopeSection(Section):
         is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps  # round-off
         if not is_multiple or steps > MOST_STEPS:
             allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
-            count = max(round(steps), 1)
+            if steps < 1:
+                cure = f"envelope.step is longer, {self.step:g} s: mend the unit of either"
+                raise RefusedError(key, f"{duration:g} s", allowed, cure)
+            count = round(steps)
             cure = f'write envelope.step = "{duration / count:.9g} s"'
             if count > MOST_STEPS:
                 cure = f'write envelope.step = "{duration / MOST_STEPS:.3g} s" or more'

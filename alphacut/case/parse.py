@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.errors import RefusedError, cure_of, printable, require
 from alphacut.case.types import Quantity, Section
 from alphacut.io.files import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
@@ -28,6 +28,11 @@ KINDS = {
 }
 """What a key takes, by Pydantic's name of the error."""
 C = TypeVar("C", bound=Section)
+TOML_CURES = {
+    r"=\s*[-+]?[\d.]+\s*[A-Za-z%°µμ±]": 'quantities stand in quotes, as "0.01 s"',
+    r"=\s*(?!true|false|inf|nan)[A-Za-z]": 'texts stand in quotes, as "auto"',
+}
+"""Cure by a pattern in a line that is not TOML."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,8 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
             place += f":{match[1]}"
             shown = text.splitlines()[int(match[1]) - 1].strip() or shown
         what = str(error).partition(" (at")[0].lower()
-        problem = RefusedError(shown, f"not TOML: {what}", "", "", place)
+        cure = cure_of(shown, TOML_CURES)
+        problem = RefusedError(shown, f"not TOML: {what}", "", cure, place)
         raise BadInput([problem]) from None
 
 

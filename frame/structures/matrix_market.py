@@ -42,6 +42,9 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
         cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
+        if re.match(r"\s*\d+\s*,", first):  # of Abaqus, in its own order of nodes and directions
+            cure = "write ROW COLUMN VALUE without commas, below the line %%MatrixMarket matrix"
+            cure += " coordinate real symmetric and one of sizes, as 18 18 42"
         raise RefusedError(name, first, EXPECTED, cure)
     is_sparse = match[1].lower() == b"coordinate"
     is_symmetric = match[2].lower() == b"symmetric"

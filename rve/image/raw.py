@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import zlib
 from collections.abc import Sequence
@@ -60,10 +61,11 @@ class RawHead:
         found = self.data.stat().st_size
         sizes = " × ".join(map(str, self.stored_shape[::-1]))
         name = self.data.name
+        cure = "mend the sizes and the type in the head, or copy the data anew"
         allowed = f"{expected} for {sizes} of {self.dtype}"
         if self.is_compressed:
             content = self._decompressed(expected)
-            require(len(content) == expected, name, f"{len(content)} bytes unpacked", allowed)
+            require(len(content) == expected, name, f"{len(content)} bytes unpacked", allowed, cure)
             values = np.frombuffer(content, self.dtype)
         else:
             offset = self.offset
@@ -72,7 +74,7 @@ class RawHead:
             if offset > 0:
                 allowed = f"{offset} + {allowed}"
             is_whole = offset >= 0 and found == offset + expected
-            require(is_whole, name, f"{found} bytes", allowed)
+            require(is_whole, name, f"{found} bytes", allowed, cure)
             values = np.fromfile(self.data, self.dtype, offset=offset)
         values = values.reshape(self.stored_shape).astype(self.dtype.newbyteorder("="))
         return np.asarray(np.flip(values, self.reversed_axes).transpose(self.order))
@@ -121,7 +123,9 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     are_whole = are_whole and math.prod(map(int, sizes)) <= 1 << 40
     require(are_whole, name, f"sizes {' '.join(sizes)}", "whole numbers greater than 0")
     # folders and devices are no data
-    require(data.is_file(), name, f"data in {data.name}", "a file beside the head")
+    value = f"data in {os.path.relpath(data, path.parent)}, which is no file"
+    cure = "put the data there, or mend the name in the head"
+    require(data.is_file(), name, value, "a file, from the folder of the head", cure)
 
     encoding = entries.value("encoding").lower() or "raw"
     is_gzip = encoding in ("gzip", "gz")

@@ -90,7 +90,8 @@ def read_prisms(mesh: MshFile) -> Prisms:
         name = mesh.names.get(group) or f"group {group}"
         volumes = sorted(mesh.groups[group])
         if grouped & set(volumes):
-            raise MeshError(f"prisms of the physical group {name!r} are in another one too")
+            cure = "give each volume one physical group alone"
+            raise MeshError(f"prisms of the physical group {name!r} are in another one too", cure)
         grouped |= set(volumes)
         for volume in volumes:
             cells.append(_cells_of(mesh, volume, name))

@@ -224,14 +224,15 @@ def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
         value = type(phases).__name__
         raise RefusedError("phases of the mesh", value, f"{{name: phase}} for the groups {listed}")
     allowed = f"one for each physical group: {listed}"
+    cure = 'write the names of the mesh, or name its groups: addPhysicalGroup(3, …, name="matrix")'
     for name, phase in phases.items():
         if name not in names:
-            raise RefusedError("phase", repr(name), allowed)
+            raise RefusedError("phase", repr(name), allowed, cure)
         if not isinstance(phase, Phase | VoigtPhase):
             raise RefusedError(f"phase {name!r}", repr(phase), "a Phase or a VoigtPhase")
     for name in names:
         if name not in phases:
-            raise RefusedError("phase", f"without {name!r}", allowed)
+            raise RefusedError("phase", f"without {name!r}", allowed, cure)
     require_compressible(*phases.values())
     return {name: phases[name] for name in names}
 
@@ -253,5 +254,6 @@ def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
     if max(distances) > tolerance:
         value = f"on {distribution.lower:g} … {distribution.upper:g}"
         allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
-        raise RefusedError("law of θ", value, allowed)
+        cure = f"a case has radius.theta = [{low:g}, {high:g}]"
+        raise RefusedError("law of θ", value, allowed, cure)
     return FixedCell(distribution)

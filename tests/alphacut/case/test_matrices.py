@@ -90,6 +90,7 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ("12*E*I*l^-3", "E*J", "factor"),
         ('row = { "2.x"', 'row = { "9.x"', "matrices.outputs.roof.row"),
         ('direction = "x"', 'direction = "y"', "matrices.direction"),
+        ('.x"', '"', "name the unknowns NODE.DIRECTION, as 1.x"),
         ('direction = "x"', 'direction = ["x", "y"]', "of a list make a table"),
         ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
         ('"lower.mtx"', '"short.csv"', "short.csv is of shape (1, 2); allowed: (2, 2); the case"),

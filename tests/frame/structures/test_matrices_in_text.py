@@ -63,6 +63,7 @@ def test_files_of_other_types_are_told_what_to_write(tmp_path, name, cure):
 def test_arrays_that_are_no_matrix_are_told_what_they_are(tmp_path):
     for array, words in (
         (MATRIX * 1j, "complex128 of shape"),
+        (MATRIX.astype(object), "a sparse matrix by scipy.sparse.save_npz"),
         (np.zeros((2, 2, 2)), "an array of 2 × 2 × 2"),
     ):
         np.save(tmp_path / "k.npy", array)
