@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -25,7 +25,7 @@ from alphacut.fuzzy.campaign.call import (
     named_point,
 )
 from alphacut.fuzzy.campaign.store import Store, point_key
-from alphacut.fuzzy.campaign.workers import completed
+from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -155,6 +155,14 @@ class Campaign:
             self.progress(fraction)
 
 
+def _tasks(call: Call, points: Array, *, stored: frozenset[int]) -> Iterator[Task]:
+    """Yield the rows that each call evaluates, without the stored ones, and their points."""
+    for rows in call.tasks(points):
+        missing = [row for row in rows if row not in stored]
+        if missing:
+            yield missing, points[missing]
+
+
 def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
     """Return the sample or failure of each new point, from the store, or evaluated for it.
 
@@ -175,8 +183,7 @@ def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
             sample = campaign.store.get(campaign.model, key)
             if sample:
                 outcomes[row] = campaign.checked(sample)
-    rows_by_call = ([x for x in rows if x not in outcomes] for rows in campaign.call.tasks(points))
-    tasks = ((rows, points[rows]) for rows in rows_by_call if rows)
+    tasks = _tasks(campaign.call, points, stored=frozenset(outcomes))
     unwritten: dict[str, Sample] = {}
     last_write = perf_counter()
     write_seconds = 0.0

@@ -130,7 +130,7 @@ class General:
                 knowledge.
         """
         grids = level_grids(domain, inner=self.takes_inner_points)
-        count = sum(prod(len(points) for points in grid) for grid in grids)
+        count = sum(prod(map(len, grid)) for grid in grids)
         require_budget(count, campaign, self.name)
         points = [point for grid in grids for point in product(*grid)]
         bounds = bounds_at(campaign, domain, np.array(points), self.name)
