@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from textwrap import fill
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -86,7 +87,7 @@ def draw_tolerances(answer: Tolerances) -> Figure:
 def draw_decision(answer: Decision) -> Figure:
     """Draw, of each limit, bars from the smallest to the largest peak over it on each level."""
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
-    figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.7 * len(limits)))
+    figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.85 * len(limits)))
     rows = np.arange(len(limits))[::-1]  # the first limit on top
     for row, limit in zip(rows, limits, strict=True):
         ratios = peak_over_limit(limit)
@@ -96,12 +97,14 @@ def draw_decision(answer: Decision) -> Figure:
             f"possible to {degree_text(limit.possibility)},"
             f" necessary to {degree_text(limit.necessity)}"
         )
-        text = f"{limit.verdict_words} ({answer.nature_text(limit.nature)}): {degrees}"
-        axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
+        # Two lines of text have room between the bars of two limits.
+        text = fill(f"{limit.verdict_words} ({answer.nature_text(limit.nature)}): {degrees}", 72)
+        place: Look = {"fontsize": 8, "linespacing": 1.0, "transform": axes.get_yaxis_transform()}
+        axes.text(0.01, row + 0.37, text, **place)
     axes.axvline(1.0, **LIMIT)
     axes.axvline(0.0, color=GREY, lw=0.4)
     axes.set_ylim(-0.5, len(limits) - 0.2)
-    axes.set_yticks(rows, [limit.words for limit in limits], color=INK)
+    axes.set_yticks(rows, [limit.words.replace("^2", "²") for limit in limits], color=INK)
     axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
     return figure
 
