@@ -106,7 +106,7 @@ def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfi
     rank_cells = np.array_split(cells, comm.size)[comm.rank]
     rank_coordinates = np.array_split(coordinates, comm.size)[comm.rank]
 
-    def keep_on_rank(*_: Any) -> Any:
+    def keep_on_rank(*_: object) -> object:
         destinations = np.full((len(rank_cells), 1), comm.rank, np.int32)
         graph = dolfinx.graph.adjacencylist(destinations)
         return getattr(graph, "_cpp_object", graph)  # DOLFINx 0.9 has no Python class

@@ -182,10 +182,10 @@ class FuzzyStiffness:
         lines = ["constant,alpha,lower,upper,guarantee"]
         for name in self.constants:
             guarantee = self.bounds.nature_of(name)
-            for alpha, cut in zip(self.bounds.alpha, self.cuts(name), strict=True):
-                lower = float(cut[0])
-                upper = float(cut[1])
-                lines.append(f"{name},{alpha:g},{lower!r},{upper!r},{guarantee}")
+            lower, upper = self.bounds.bounds(name)
+            for level, alpha in enumerate(self.bounds.alpha):
+                ends = f"{float(lower[level])!r},{float(upper[level])!r}"
+                lines.append(f"{name},{alpha:g},{ends},{guarantee}")
         with open(path, "w", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n")
 

@@ -9,15 +9,18 @@ above, those of level 1, and so on. A rank owns levels with the mid-level above 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid
+
+Number = TypeVar("Number", bound=np.generic)
 
 
 class Elimination:
@@ -138,7 +141,7 @@ class LevelNumbering:
         on_mid_levels = np.where(vertices >= 0, vertices + first_on_mid_level, -1)
         return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
-    def split(self, fields: Any) -> tuple[Any, Any]:
+    def split(self, fields: NDArray[Number]) -> tuple[NDArray[Number], NDArray[Number]]:
         """Return views of hats and bubbles of fields.
 
         Args:
