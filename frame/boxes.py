@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -301,7 +301,7 @@ class UnitFlow:
         return self.flow.taylor(self.boxes.to_physical(unit)).rescaled(self.boxes.radius)
 
     def envelope(
-        self, bounds: Array, at: Array, error: Array | None = None, **fields: Any
+        self, bounds: Array, at: Array, error: Array | None = None, **fields: object
     ) -> Envelope:
         """Return the envelope with given bounds.
 
@@ -322,5 +322,5 @@ class UnitFlow:
             upper_at=at[..., 1, :],
             error=np.zeros(bounds.shape[:-1]) if error is None else error,
             units=self.units,
-            **fields,
+            **fields,  # type: ignore[arg-type]
         )

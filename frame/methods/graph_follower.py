@@ -11,9 +11,9 @@ trajectory of the outputs over time a graph. The implementation differs from it 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -279,7 +279,10 @@ def estimated_envelope(
     *,
     error: Array,
     steepest: Array,
-    **fields: Any,
+    method: str,
+    evaluations: int,
+    facts: Mapping[str, float],
+    notes: tuple[str, ...] = (),
 ) -> Envelope:
     """Return an estimated envelope, or an attained one if neighbouring trajectories diverge.
 
@@ -293,11 +296,26 @@ def estimated_envelope(
         points: Unit coordinates that attain them, shape (levels, times, outputs, 2, inputs).
         error: Estimated error of the bounds, shape (levels, times, outputs).
         steepest: Largest first derivative of each output by a unit coordinate, shape (outputs,).
-        fields: Further fields of `Envelope` by name.
+        method: Name of the method.
+        evaluations: Number of trajectories.
+        facts: Further numbers by name, see `Envelope`.
+        notes: Remarks, one sentence each.
     """
     at = flow.boxes.to_physical(points)
     widest = bounds[0]
     half_range = (widest[..., 0].max(axis=0) + widest[..., 1].max(axis=0)) / 2
+    nature = Nature.ESTIMATED
+    estimate: Array | None = error
     if (steepest > 8.0 * half_range).any():
-        return flow.envelope(bounds, at, nature=Nature.ATTAINED, **fields)
-    return flow.envelope(bounds, at, error, nature=Nature.ESTIMATED, **fields)
+        nature = Nature.ATTAINED
+        estimate = None
+    return flow.envelope(
+        bounds,
+        at,
+        estimate,
+        method=method,
+        nature=nature,
+        evaluations=evaluations,
+        facts=facts,
+        notes=notes,
+    )
