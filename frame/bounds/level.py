@@ -23,6 +23,12 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import ModalResponseModels
 from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.response.chord_deviation import (
+    Response,
+    load_deviation,
+    narrowed_at_jumps,
+    narrowed_deviation,
+)
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,
@@ -30,12 +36,6 @@ from alphacut.frame.response.oscillators import (
     grid_over,
     is_fed_through,
     read_response,
-)
-from alphacut.frame.response.straying import (
-    Response,
-    load_deviation,
-    narrowed_at_jumps,
-    narrowed_straying,
 )
 
 
@@ -167,7 +167,7 @@ class LevelModels:
             by_magnitude += np.outer(load_deviation(response.load, time), of_others)
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
         responses += feedthroughs.values()
-        narrowed = narrowed_straying(responses, time, by_magnitude, unresolved)
+        narrowed = narrowed_deviation(responses, time, by_magnitude, unresolved)
         if unresolved.any():
             # Steps in which a force jumps need the change of all contributions within the step.
             return narrowed
@@ -205,7 +205,7 @@ class LevelModels:
                     load=self.excitation.loads[source],
                     order=2,
                     coefficient=coefficient.value[:, np.newaxis, np.newaxis],
-                    spread=np.stack([real_radius, 0 * real_radius]),
+                    coefficient_error=np.stack([real_radius, 0 * real_radius]),
                 )
                 yield source, response
 
@@ -230,7 +230,7 @@ class LevelModels:
                     load=loads.get(source),
                     order=order,
                     coefficient=participation * (real + 1j * imag),
-                    spread=np.outer(largest, radius * of_order),
+                    coefficient_error=np.outer(largest, radius * of_order),
                 )
 
 

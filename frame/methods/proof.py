@@ -44,9 +44,9 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.response.chord_deviation import Response, narrowed_at_jumps, narrowed_deviation
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.straying import Response, narrowed_at_jumps, narrowed_straying
 
 LOG = logging.getLogger(__name__)
 
@@ -371,7 +371,7 @@ def _line_deviation(model: ModalModel) -> Array:
     # The sum of the magnitudes of all modes bounds the deviation; where it is large, the signs of
     # the modes are used, which often cancel.
     by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)
-    deviation = narrowed_straying(responses, time, by_magnitude)
+    deviation = narrowed_deviation(responses, time, by_magnitude)
     return narrowed_at_jumps(responses, time, deviation)
 
 

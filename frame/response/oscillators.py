@@ -32,14 +32,14 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.records.history import History
-from alphacut.frame.response.duhamel import absolute_moments, require_in_range
-from alphacut.frame.response.straying import (
+from alphacut.frame.response.chord_deviation import (
     fourth_derivative,
     line_deviations,
     moments_of,
     responses_of,
     with_power,
 )
+from alphacut.frame.response.duhamel import absolute_moments, require_in_range
 
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ in `response_ranges`."""

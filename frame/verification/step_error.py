@@ -15,7 +15,7 @@ from alphacut.frame.dynamics.flow import Flow, StepError
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.records.history import History
-from alphacut.frame.response.straying import load_deviation, load_excess
+from alphacut.frame.response.chord_deviation import load_deviation, load_excess
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import evaluate, has_matrices
 from alphacut.frame.structures.loads import distinct_histories

@@ -25,7 +25,7 @@ SHORTEST_PERIOD = 2 * np.pi / np.sqrt(np.linalg.eigvalsh(STIFFNESS)[-1])
 @pytest.mark.parametrize("periods", [0.1, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("proof", [DualProof(slabs=2, steps=4, peaks=1.0), Proof(tolerance=5e-2)])
-def test_between_is_at_most_three_times_the_true_straying(proof, load, periods):
+def test_between_is_at_most_three_times_the_true_deviation(proof, load, periods):
     frame = StoreyFrame(
         [2e4] * FLOORS,
         stiffness=[4e7] * FLOORS,

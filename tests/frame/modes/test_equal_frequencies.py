@@ -49,8 +49,8 @@ def test_double_modes_are_proved_and_the_output_at_rest_has_no_gap(angle, method
     assert found.facts["gap_of_peaks"] < 2e-3
     points, nodes = np.array([[600.0], [610.0], [620.0]]), np.arange(0, 3001, 10)
     fine = exact_motions(building(angle), points, ("k",), 3.0, 0.001)[..., 0]
-    straying = [np.abs(x - np.interp(np.arange(3001), nodes, x[::10])).max() for x in fine]
-    assert max(straying) <= found.between[:, 0].max() <= 3 * max(straying)
+    deviation = [np.abs(x - np.interp(np.arange(3001), nodes, x[::10])).max() for x in fine]
+    assert max(deviation) <= found.between[:, 0].max() <= 3 * max(deviation)
 
 
 def test_an_oscillator_is_left_where_all_blocks_are_narrower_by_sums():

@@ -75,7 +75,7 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
         eigenvalue_low=np.full(2, squared - off), eigenvalue_high=np.full(2, squared + off)
     )
     excitation = Excitation({}, time, ("start",))
-    added, straying, _ = coupling_bounds(structure, of_block, found, excitation)
+    added, deviation, _ = coupling_bounds(structure, of_block, found, excitation)
     largest_read = 1 + variation / 2
 
     def coupled(t):
@@ -87,5 +87,5 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
     assert (at_nodes[-10:] >= 0.9 * added[-10:, 0]).all()
     middles = (time[1:] + time[:-1]) / 2
     between = np.abs(coupled(middles) - (coupled(time[1:]) + coupled(time[:-1])) / 2)
-    assert (between <= straying[1:, 0] + 1e-12).all()
-    assert (between[-10:] >= 0.8 * straying[-10:, 0]).all()
+    assert (between <= deviation[1:, 0] + 1e-12).all()
+    assert (between[-10:] >= 0.8 * deviation[-10:, 0]).all()

@@ -116,14 +116,14 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
     found = motion(system, inputs, method=DualProof(), alpha=(1.0,))
     wide = np.abs(found.upper).max(1, keepdims=True) * np.ones_like(found.upper)
     (exact,) = self_test.structures_at(system, found, np.array([[4e6]]))
-    straying = np.zeros_like(found.between)
+    deviation = np.zeros_like(found.between)
     nodes = exact.outputs(found.time)[0]
     for fraction in np.arange(1, 40) / 40:
         inside = exact.outputs(found.time[:-1] + np.diff(found.time) * fraction)[0]
         chord = (1 - fraction) * nodes[:-1] + fraction * nodes[1:]
-        straying[1:] = np.maximum(straying[1:], np.abs(inside - chord))
+        deviation[1:] = np.maximum(deviation[1:], np.abs(inside - chord))
     faulty = replace(
-        found, lower=-3 * wide, upper=3 * wide, inner=None, outer=None, between=0.75 * straying
+        found, lower=-3 * wide, upper=3 * wide, inner=None, outer=None, between=0.75 * deviation
     )
     with pytest.raises(ContradictionError, match="from the straight line"):
         self_test.with_motions_tested(faulty, system)

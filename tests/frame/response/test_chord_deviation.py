@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame.records.history import History
+from alphacut.frame.response.chord_deviation import Response, narrowed_deviation
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import grid_over
-from alphacut.frame.response.straying import Response, narrowed_straying
 
 PARTS, TIME = 40, np.linspace(0, 1.2, 25)
 LOADS = {
@@ -50,7 +50,7 @@ def modes_that_cancel(load, width, rng):
         kappa = SHARES / (1j * w) + spread * (signs[0] + 1j * signs[1])
         return off_chords((-q + 1j) * w, LOADS[load], order, kappa)
 
-    return draw, narrowed_straying(responses, TIME, by_magnitude)[1:, 0], by_magnitude[1:, 0]
+    return draw, narrowed_deviation(responses, TIME, by_magnitude)[1:, 0], by_magnitude[1:, 0]
 
 
 @pytest.mark.parametrize("width", [0.0, 0.03, 0.3])

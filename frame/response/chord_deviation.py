@@ -10,7 +10,7 @@ differs from a line by at most r within the segment adds at most 2 d r. The dist
 the segments from the chord of the whole step are computed from the responses there.
 
 These bounds add modes by magnitude. Where the responses of modes cancel, nodes are added within the
-steps, at which responses are summed with their signs (`narrowed_straying`).
+steps, at which responses are summed with their signs (`narrowed_deviation`).
 """
 
 from __future__ import annotations
@@ -60,22 +60,24 @@ class Response(NamedTuple):
         order: Order of the derivative by time.
         coefficient: κ at the points of the grid, monotonic between them along q and along ω, shape
             (m, Q, W); of a load itself (m, 1, 1).
-        spread: Bounds of the errors of Re κ and of Im κ, shape (2, m).
+        coefficient_error: Bounds of the errors of Re κ and of Im κ, shape (2, m).
     """
 
     sigma: Array | None
     load: History | None
     order: int
     coefficient: Array
-    spread: Array
+    coefficient_error: Array
 
-    def in_the_middle(self) -> Response:
+    def at_midpoint(self) -> Response:
         """Return the response at the midpoint of the grid alone, without errors of κ."""
         _, q_points, w_points = self.coefficient.shape
         q = q_points // 2
         w = w_points // 2
         coefficient = self.coefficient[:, q : q + 1, w : w + 1]
-        response = self._replace(coefficient=coefficient, spread=0 * self.spread)
+        response = self._replace(
+            coefficient=coefficient, coefficient_error=0 * self.coefficient_error
+        )
         if self.sigma is None:
             return response
         return response._replace(sigma=self.sigma[q : q + 1, w : w + 1])
@@ -87,7 +89,7 @@ class Response(NamedTuple):
         |Re κ H| ≤ |Re κ| |H| + |ω Im κ| |Im H/ω|.
         """
         kappa = self.coefficient
-        real_error, imag_error = self.spread
+        real_error, imag_error = self.coefficient_error
         real = np.abs(kappa.real).max((1, 2)) + real_error
         if self.sigma is None:
             assert self.load is not None
@@ -117,7 +119,7 @@ class Response(NamedTuple):
         sliver = 4 * SAME_TIME * self.load.step
         missed = 2 * sliver * self.load.extremes[1]
         deviation = load_deviation(self.load, np.array([first, last - sliver]))[1] + missed
-        real = np.abs(self.coefficient.real).max((1, 2)) + self.spread[0]
+        real = np.abs(self.coefficient.real).max((1, 2)) + self.coefficient_error[0]
         return np.asarray(deviation * real)
 
     def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
@@ -161,7 +163,7 @@ class Response(NamedTuple):
     def _range_of_load(self, value: Array) -> tuple[Array, Array]:
         """Return bounds of Re κ f for values f of the load itself, (N, 1): shape (N, m) each."""
         midpoint = value * self.coefficient[:, 0, 0].real
-        radius = np.abs(value) * self.spread[0]
+        radius = np.abs(value) * self.coefficient_error[0]
         return midpoint - radius, midpoint + radius
 
     def _range_off(self, chords: Chords, nodes: Array, *, fourth: Array) -> tuple[Array, Array]:
@@ -202,7 +204,7 @@ class Response(NamedTuple):
             differences = np.abs(np.diff(self.coefficient, axis=axis))
             change = change + differences.max((1, 2), initial=0.0)
         margin = np.outer(missed, np.abs(kappa).max(1)) + np.outer(np.hypot(real, imag), change)
-        margin += np.stack([real + missed, imag + missed], 1) @ self.spread
+        margin += np.stack([real + missed, imag + missed], 1) @ self.coefficient_error
         return low - margin, margin - minus_high
 
     def _fourth_off_chords(self, time: Array) -> Array:
@@ -272,7 +274,7 @@ class Chords(NamedTuple):
         return np.asarray(bound + np.maximum(bound[self.before], bound[self.after]))
 
 
-def narrowed_straying(
+def narrowed_deviation(
     responses: Sequence[Response], time: Array, bound: Array, unresolved: Array | float = 0.0
 ) -> Array:
     """Return a narrower bound of the distance of Σ responses + unresolved from chords, (T, m).
@@ -295,7 +297,7 @@ def narrowed_straying(
     # are taken for the whole box, too, else sixteen: what remains then is due to the box itself.
     few = 4
     many = 16
-    midpoint = [response.in_the_middle() for response in responses]
+    midpoint = [response.at_midpoint() for response in responses]
     at_added, between_added = _at_and_between_added(midpoint, time, few)
     largest = at_added.max(0)
     if (bound.max(0) <= 2.5 * largest).all():
