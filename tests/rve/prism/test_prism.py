@@ -6,6 +6,8 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import Interval
+from alphacut.rve import fuzzy_stiffness
 from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.mesh.columns import extrude
@@ -266,3 +268,11 @@ class Empty(Own):
 def test_layers_without_probability_are_refused():
     with pytest.raises(RefusedError, match=r"density of θ at .* is 0; allowed: positive densities"):
         solve(HermiteMap(0.2, 0.1, 0.8, 0.2, Empty()), mesh_size=0.3, layers=4)
+
+
+def test_curves_of_a_campaign_declare_the_error_at_a_single_theta():
+    model = PrismModel(0.6, 3, estimate=False)
+    inputs = {"inclusion_modulus": Interval(79e9, 81e9)}
+    found = fuzzy_stiffness(model, PAPER, (MATRIX, PARTICLE), inputs, alpha=[0.0], progress=False)
+    assert found.curve_error == ModulusBasis.curve_error > 0
+    assert found.to_dataset()["curve11"].attrs["relative_error"] == found.curve_error
