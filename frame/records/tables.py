@@ -500,7 +500,8 @@ def _even_steps(
         raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
 
     even: Array = np.asarray(np.linspace(first, time[-1], len(time)), float)
-    step = float(even[1] - even[0])
+    # Differences of two times as 1.7e9 s, from 1970 on, have lost the digits of the step.
+    step = duration / n_steps
     if step > 0 and np.abs(time - even).max() <= MAX_UNEVENNESS * step:
         return _EvenSteps(step, first)
     last_digit = to_s * table.resolution()

@@ -217,10 +217,12 @@ def test_decimal_commas_between_commas_are_told_apart_by_the_head(tmp_path, is_w
     assert "these seem to be decimal commas" in refused(path)
 
 
-def test_no_warning_of_numpy_is_raised_by_times_that_begin_late(tmp_path, recwarn):
-    rows = [f"{1 + 0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in range(20)]
+@pytest.mark.parametrize("start", [1, 1_709_290_000])
+def test_times_that_begin_late_keep_their_step_and_raise_no_warning(tmp_path, recwarn, start):
+    rows = [f"{start + 0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in range(400)]
     record = read_recording(saved(tmp_path, rows, "time [s],acceleration [g]"))
-    assert record.remarks == ("its times begin at 1 s, taken as 0",)
+    assert record.remarks == (f"its times begin at {start:g} s, taken as 0",)
+    assert record.step == pytest.approx(0.01, rel=1e-7)
     assert not recwarn.list
 
 
