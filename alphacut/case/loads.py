@@ -165,8 +165,11 @@ class Scale:
 def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
     """Return the recordings of all files that "records/*.AT2" or "a.v2#1" matches.
 
-    Files stand below the case's folder; the text after # is the channel of each file.
+    Files stand below the case's folder; the text after # is the channel of each file. None is read
+    where step or unit is refused: without it the files would seem to lack one.
     """
+    if "step" not in info.data or "unit" not in info.data:
+        return ()
     folder: Path = (info.context or {}).get("folder", Path())
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"

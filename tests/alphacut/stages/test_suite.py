@@ -108,8 +108,9 @@ def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
     assert record.ground.step == 0.02
     assert record.ground.samples == pytest.approx(samples)
     for old, bad in (("0.02 s", "0.02"), ("m/s^2", "mm"), ('unit = "m/s^2"\n', "")):
-        with pytest.raises(BadInput, match=r"unit|step"):
+        with pytest.raises(BadInput, match=r"unit|step") as caught:
             records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new.replace(old, bad))
+        assert len(str(caught.value).splitlines()) == 1
 
 
 def test_all_bad_files_of_a_folder_are_named_at_once(tmp_path):
