@@ -120,7 +120,8 @@ class Exact:
             substeps = 1 << max(0, doublings)
             longest = f"up to {largest_phase * most_substeps / fastest:.2g} s"
             allowed = f"{longest} with motions as fast as {fastest:.3g} rad/s under a load"
-            require(substeps <= most_substeps, "step", value=f"{step:g} s", allowed=allowed)
+            cure = "such fast motions are mostly stiffness or mass in a wrong unit"
+            require(substeps <= most_substeps, "step", f"{step:g} s", allowed, cure)
         h = step / substeps
 
         # (A h)^k b / k!, each from the one before

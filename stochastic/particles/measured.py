@@ -83,7 +83,8 @@ def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
         if not ((centre >= 0) & (centre <= size)).all():
             value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
             allowed = f"places in the section of {1e3 * size[0]:g} × {1e3 * size[1]:g} mm"
-            raise RefusedError(f"{path.name}, row {row}", value, allowed)
+            cure = "mend the row, or the size of the section"
+            raise RefusedError(f"{path.name}, row {row}", value, allowed, cure)
     discs = Particles(centres, radii, np.array(size), periodic=False)
     first, second = close_pairs(discs, 0.0)
     overlap = -surface_distance(discs, first, second) / np.minimum(radii[first], radii[second])
@@ -92,7 +93,8 @@ def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
         upper, lower = sorted([int(rows[first[worst]]), int(rows[second[worst]])])
         value = f"a circle that overlaps that of row {upper} by {overlap[worst]:.2g} of its radius"
         key = f"{path.name}, row {lower}"
-        raise RefusedError(key, value, "circles that do not overlap", "mend the row")
+        cure = "mend the row; columns of radii have the head r, those of diameters d"
+        raise RefusedError(key, value, "circles that do not overlap", cure)
     return discs
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from alphacut.base.errors import RefusedError
 from alphacut.frame import INTEGRATORS, Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.dynamics.integrators import Integrator
 from benchmarks.frame.envelopes import FRAME
@@ -34,6 +35,12 @@ def test_error_falls_with_the_square_of_the_step(method: Integrator, system: Sto
         assert max(errors) < 1e-11
     else:
         assert abs(np.log2(errors[0] / errors[1]) - 2) < 0.15
+
+
+def test_motions_as_of_a_stiffness_in_a_wrong_unit_are_refused() -> None:
+    stiff = replace(SHAKEN, modulus=1e15 * SHAKEN.modulus)
+    with pytest.raises(RefusedError, match="mostly stiffness or mass in a wrong unit"):
+        LinearFlow(stiff, ("E",), 10, 0.1, Exact()).values(modal(("E",), stiff))
 
 
 @pytest.mark.parametrize("method", ALL, ids=str)
