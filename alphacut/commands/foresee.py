@@ -96,7 +96,7 @@ def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
         yield from _motion(content, content.envelope, material)
 
 
-def whole_seconds(run: Callable[[float], float]) -> float:
+def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
     """Return about how many seconds a work takes, from the times of small parts of it.
 
     The time of a part x of the work is taken as a + b x, where a is what every part takes once.
@@ -104,19 +104,22 @@ def whole_seconds(run: Callable[[float], float]) -> float:
 
     Args:
         run: Function that does about a fraction of the work, and returns the fraction done.
+        fewest: Number of parts that are timed, however long they take.
     """
     parts, seconds = list[float](), list[float]()
     for fraction in PARTS:
         start = perf_counter()
         parts.append(run(fraction))
         seconds.append(perf_counter() - start)
-        if sum(seconds[1:]) > LONG_ENOUGH or seconds[0] > 2 * LONG_ENOUGH:
+        is_long = sum(seconds[1:]) > LONG_ENOUGH or seconds[0] > 2 * LONG_ENOUGH
+        if is_long and len(parts) >= fewest:
             break
     compiling = max(0.0, seconds[0] - seconds[:2][-1])  # of the same part, done once more
+    # A work that has no smaller parts is timed by equal ones.
+    if len(parts) > 2 and len(set(parts)) == 1:
+        return compiling + seconds[-1] / parts[-1]
     if len(parts) < 3:  # parts so long consist of what every part takes once
         return compiling + seconds[-1]
-    if len(set(parts)) == 1:  # a work so small has no smaller parts
-        return compiling + seconds[-1] / parts[-1]
     timed = np.array(seconds[1:])
     slope, constant = np.polyfit(parts[1:], timed, 1, w=1 / timed)
     return compiling + float(max(slope + constant, timed.max()))
@@ -198,7 +201,7 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
         )
         return float(part.image.values.size / study.image.values.size)
 
-    found = Foreseen("image", len(alpha), "levels", whole_seconds(run))
+    found = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
     if content.has_stated_modulus and not content.has_material_damping:
         return found, Material()
     largest = solved[-1]

@@ -155,6 +155,8 @@ def test_a_long_part_is_the_last_one(clock):
 
     assert whole_seconds(run) == 30.0
     assert len(parts) == 1
+    whole_seconds(run, fewest=3)
+    assert len(set(parts)) == 2
 
 
 @pytest.mark.parametrize(("power", "setup"), [(1.0, 0.0), (2.0, 0.0), (1.0, 7.0)])
