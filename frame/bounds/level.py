@@ -181,7 +181,7 @@ class LevelModels:
         index = self.excitation.sources.index(source)
         is_acceleration = self.structure.derivative_orders == 2
         midpoint: Array = feedthrough.coefficient.real[:, 0, 0]
-        radius: Array = feedthrough.spread[0]
+        radius: Array = feedthrough.coefficient_error[0]
         for mode in self.models.oscillators:
             participation = mode.participation[index]
             midpoint = midpoint - np.where(is_acceleration, participation.value, 0.0)
