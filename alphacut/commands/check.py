@@ -53,6 +53,8 @@ LEAST_MODES, MAX_MODES = 3, 8
 """Modes that are shown, if the structure has as many."""
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
+MOST_TIMED_STEPS = 16_000
+"""Steps of a motion beyond which `check` looks at its beginning alone."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
@@ -86,11 +88,16 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         text += motion_text(content, structure)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
-    if options.json or not options.quiet:  # else nobody would see what takes time to foresee
+    if not options.quiet and options.json != "-":
+        # all that is known at once, before parts of the work are timed, which may take seconds
+        out.write(text)
+        out.flush()
+    last_lines = f"{options.case}: no problems\n"
+    if options.json or not options.quiet:
         foreseen, failure = foreseen_stages(content, options.petsc)
         document["foreseen"] = [stage._asdict() for stage in foreseen]
-        text += foreseen_text(foreseen) + failure
-    write_answer(options, document, out, f"{text}{options.case}: no problems\n")
+        last_lines = foreseen_text(foreseen) + failure + last_lines
+    write_answer(options, document, out, last_lines)
     return 0
 
 
@@ -113,6 +120,8 @@ def motion_text(content: Content, structure: Structure) -> str:
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
         duration = step * round(strongest.duration / step)
         moved = linear.moved_by(strongest.ground)
+    # of a very long motion the first steps tell enough, and `check` ends in seconds
+    duration = min(duration, MOST_TIMED_STEPS * step)
     return text + "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
 
 

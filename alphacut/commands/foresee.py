@@ -21,6 +21,7 @@ from alphacut.case.material import ImageCell, RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
+from alphacut.commands.check import MOST_TIMED_STEPS
 from alphacut.frame import Probability
 from alphacut.frame import envelope as frame_envelope
 from alphacut.frame.analyses.peaks import PEAK_ERROR
@@ -264,9 +265,12 @@ def _structure(content: Content, material: Material | None) -> Structure:
 
 
 def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]:
-    """Return a task of about a fraction of the duration of a motion, and that fraction."""
+    """Return a task of about a fraction of the duration of a motion, and the fraction it is.
+
+    Of very long motions it is a smaller one, since a part of them would take long as well.
+    """
     steps = round(task.duration / task.section.step)
-    count = min(steps, max(8, round(fraction * steps)))
+    count = min(steps, max(8, round(fraction * min(steps, MOST_TIMED_STEPS))))
     return replace(task, duration=count * task.section.step), count / steps
 
 
