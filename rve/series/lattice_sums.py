@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from math import lgamma
 
 import numpy as np
-from scipy.special import gammaln, zeta
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
@@ -59,7 +59,7 @@ def lattice_sums(highest: int) -> LatticeSums:
     conjugate = np.zeros(highest + 1)
     for n in range(4, highest + 1, 4):
         if n < 40:
-            plain[n] = 2 * (zeta(n) + _lipschitz(n, 1))
+            plain[n] = 2 * (_zeta(n) + _lipschitz(n, 1))
         else:
             plain[n] = _near_points(n, conjugate=False)
     for n in range(7, highest + 1, 4):
@@ -86,8 +86,22 @@ def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
     """
     k = k[:, None]
     n = n[None, :]
-    log_binomial = gammaln(n + k) - gammaln(n) - gammaln(k + 1)
+    # ln Γ by the standard library: SciPy's functions take .12 s to import, a tenth of a sample
+    log_gamma = np.array([0.0] + [lgamma(x) for x in range(1, int(n.max() + k.max()) + 2)])
+    log_binomial = log_gamma[n + k] - log_gamma[n] - log_gamma[k + 1]
     return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums[n + k])
+
+
+def _zeta(n: int) -> float:
+    """Return Riemann's ζ(n) for n ≥ 4, by the formula of Euler and Maclaurin.
+
+    After the terms below 100 follow ∫ x^-n dx from 100 on, half the next term, and two corrections.
+    What remains is at most the third one, n (n + 1) … (n + 4) 100^(−n−5) / 30240 < 3e-19.
+    """
+    last = 100.0
+    head = float(np.sum(np.arange(last - 1, 0, -1) ** -float(n)))
+    tail = last ** (1 - n) / (n - 1) + last**-n / 2 + n * last ** (-n - 1) / 12
+    return head + tail - n * (n + 1) * (n + 2) * last ** (-n - 3) / 720
 
 
 def _lipschitz(n: int, power: int) -> float:
@@ -97,7 +111,7 @@ def _lipschitz(n: int, power: int) -> float:
     are below rounding for n < 40.
     """
     q = np.arange(1.0, 40.0)
-    logarithm = n * np.log(2 * np.pi) - gammaln(n) + (n - 1) * np.log(q) - 2 * np.pi * q
+    logarithm = n * np.log(2 * np.pi) - lgamma(n) + (n - 1) * np.log(q) - 2 * np.pi * q
     return float(np.sum(np.exp(logarithm) / (1 - np.exp(-2 * np.pi * q)) ** power))
 
 
