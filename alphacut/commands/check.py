@@ -39,7 +39,7 @@ from alphacut.io.results import ResultsFolder
 from alphacut.report.results import agreement
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA
-from alphacut.stages.foreseen import foreseen_structure
+from alphacut.stages.foreseen import MOST_TIMED_STEPS, foreseen_structure
 from alphacut.stages.image import study_of
 from alphacut.stages.suite import suite_records
 
@@ -53,8 +53,6 @@ LEAST_MODES, MAX_MODES = 3, 8
 """Modes that are shown, if the structure has as many."""
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
-MOST_TIMED_STEPS = 16_000
-"""Steps of a motion beyond which `check` looks at its beginning alone."""
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 

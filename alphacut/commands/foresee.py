@@ -21,7 +21,6 @@ from alphacut.case.material import ImageCell, RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.commands.check import MOST_TIMED_STEPS
 from alphacut.frame import Probability
 from alphacut.frame import envelope as frame_envelope
 from alphacut.frame.analyses.peaks import PEAK_ERROR
@@ -40,7 +39,7 @@ from alphacut.stages import answers, envelope, identify, microstructure, modulus
 from alphacut.stages.answers import Response
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import FOLLOWERS, EnvelopeTask
-from alphacut.stages.foreseen import Material, possible_materials
+from alphacut.stages.foreseen import MOST_TIMED_STEPS, Material, possible_materials
 from alphacut.stages.image import study_of
 from alphacut.stages.store import Stage, StageContext, no_progress
 

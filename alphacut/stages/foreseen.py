@@ -14,6 +14,9 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.rve.result.loss_factors import loss_factors
 from alphacut.stages.cell import CellProblem
 
+MOST_TIMED_STEPS = 16_000
+"""Steps of a motion beyond which `check` looks at its beginning alone."""
+
 
 class Material(NamedTuple):
     """What a structure takes from its cell; None of what the case states itself.
