@@ -117,7 +117,7 @@ def _spellings(unit: str) -> Iterator[str]:
     """Yield other spellings of a unit, the most likely one first.
 
     They are the unit without brackets; with the usual symbol in place of each word, whatever its
-    capitals; with blanks between the symbols; and with forces in place of masses.
+    capitals; with blanks between the symbols; with forces in place of masses; and without powers.
     """
     bare = re.sub(r"[\[\](){}]", "", unit).strip(" .")
     yield bare
@@ -126,6 +126,7 @@ def _spellings(unit: str) -> Iterator[str]:
     yield re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", " ", with_symbols)
     yield _usual_symbol(bare.replace(" ", ""))
     yield re.sub(r"\b(kg|lb)\b", r"\1f", with_symbols)
+    yield re.sub(r"(?<=[A-Za-z])(?:\^|\*\*)?[23²³]", "", with_symbols)
 
 
 def _usual_symbol(word: str) -> str:

@@ -138,6 +138,7 @@ WRONG = [
     ("[5; 6] m", "m", r"\[5, 6\] m"),
     ("[5 6] m", "m", "units are m, cm"),
     ("80 Giga Pa", "Pa", r"did you mean GPa\?"),
+    ("60 N/mm2", "N/m", r"did you mean N/mm\?"),
     ("[5, 6 m", "m", "close the bracket"),
     ("~5 m", "m", "a value, or a range"),
     ("GPa 80", "Pa", "the number first"),
