@@ -26,7 +26,7 @@ from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import NominalMode, ScaledRecord, nominal_mode
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
-from alphacut.frame.structures.linear import LinearSystem, NominalModes, nominal_modes
+from alphacut.frame.structures.linear import LinearSystem, NominalModes, histories, nominal_modes
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.structures.storey import yields
 from alphacut.frame.verification.self_test import Trial, stored_motions
@@ -105,6 +105,12 @@ def motion_text(content: Content, structure: Structure) -> str:
     if section is None or linear is None:
         return ""
     text, duration, step, moved = "", section.duration, section.step, linear
+    for name, history in histories(linear).items():
+        if len(history.samples) > 2 and history.step > duration:
+            text += (
+                f"warning: {name}: the motion ends before the second sample, at {history.step:g}"
+            )
+            text += " s: are its times in another unit than s?\n"
     if (record := linear.ground) is not None:
         peak = record.extremes[0]
         sizes = f"peak {engineering(peak, 'm/s^2')}, {peak / STANDARD_GRAVITY:.3g} g"

@@ -67,3 +67,15 @@ def test_a_step_that_misses_accelerations_of_yielding_columns_is_warned_of(tmp_p
 def test_spectral_acceleration_is_said_to_be_pseudo_acceleration_with_own_damping(tmp_path, capfd):
     text = said(tmp_path, capfd, suite=True)
     assert re.search(r"Sa\(T1\): pseudo-acceleration .* T1 = 0.3594 s .* ratio, 4.0%", text), text
+
+
+def test_a_force_whose_times_are_in_milliseconds_is_doubted(tmp_path, capfd):
+    rows = "".join(f"{250 * k},{k % 3}\n" for k in range(20))
+    (tmp_path / "force.csv").write_text("time [s],force [kN]\n" + rows)
+    force = '[[force]]\namplitude = {2 = "1"}\nhistory = "force.csv"\n'
+    case = (
+        CASE.replace("GROUND", "").replace("YIELD", "").replace("[envelope]", force + "[envelope]")
+    )
+    (tmp_path / "case.toml").write_text(case, encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml")]) == 0
+    assert "ends before the second sample, at 250 s: are its times" in capfd.readouterr().out
