@@ -1,4 +1,8 @@
-"""Stage modulus: the fuzzy constants of a cell and their loss factors, as numbers and a dataset."""
+"""Stage modulus: the fuzzy constants of a cell and their loss factors, as numbers and a dataset.
+
+A sample is solved by `rve/fuzzy_cell.py` (`CellSamples`), which asks a model of the cell; of prisms
+that is `rve/prism/model.py`, whose samples of one map share two solutions (`modulus_basis.py`).
+"""
 
 from __future__ import annotations
 

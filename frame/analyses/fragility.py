@@ -11,7 +11,8 @@ never multiplied by one.
 
 A case reaches `fragility_of` as follows. `alphacut/stages/suite.py` computes the peaks under each
 record (`suites.record_peaks`, `peaks.close_peaks`), `alphacut/stages/answers.py` passes them on,
-and `alphacut/report/results.py` prints the first columns of `Fragility.table`.
+and `alphacut/report/results.py` prints the first columns of `Fragility.table`. The CSV files are
+written by `alphacut/report/tables.py` from `Fragility.records`.
 """
 
 from __future__ import annotations
