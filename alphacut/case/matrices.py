@@ -23,7 +23,7 @@ from alphacut.case.structure import (
 )
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
 from alphacut.frame import Accelerogram, MatrixStructure, damping_from_loss, read_matrix
-from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
+from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions, require_symmetric
 from alphacut.frame.structures.quantities import Output, require_names
 from alphacut.frame.structures.read_matrix import MAX_ROWS
 from alphacut.fuzzy import Crisp, FuzzyNumber
@@ -41,6 +41,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             array = read_matrix(path, name=member, max_rows=rows)
             if unknowns:
                 _require_shape(path.name, array, rows)
+                require_symmetric(path.name, array, unknowns)
             require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
             return Monomial.parse(factor), array
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')

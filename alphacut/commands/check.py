@@ -34,6 +34,7 @@ from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.campaign.call import CampaignError
 from alphacut.fuzzy.result import Nature
+from alphacut.io.files import say
 from alphacut.io.quantity import QUANTITIES
 from alphacut.io.results import ResultsFolder
 from alphacut.report.results import agreement
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
 
     from alphacut.commands.foresee import Foreseen
 
-USUAL_PERIODS = 1e-3, 30.0  # in s: towers have 10 s at most, machine parts seldom below 1 ms
 LEAST_MODES, MAX_MODES = 3, 8
 """Modes that are shown, if the structure has as many."""
 UNUSUAL = ", unusual"
@@ -60,28 +60,30 @@ Row = tuple[str, str, str]
 def check(options: argparse.Namespace, out: TextIO) -> int:
     """Check a case, show how it was read and what a run of it will take; return exit status 0."""
     content = read_case(options).content
-    study = require_runnable(content)
+    rows = list(rows_of("", content))
+    try:
+        study = require_runnable(content)
+        structure = foreseen_structure(content) if "envelope" in content.stages else None
+    except RefusedError:
+        # a wrong unit may be the cause of what is refused, and is told before it
+        for doubt in doubts_before_refusal(content, rows):
+            say(f"warning: {doubt}")
+        raise
     if content.image_cell is not None and study is None:
         study = study_of(content.image_cell)
-    rows = list(rows_of("", content))
     text = text_table(("key", "value", "kind"), rows)
-    for key, value, kind in rows:
-        if kind.endswith(UNUSUAL):
-            text += f"warning: {key} is {value}, which is unusual: is its unit right?\n"
+    text += "".join(f"warning: {doubt}\n" for doubt in doubts(content, rows, structure))
     if study is not None:
         phases = (f"{name} {fraction:.2%}" for name, fraction in study.fractions.items())
         text += f"image: {study.extent}\nphases: {', '.join(phases)}\n"
     document: dict[str, object] = {"case": options.case, "stages": list(content.stages)}
     document |= {"period_s": None, "modes": None}
-    structure = foreseen_structure(content) if "envelope" in content.stages else None
     if structure is not None and structure.linear is not None:
         modes = nominal_modes(structure.linear)
         document["modes"] = modes_document(modes)
         document["period_s"] = 2 * pi / float(modes.frequencies[0])
-        text += modes_text(modes)
-    section = content.structure_section
-    if section is not None:
-        text += "".join(f"warning: {line}\n" for line in section.warnings(structure))
+        is_shaken = content.records is not None or structure.linear.ground is not None
+        text += modes_text(modes, is_shaken=is_shaken)
     if structure is not None:
         text += motion_text(content, structure)
     keys = ("key", "value", "kind")
@@ -90,6 +92,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         # all that is known at once, before parts of the work are timed, which may take seconds
         out.write(text)
         out.flush()
+    else:
+        for line in text.splitlines():
+            if line.startswith("warning: "):
+                say(line)
     last_lines = f"{options.case}: no problems\n"
     if options.json or not options.quiet:
         foreseen, failure = foreseen_stages(content, options.petsc)
@@ -97,6 +103,42 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         last_lines = foreseen_text(foreseen) + failure + last_lines
     write_answer(options, document, out, last_lines)
     return 0
+
+
+def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -> Iterator[str]:
+    """Yield a sentence for each size that suggests a wrong unit.
+
+    Args:
+        content: The case.
+        rows: Rows of its quantities, as of `rows_of`.
+        structure: The structure of the case; None if there is none, or it cannot be built.
+    """
+    for key, value, kind in rows:
+        if kind.endswith(UNUSUAL):
+            yield f"{key} is {value}, which is unusual: is its unit right?"
+    if content.structure_section is not None:
+        yield from content.structure_section.warnings(structure)
+    if structure is None:
+        return
+    # towers sway by some 2 m, and floors move at less than 10 g: more is a slip of a unit
+    largest = {"m": 5.0, "m/s": 50.0, "m/s^2": 500.0}
+    for key, question in content.questions.items():
+        for limit in question.with_storeys(structure).limits:
+            unit = structure.unit(limit.output)
+            size = abs(limit.value_in_si(structure, f"{key}.limits"))
+            if size > largest.get(unit, np.inf):
+                yield (
+                    f"{key}.limits: {limit.text} is more than structures reach: is its unit right?"
+                )
+
+
+def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
+    """Return the sentences of `doubts` on a case that is refused, as far as it can be read."""
+    try:
+        structure = foreseen_structure(content) if "envelope" in content.stages else None
+        return list(doubts(content, rows, structure))
+    except RefusedError:
+        return list(doubts(content, rows, None))
 
 
 def motion_text(content: Content, structure: Structure) -> str:
@@ -164,16 +206,24 @@ def modes_document(modes: NominalModes) -> dict[str, object]:
     }
 
 
-def modes_text(modes: NominalModes) -> str:
+def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
     """Return the first period, a table of the first modes, and the weight that moves.
 
     Modes are shown up to 90 % of the moved mass, but not more than `MAX_MODES`.
+
+    Args:
+        modes: The modes.
+        is_shaken: Whether the ground moves, as under buildings, whose first periods are longer than
+            those of parts of machines.
     """
     periods = 2 * pi / np.maximum(modes.frequencies, 1e-300)
     first = float(2 * pi / modes.frequencies[0])
     text = f"first natural period: {first:.4g} s, at the most plausible values\n"
-    if not USUAL_PERIODS[0] <= first <= USUAL_PERIODS[1]:
-        text += "this is an unusual period: are units right, mass and stiffness not exchanged?\n"
+    # parts of machines have some 1 ms, one-storey buildings .05 s, the highest towers 10 s
+    shortest = 0.02 if is_shaken else 1e-3
+    if not shortest <= first <= 10.0:
+        text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
+        text += " not exchanged?\n"
     moved = modes.moved_mass
     fractions = modes.effective_masses / (moved or np.inf)
     needed = int(np.searchsorted(np.cumsum(fractions), 0.9)) + 1

@@ -55,7 +55,7 @@ QUANTITIES = {
         "second moment of area",
         "1e-6 m^4",
         {"m^4": 0, "cm^4": -8, "mm^4": -12},
-        usual=(1e-16, 1e4),
+        usual=(1e-13, 1e3),
     ),
     "kg": Dimension("mass", "20 t", {"kg": 0, "t": 3}, usual=(1e-3, 1e9)),
     "s": Dimension("time", "30 s", {"s": 0, "ms": -3}, usual=(1e-7, 1e5)),

@@ -10,7 +10,8 @@ from alphacut.base.errors import cure_of
 
 NUMBER_CURES = {
     r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
-    r"^[-+\d.]+\s*,\s+[-+\d.]": "several values stand in brackets, as [19, 20, 21] t",
+    r"^[-+\d.]+\s*,\s+[-+\d.]": "several values of one quantity stand in brackets, as"
+    " [19, 20, 21] t; those of several floors or storeys are texts of their own",
     r"\d,\d": "write a decimal point, as 1.5; several values stand in brackets, as [1, 2]",
     r"^[-+]?[\d.]*\s*[x×*·⋅]?\s*10\s*(?:\^|\*\*|[⁻⁰-⁹])": "write a power of ten as 3e6",
     r"^\d+:\d": "write a time in one unit, as 90 s",

@@ -69,7 +69,14 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
     for mark, n_lines, read in FORMATS:
         if any(mark.match(line) for line in file.lines[:n_lines]):
             return read(file, unit)
-    if is_table(file, is_described=bool(channel or (step and unit))):
+    is_described = bool(channel or (step and unit))
+    if is_table(file, is_described=is_described):
+        is_named = path.suffix.lower() in (".at2", ".v1", ".v2", ".v2a", ".smc")
+        begins_with_number = re.match(rb"\s*[-+]?\.?[0-9]", content) is not None
+        value = "without the head that files of this name begin with"
+        cure = 'load it anew; numbers alone have records.step = "0.005 s" and records.unit = "g"'
+        lost_head = is_named and begins_with_number and not is_described
+        require(not lost_head, path.name, value, READ, cure)
         return read_table(file, step, unit, channel)
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"

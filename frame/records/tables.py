@@ -79,7 +79,8 @@ class _Table:
     Args:
         file: The file; its lines are counted from 0.
         start: First line that is neither empty nor a comment.
-        head: Last line above the numbers; empty without one.
+        head: Last line above the numbers; empty without one. Of a line of names above a line of
+            units it has both, as "time [s],acc [g]".
         above: All lines above the numbers, comments among them without their mark.
         rows: Cells of each row, by its line.
     """
@@ -109,8 +110,9 @@ class _Table:
             else:
                 rows[line] = re.findall(r'[^,;\s"]+', text)
         heads = [text for line, text in lines.items() if line < first]
+        head = _with_units(heads) if heads else ""
         above = tuple(x.lstrip("# \t") for x in file.lines[:first] if x.strip("# \t"))
-        return cls(file, min(lines, default=0), heads[-1] if heads else "", above, rows)
+        return cls(file, min(lines, default=0), head, above, rows)
 
     @property
     def width(self) -> int:
@@ -195,6 +197,24 @@ class _Table:
         finest = min(int(time.as_tuple().exponent) for time in times)
         digits = max(len(time.as_tuple().digits) for time in times)
         return float(10.0 ** max(finest, max(times).adjusted() + 1 - digits))
+
+
+def _with_units(heads: Sequence[str]) -> str:
+    """Return the last of the lines above numbers, joined with the one before if it has units alone.
+
+    Loggers write the names of columns in one line and their units, with or without brackets, in
+    the next: "time,acc" and "s,g" become "time [s],acc [g]".
+
+    Args:
+        heads: The lines above the numbers, one or more.
+    """
+    cells = [re.split("[,;\t]", line) for line in heads[-2:]]
+    units = [cell.strip(' "[]()') for cell in cells[-1]]
+    names = cells[0]
+    known = [acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units]
+    if len(heads) < 2 or len(names) != len(units) or not all(known):
+        return heads[-1]
+    return ",".join(f"{name.strip()} [{unit}]" for name, unit in zip(names, units, strict=True))
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:

@@ -291,14 +291,9 @@ class MatrixStructure(LinearSystem):
         is_square = array.shape == (size, size)
         require(is_square, key, f"of shape {array.shape}", f"({size}, {size})", cure)
         require_numbers(kind, array)
+        require_symmetric(key, array, range(size))
         # Eigenvalue solvers read one triangle alone, and proofs bound entries: so the mean of both
-        # triangles is taken, which is symmetric to the last bit. A difference of more than
-        # rounding, 1e-9 of the largest entry, is an error of the caller.
-        asymmetry = np.abs(array - array.T)
-        i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
-        is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
-        what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-        require(is_symmetric, key, what, "symmetric arrays", cure="mirror one triangle")
+        # triangles is taken, which is symmetric to the last bit.
         return factor, np.asarray((array + array.T) / 2, float)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
@@ -414,6 +409,27 @@ def _value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
     if callable(factor):
         return factor(p)
     return factor
+
+
+def require_symmetric(key: str, array: Array, names: Sequence[object]) -> None:
+    """Refuse an array that differs from its transpose by more than rounding.
+
+    That is 1e-9 of its largest entry.
+
+    Args:
+        key: What the array is, for the message.
+        array: Shape (n, n).
+        names: Names of its n rows and columns, for the message.
+
+    Raises:
+        RefusedError: The array is not symmetric; the message has the two entries that differ most.
+    """
+    asymmetry = np.abs(array - array.T)
+    i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
+    is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
+    pair = f"[{names[i]}, {names[j]}] is {array[i, j]:g}, [{names[j]}, {names[i]}]"
+    what = f"not symmetric: {pair} is {array[j, i]:g}"
+    require(is_symmetric, key, what, "symmetric arrays", cure="mirror one triangle")
 
 
 def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:

@@ -46,6 +46,7 @@ def folder(tmp_path):
     np.savez(tmp_path / "upper.npz", springs=springs, other=np.eye(2))
     (tmp_path / "short.csv").write_text("1,0\n")
     np.save(tmp_path / "diagonal.npy", np.ones(2))
+    (tmp_path / "upper.csv").write_text("9,3\n0,4\n")
     np.save(tmp_path / "zeros.npy", np.zeros((2, 2)))
     times = 0.02 * np.arange(40)
     rows = [f"{t:.2f},{np.sin(9 * t):.8f}" for t in times]
@@ -95,6 +96,7 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
         ('"lower.mtx"', '"short.csv"', "short.csv is of shape (1, 2); allowed: (2, 2); the case"),
         ('"lower.mtx"', '"diagonal.npy"', "of a diagonal make a matrix, by numpy.diag"),
+        ('"lower.mtx"', '"upper.csv"', "upper.csv is not symmetric: [1.x, 2.x] is 3, [2.x, 1.x]"),
         ('"lower.mtx"', '"zeros.npy"', "zeros.npy is zeros throughout"),
         ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
         (

@@ -79,6 +79,9 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     assert "unusual period" in spoken(capfd, "check", written(tmp_path), soft)[1]
     tiny = spoken(capfd, "check", written(tmp_path), "--set=frame.modulus=[22, 24, 26] Pa")[1]
     assert "warning: frame.modulus is 22.00 Pa" in tiny
+    quiet = spoken(capfd, "check", written(tmp_path), soft, "--quiet")
+    assert quiet[1] == ""
+    assert "unusual period" in quiet[2]
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
     assert out.endswith("no problems\n")
     read = {
@@ -91,6 +94,22 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     for name, lines in read.items():
         words = " ".join(spoken(capfd, "check", CASES / f"{name}.toml")[1].split())
         assert all(line in words for line in lines), words
+
+
+def test_a_unit_that_may_be_wrong_is_told_before_what_is_refused(tmp_path, capfd):
+    stiff = spoken(capfd, "check", CASES / "building.toml", "--set=frame.second_moment='3e5 m^4'")
+    assert stiff[0] == 2
+    doubt, *_, refusal = stiff[2].splitlines()
+    assert "frame.second_moment is 300000 m^4, which is unusual: is its unit right?" in doubt
+    assert "step is 0.01 s; allowed: up to" in refusal
+
+
+def test_a_limit_beyond_all_structures_is_doubted(capfd):
+    limits = "--set=decision.limits=['roof <= 40 m', 'moment <= 350 kN m']"
+    status, out, _ = spoken(capfd, "check", CASES / "plane-frame.toml", limits)
+    assert status == 0
+    assert out.count("is more than structures reach") == 1
+    assert "decision.limits: roof <= 40 m is more than structures reach" in out
 
 
 REFUSED = [

@@ -111,7 +111,7 @@ WRONG = [
             ("20 Mt", "kg", "t"),
         )
     ],
-    ("19, 20, 21 t", "kg", "several values stand in brackets"),
+    ("19, 20, 21 t", "kg", "several values of one quantity stand in brackets"),
     ("20 ton", "kg", "write t"),
     ("20 tons", "kg", "write t"),
     ("5 percent", "", "write %"),

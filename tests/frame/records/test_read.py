@@ -99,12 +99,12 @@ def test_a_head_of_peer_without_a_unit_is_read_in_the_stated_one(tmp_path):
 
 
 def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
-    two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2])
+    two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2], "record.csv")
     with pytest.raises(RefusedError, match=r"or say records\.unit"):
         read_recording(two)
-    other = saved(tmp_path, "s,m/s^2\n" + two.read_text(encoding="utf-8"))
+    other = saved(tmp_path, "s,m/s^2\n" + two.read_text(encoding="utf-8"), "other.csv")
     assert "its head, s,m/s^2, is not" in " ".join(read_recording(other, unit="g").remarks)
-    one = saved(tmp_path, written.lines(written.samples(), "15.7E", 1))
+    one = saved(tmp_path, written.lines(written.samples(), "15.7E", 1), "one.csv")
     with pytest.raises(RefusedError, match=r"records\.step"):
         read_recording(one, unit="g")
 
@@ -117,6 +117,14 @@ def test_what_is_no_format_is_one_line_with_those_that_are_read(tmp_path):
         assert "CSMIP" in caught.value.allowed
         assert "records.step" in caught.value.cure
         assert len(str(caught.value)) <= 300
+
+
+def test_a_file_named_as_a_format_without_its_head_is_told_so(tmp_path):
+    numbers = written.lines(written.samples(), "8.2f", 10)
+    path = saved(tmp_path, numbers, "record.V2A")
+    with pytest.raises(RefusedError, match="without the head that files of this name begin with"):
+        read_recording(path)
+    assert len(read_recording(path, step=0.02, unit="g").samples) == len(written.samples())
 
 
 def test_what_is_unusual_is_said(tmp_path):

@@ -110,6 +110,28 @@ def test_decimal_commas_between_other_marks_are_read(tmp_path, mark):
     )
 
 
+@pytest.mark.parametrize(
+    ("heads", "factor"),
+    [
+        ("time,acc\ns,g", G),
+        ("time,acceleration\n[s],[m/s2]", 1.0),
+        ('"Time";"Accel"\n"(s)";"(cm/s^2)"', 0.01),
+    ],
+)
+def test_units_in_a_line_below_the_names_are_read(tmp_path, heads, factor):
+    """As loggers write them."""
+    mark = ";" if ";" in heads else ","
+    rows = [f"{k * STEP:.8f}{mark}{x:.5f}" for k, x in enumerate(VALUES)]
+    samples = read_recording(saved(tmp_path, rows, heads)).samples
+    assert samples == pytest.approx(factor * VALUES)
+
+
+def test_another_quantity_in_a_line_of_units_is_refused(tmp_path):
+    rows = [f"{k * STEP:.8f},{x:.5f}" for k, x in enumerate(VALUES)]
+    with pytest.raises(RefusedError, match="mm/s is no unit of accelerations"):
+        read_recording(saved(tmp_path, rows, "time,motion\ns,mm/s"))
+
+
 def test_decimal_commas_are_told_by_the_marks_where_whole_seconds_rise(tmp_path):
     rows = [f"{0.4 * k:.1f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES[:50])]
     record = read_recording(saved(tmp_path, rows, "time [s];acceleration [m/s^2]"))
