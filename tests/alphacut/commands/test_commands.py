@@ -207,7 +207,9 @@ def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path):
         time.sleep(0.05)
     started.send_signal(signal.SIGINT)
     _, err = started.communicate(timeout=60)
-    assert started.returncode in (0, 128 + signal.SIGINT)
+    # Python ends itself by the signal if that reached it in code that a library ran from a string;
+    # a shell shows 130 of both.
+    assert started.returncode in (0, 128 + signal.SIGINT, -signal.SIGINT)
     if started.returncode:
         assert "continues from" in err
     again = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
