@@ -75,9 +75,18 @@ class StiffnessBounds:
         return Enclosure(low - 2 * _rounding(self.lower), high + 2 * _rounding(self.upper))
 
     def shear(self, average: str = AXES) -> Enclosure:
-        """Return bounds of the shear modulus in Pa: of an average of the plane, or of Hill's."""
+        """Return bounds in Pa of the shear modulus of an isotropic average of the stiffness.
+
+        In space it is Hill's average, whatever `average`. The lower bound is 0 where pores
+        percolate, and the upper one is infinite beside rigid phases.
+
+        Args:
+            average: In the plane, "axes" for C33, the modulus along the axes, or "isotropic" for
+                Hill's mean over all directions of the plane.
+        """
         if self.dimension == 3:
             return self._hill(1)
+        # Both averages rise in C11 − C12 and C33, each of which is the value of C at a strain.
         with np.errstate(divide="ignore"):  # a mean of 0, of infinity
             low = float(shear_modulus(square_moduli(self.lower), average))
             high = float(shear_modulus(square_moduli(self.upper), average))
@@ -86,20 +95,31 @@ class StiffnessBounds:
         return Enclosure(low - 4 * _rounding(self.lower), high + 4 * _rounding(self.upper))
 
     def young(self, average: str = AXES) -> Enclosure:
-        """Return bounds of Young's modulus of an average, in Pa.
+        """Return bounds in Pa of Young's modulus E of an isotropic average of the stiffness.
 
         E = G (3 − x) with x = G/(K + G/3), where the K of plane strain is K + G/3 already. E rises
-        with K; in space it rises with G as well. In the plane E = 3 G − G²/K rises with G up to
-        G = 3/2 K and falls beyond, so that it may be negative.
+        with K; in space it rises with G as well. In the plane E = 3 G − G²/K rises with G up to G =
+        3/2 K and falls beyond, so that it may be negative.
+
+        Args:
+            average: In the plane, "axes" for the average with G = C33, or "isotropic" for Hill's
+                mean over all directions of the plane. In space it is Hill's average, whatever this
+                says.
+
+        Returns:
+            Lower and upper bound. Without a lower bound of the stiffness (percolating pores) the
+            lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
+            upper one is infinite.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
         softest = [min_shear]
         stiffest = [max_shear]
-        # where there is no bound
+        # These stay where there is no bound of the stiffness.
         low = 0.0
         high = np.inf
         if self.dimension == 2:
+            # The extremes over an interval of G are at its ends, or where E has its maximum over G.
             top = float(np.clip(1.5 * max_bulk, min_shear, max_shear))
             softest = stiffest = [min_shear, top, max_shear]
             low = -np.inf
@@ -115,12 +135,25 @@ class StiffnessBounds:
         return shear * (3 - ratio) + side * 8 * UNIT * shear * (3 + ratio)
 
     def poisson(self, average: str = AXES) -> Enclosure:
-        """Return bounds of Poisson's ratio (1 − x)/2 of an average, x as of `young`."""
+        """Return bounds of Poisson's ratio ν = (1 − x)/2 of an isotropic average of the stiffness.
+
+        Here x = G/(K + G/3), where the K of plane strain is K + G/3 already.
+
+        Args:
+            average: In the plane, "axes" for the average with G = C33, or "isotropic" for Hill's
+                mean over all directions of the plane. In space it is Hill's average, whatever this
+                says.
+
+        Returns:
+            Lower and upper bound. Where a bound of the stiffness is missing, they are the limits of
+            an isotropic solid but for rounding: −1 in space or −∞ in the plane, and 1/2.
+        """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
         max_ratio = self._ratio(max_shear, min_bulk)
         min_ratio = self._ratio(min_shear, max_bulk)
-        # ν falls with x, which rises with G and falls with K
+        # ν falls with x, which rises with G and falls with K. Each ratio is off by 3 units, and the
+        # two operations here add one each.
         low = (1 - max_ratio) / 2 - 4 * UNIT * (1 + max_ratio)
         return Enclosure(low, (1 - min_ratio) / 2 + 4 * UNIT * (1 + min_ratio))
 
@@ -133,14 +166,24 @@ class StiffnessBounds:
             return float(1 / inverse)
 
     def constants(self) -> Array:
-        """Return bounds of engineering constants along the axes, in Pa, shape (constants, 2).
+        """Return bounds of the engineering constants along the axes, shape (constants, 2).
 
-        They are E_x, E_y, ν_xy and G_xy in plane strain; in space E_x, E_y, E_z, ν_yz, ν_xz, ν_xy,
-        G_yz, G_xz and G_xy. Moduli are 1/S_kk of the compliance S, ratios −S_ij/S_ii.
+        With the compliance S, the inverse of the stiffness in Voigt's order, moduli are 1/S_kk in
+        Pa and Poisson's ratios are −S_ij/S_ii.
+
+        Returns:
+            Lower and upper bound of E_x, E_y, ν_xy and G_xy in plane strain, or of E_x, E_y, E_z,
+            ν_yz, ν_xz, ν_xy, G_yz, G_xz and G_xy in space. Without a lower bound of the stiffness
+            moduli are bounded from below by 0, without an upper one they are infinite from above;
+            without either one ratios lie between −∞ and ∞.
+
+        Raises:
+            FailedError: A bound of the stiffness is singular to rounding.
         """
         low, high = self._compliance
         n = self.dimension
-        # A quotient is off by one unit; the factors themselves are rounded.
+        # A quotient is off by one unit, and so are the factors themselves. The largest compliance
+        # gives the smallest modulus.
         outwards = np.array([1 - 4 * UNIT, 1 + 4 * UNIT])
         with np.errstate(divide="ignore"):
             moduli = outwards / np.diagonal([high, low], 0, 1, 2).T
@@ -149,7 +192,12 @@ class StiffnessBounds:
 
     @property
     def _compliance(self) -> tuple[Array, Array]:
-        """Lower and upper bound of the compliance: 0 and infinite where there is none."""
+        """Lower and upper bound, in the Loewner order, of the inverse of the stiffness.
+
+        Both compliances have the shape of the stiffness, (3, 3) or (6, 6), in 1/Pa. Where pores
+        percolate there is no upper bound, and all its entries are infinite; beside rigid phases the
+        lower one is zero. FailedError if a bound of the stiffness is singular to rounding.
+        """
         low = np.zeros_like(self.upper)
         high = np.full_like(self.lower, np.inf)
         if self.has_upper:
@@ -159,10 +207,26 @@ class StiffnessBounds:
         return low, high
 
     def _lateral_ratio(self, i: int, j: int) -> Enclosure:
-        """Return bounds of −S_ij/S_ii from those of S.
+        """Return bounds of −S_ij/S_ii from bounds of S, the inverse of the stiffness.
 
-        With S between A and B and D = B − A, Cauchy and Schwarz give, for any vectors x and y,
-        |x·(S − (A + B)/2) y| ≤ √(x·D x) √(y·D y)/2. Here x and y are unit vectors.
+        With S between A and B in the Loewner order and D = B − A, the inequality of Cauchy and
+        Schwarz gives, for any vectors x and y,
+
+            |x·(S − (A + B)/2) y| ≤ √(x·D x) √(y·D y)/2.
+
+        Here x and y are the unit vectors i and j, so that S_ij lies within √(D_ii D_jj)/2 of the
+        mean of A_ij and B_ij.
+
+        Args:
+            i: Index of the load in Voigt's order, from 0.
+            j: Index of the other component in Voigt's order, from 0.
+
+        Returns:
+            Lower and upper bound; −∞ and ∞ where the lower or the upper bound of the stiffness is
+            missing.
+
+        Raises:
+            FailedError: A bound of the stiffness is singular to rounding.
         """
         if not (self.has_lower and self.has_upper):
             return Enclosure(-np.inf, np.inf)
@@ -171,13 +235,27 @@ class StiffnessBounds:
         middle = (low[i, j] + high[i, j]) / 2
         variances = np.maximum(np.diagonal(high - low)[[i, j]], 0)
         radius = np.sqrt(variances).prod() / 2 + slack * np.abs(high).max()
+        # The quotient of two intervals, of which the second one is positive, is extreme at their
+        # ends.
         cross_terms = [-middle - radius, -middle + radius]
         ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
         margin = slack * np.abs(ratios).max()
         return Enclosure(float(ratios.min() - margin), float(ratios.max() + margin))
 
     def _hill(self, modulus: int) -> Enclosure:
-        """Return bounds of K (modulus 0) or G (1) of Hill's average of a stiffness of space."""
+        """Return bounds in Pa of K or G of Hill's average of a stiffness of space.
+
+        Hill's average is the mean of Voigt's and Reuss's averages over all directions.
+
+        Args:
+            modulus: 0 for the bulk modulus K, 1 for the shear modulus G.
+
+        Returns:
+            Lower and upper bound; 0 where pores percolate, infinite beside rigid phases.
+
+        Raises:
+            FailedError: A bound of the stiffness is singular to rounding.
+        """
         # Voigt's modulus rises with the stiffness, Reuss's falls with the compliance.
         min_compliance, max_compliance = self._compliance
         low = 0.0
@@ -195,23 +273,28 @@ class StiffnessBounds:
 
 
 def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -> float:
-    """Return the mean of Voigt's and Reuss's modulus K or G of space, rounded to one side.
+    """Return a bound of the mean of Voigt's and Reuss's bulk or shear modulus in space, in Pa.
 
     Voigt's averages of a stiffness C and Reuss's of a compliance S are, with sums over the normal
-    components i ≠ j and over the shear components k,
+    components i ≠ j and over the shear components k of Voigt's order 11, 22, 33, 23, 13, 12,
 
         9 K_V = Σ C_ii + Σ C_ij,      15 G_V = Σ C_ii − Σ C_ij/2 + 3 Σ C_kk,
         1/K_R = Σ S_ii + Σ S_ij,      15/G_R = 4 Σ S_ii − 2 Σ S_ij + 3 Σ S_kk.
 
+    Hill's (1952) average is the mean of both. The computed mean is moved to one side by a bound of
+    its rounding error.
+
     Args:
-        stiffness: Stiffness C in Voigt order, shape (6, 6), in Pa.
-        compliance: Compliance S, of the same shape, in 1/Pa.
-        modulus: 0 for K, 1 for G.
-        side: −1 for a lower, 1 for an upper bound of the mean.
+        stiffness: Stiffness C of Voigt's average, finite, shape (6, 6), in Pa.
+        compliance: Compliance S of Reuss's average, positive definite and finite, shape (6, 6), in
+            1/Pa. It need not be the inverse of `stiffness`: both come from bounds.
+        modulus: 0 for the bulk modulus K, 1 for the shear modulus G.
+        side: −1 to move the mean down, so that it is a lower bound; 1 to move it up.
     """
     diagonal: Array = np.eye(6)
     is_normal: Array = np.zeros((6, 6))
     is_normal[:3, :3] = 1
+    # The factor 3 of Σ C_kk and Σ S_kk; the weights of the formulas above are entries of matrices.
     is_shear = 3 * diagonal * (1 - is_normal)
     if modulus == 0:
         voigt_weights = is_normal / 9
@@ -234,25 +317,38 @@ def _rounding(stiffness: Array) -> float:
 def inverse_below(matrix: Array) -> Array:
     """Return a lower bound of the inverses of all symmetric matrices ≤ `matrix`, shape (n, n).
 
-    The order is Loewner's, in which the inverse of positive definite matrices falls.
+    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse of
+    positive definite matrices falls. FailedError if `matrix` is singular to rounding.
     """
     inverse, error = _inverse(matrix)
     return np.asarray(inverse - error)
 
 
 def inverse_above(matrix: Array) -> Array:
-    """Return an upper bound of the inverses of all symmetric matrices ≥ `matrix`, shape (n, n)."""
+    """Return an upper bound of the inverses of all symmetric matrices ≥ `matrix`, shape (n, n).
+
+    The order is Loewner's, A ≤ B if B − A is positive semidefinite. FailedError if `matrix` is
+    singular to rounding.
+    """
     inverse, error = _inverse(matrix)
     return np.asarray(inverse + error)
 
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Return the computed symmetric inverse and a diagonal matrix that bounds its error.
+    """Return the computed inverse of a symmetric positive definite matrix and a bound of its error.
 
-    The true inverse lies between inverse ± error in the Loewner order; all have the shape (n, n).
+    Args:
+        matrix: The matrix, finite, shape (n, n).
+
+    Returns:
+        The computed inverse, made symmetric, and a diagonal matrix D, both of shape (n, n). The
+        true inverse lies between inverse − D and inverse + D in the Loewner order, A ≤ B if B − A
+        is positive semidefinite.
 
     Raises:
-        FailedError: The matrix is singular to rounding.
+        FailedError: The matrix is singular to rounding, or has a diagonal entry that is not
+            positive.
+        numpy.linalg.LinAlgError: The elimination meets a pivot that is exactly zero.
     """
     # Powers of two make the diagonal near 1 without rounding: loads of any size count alike.
     scale = 2.0 ** -np.round(np.log2(np.diagonal(matrix)) / 2)
@@ -271,11 +367,14 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
 
 
 def residual_above(inverse: Array, matrix: Array) -> Array:
-    """Return upper bounds of the entries of |I − inverse·matrix|, shape (n, n).
+    """Return upper bounds of the entries of |I − inverse·matrix|, with the rounding of the product.
 
-    A sum of n products is off by at most n rounding units of the sum of their magnitudes, whatever
-    the order of the summation.
+    Both arguments and the result have the shape (n, n). The bound holds for any finite matrices,
+    also where `inverse` is no inverse.
     """
     size = len(matrix)
+    # A sum of n products is off by at most n units of the sum of their magnitudes, in whatever
+    # order it is taken (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
+    # `SAFETY` stands for the rounding of this bound itself.
     residual = np.abs(np.eye(size) - inverse @ matrix)
     return np.asarray(residual + size * SAFETY * UNIT * (np.abs(inverse) @ np.abs(matrix)))

@@ -27,15 +27,25 @@ from alphacut.rve.image.fields.energy import UNIT
 from alphacut.rve.image.model import ImageModel, ImageSolution
 from alphacut.rve.image.phases import ModuliImages
 
-ROUNDING = 64 * UNIT
-"""Bound of the rounding of quotients and differences, derived by counting operations."""
+ROUNDING = 64 * UNIT  # quotients and differences take fewer than 64 rounded operations
 
 
 def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, Enclosure]:
-    """Return bounds in Pa of constants that are least energies, by name.
+    """Return bounds in Pa of those effective moduli that are the least energy of some load.
 
-    They are E along the axes, and G and K of an average of the plane, or of Hill's average.
+    Such a modulus is concave in the moduli of the phases, from which bounds of its derivatives
+    follow.
+
+    Args:
+        bounds: Bounds of the effective stiffness.
+        average: In the plane, "axes" or "isotropic": the average over directions that G is of. In
+            space G and K are of Hill's average.
+
+    Returns:
+        Lower and upper bound by name: "E_x", "E_y" and, in space, "E_z"; then "G" and "K". Missing
+        bounds are 0 and infinite.
     """
+    # Young's moduli along the axes are the first rows of the constants, one for each axis.
     low, high = bounds.constants()[: bounds.dimension].T
     values = {f"E_{'xyz'[k]}": Enclosure(float(low[k]), float(high[k])) for k in range(len(low))}
     return {**values, "G": bounds.shear(average), "K": bounds.bulk}
@@ -44,17 +54,27 @@ def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, Enclos
 def energy_fractions(
     model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, n_phases: int
 ) -> dict[str, Array]:
-    """Return bounds of the fraction of the energy that belongs to each phase.
+    """Return bounds of the fraction of the strain energy that belongs to each phase, by constant.
+
+    Let c(s) be an effective modulus with the moduli of one phase times s. As the least energy of a
+    load it is concave in s, so that c′(1) lies between the slopes of its chords to 1 − t and to 1 +
+    t. The fraction of the phase is c′(1)/c(1). With lower bounds of c(1 ± t) and an upper bound C
+    of c(1) it lies between [c(1 + t)/C − 1]/t and [1 − c(1 − t)/C]/t.
 
     Args:
-        model: Model of the solution.
-        solution: Solution of one image without pores, whose upper and lower moduli are the same.
-        images: Its moduli.
-        phase: Number of the phase of each pixel or voxel.
+        model: Model by which `solution` was made and by which the changed images are solved.
+        solution: Solution of an image without pores and rigid phases, whose upper and lower moduli
+            are the same. Its stresses are the first guess.
+        images: Moduli of that image.
+        phase: Number from 0 of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
         n_phases: Number of phases.
 
     Returns:
-        Bounds by the name of the constant, shape (phases, 2) each.
+        Lower and upper bound of the fraction of each phase, shape (phases, 2), within 0 and 1, for
+        the constants "E_x", "E_y", "E_z" (of a volume), "G" and "K".
+
+    Raises:
+        FailedError: A solution does not converge, or its compliance is singular to rounding.
     """
     unchanged = concave_constants(solution.bounds, model.average)
     fractions = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
@@ -80,8 +100,25 @@ def _lower_bounds_with(
     images: ModuliImages,
     phase: Ints,
 ) -> dict[str, float]:
-    """Return lower bounds of the constants with the moduli of one phase times a factor."""
+    """Return lower bounds in Pa of effective moduli, with the moduli of one phase times a factor.
+
+    Args:
+        factor: Positive factor of the bulk and the shear modulus.
+        changed_phase: Number of the phase.
+        model: Model by which the changed image is solved.
+        solution: Solution of the unchanged image, whose stresses are the first guess.
+        images: Moduli of the unchanged image, without pores.
+        phase: Number of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
+
+    Returns:
+        Bounds by name: "E_x", "E_y" and, of a volume, "E_z"; "G" of the average of `model`, and
+        "K".
+
+    Raises:
+        FailedError: The solver does not converge, or the compliance is singular to rounding.
+    """
     factors = np.where(phase == changed_phase, factor, 1.0)
+    # Only the lower bound is needed, which stresses give: half the work of both sides.
     stresses = model.solve_side(factors * images.lower, stress=True, start=solution.lower)
     assert stresses is not None  # None beside pores alone
     stiffness = inverse_below(stresses.energy.upper)
@@ -90,12 +127,15 @@ def _lower_bounds_with(
 
 
 def mean_loss(fractions: Array, lowest: Array, highest: Array) -> Enclosure:
-    """Return bounds of Σ fraction · loss, where the fractions sum to 1.
+    """Return bounds of the mean loss factor Σ_k fraction_k · loss_k over all phases k.
+
+    The fractions sum to 1 and are known within bounds, as the loss factors are.
 
     Args:
-        fractions: Bounds of the fraction of each phase, shape (phases, 2).
-        lowest: Lower bound of the loss factor of each phase.
-        highest: Upper bound of it.
+        fractions: Lower and upper bound of each fraction, shape (phases, 2). The lower bounds sum
+            to at most 1, the upper ones to at least 1.
+        lowest: Lower bound of the loss factor of each phase, shape (phases,).
+        highest: Upper bound of it, shape (phases,).
     """
     lower = _min_mean(fractions, np.asarray(lowest))
     return Enclosure(lower, -_min_mean(fractions, -np.asarray(highest)))
@@ -104,35 +144,49 @@ def mean_loss(fractions: Array, lowest: Array, highest: Array) -> Enclosure:
 def _min_mean(fractions: Array, losses: Array) -> float:
     """Return the least Σ fraction · loss over fractions within bounds that sum to 1.
 
-    It is attained where phases take as much as they can in the order of rising loss, and the others
-    their smallest fraction.
+    This is a linear program with one equation. As in the fractional knapsack the greedy choice is
+    optimal: from their lower bounds on, the fractions are raised to their upper bounds in the order
+    of rising loss until their sum is 1. The result is lowered by a bound of its rounding error.
+
+    Args:
+        fractions: Lower and upper bound of each fraction, shape (phases, 2), within 0 and 1. The
+            lower bounds sum to at most 1, the upper ones to at least 1.
+        losses: Loss factor of each phase, of any sign, shape (phases,).
     """
-    # a linear program of one equation: the greedy order is optimal, as of the fractional knapsack
     used = fractions[:, 0].copy()
     remaining = 1 - used.sum()
     for k in np.argsort(losses):
         added = min(remaining, fractions[k, 1] - used[k])
         used[k] += added
         remaining -= added
-    common = losses.min()  # taken out, so that equal losses are exact
+    # Taking the smallest loss out of the sum makes the mean of equal losses exact: it counts
+    # Σ fraction = 1 times, whatever rounding leaves of that sum.
+    common = losses.min()
     return float(common + used @ (losses - common) - ROUNDING * np.abs(losses).max())
 
 
 def loss_of_young(bounds: StiffnessBounds, losses: Mapping[str, Array], average: str) -> Array:
-    """Return bounds of the loss factor of E of an average, shape (levels, 2).
+    """Return bounds of the loss factor of Young's modulus E of an average, shape (levels, 2).
 
-    E is 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain. So d ln E = w d ln K +
-    (1 − w) d ln G with w = G/(3 K + G) or, in the plane, w = G/(3 K − G). The sum is bilinear in w
-    and the loss factors, so that it is extreme at their ends.
+    E is 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain. So d ln E = w d ln K + (1 − w)
+    d ln G with w = G/(3 K + G) or, in the plane, w = G/(3 K − G). The loss factor of E is the same
+    mean of those of K and G, to first order. It is bilinear in w and the loss factors, so that it
+    is extreme at their ends.
 
     Args:
-        bounds: Bounds of the stiffness, by which E is positive.
-        losses: Bounds of the loss factors of "K" and "G", shape (levels, 2) each.
-        average: Average of the plane.
+        bounds: Bounds of the stiffness, both present, by which K and G are positive and, in the
+            plane, G < 3 K.
+        losses: Lower and upper bound of the loss factors of "K" and "G" at each α-level, shape
+            (levels, 2) each.
+        average: In the plane, "axes" or "isotropic": the average over directions that E is of.
+
+    Returns:
+        Lower and upper bound at each level.
     """
     min_bulk, max_bulk = bounds.bulk
     min_shear, max_shear = bounds.shear(average)
     sign = 1 if bounds.dimension == 3 else -1
+    # In both formulas w rises with G and falls with K.
     min_weight = min_shear / (3 * max_bulk + sign * min_shear)
     max_weight = max_shear / (3 * min_bulk + sign * max_shear)
     values = [

@@ -15,13 +15,14 @@ voxels."""
 
 
 def needed_memory(shape: Sequence[int], division: int = 1) -> float:
-    """Return the bytes that the cuts of a grid take.
+    """Return the estimated bytes of memory that the bounds of an image take, at all α-levels.
 
     Args:
-        shape: Number of pixels or voxels along each axis.
-        division: Number of elements along each side of a pixel or voxel.
+        shape: Number of pixels along y and x, or of voxels along z, y and x; a KeyError for any
+            other number of axes.
+        division: Number of finite elements along each side of a pixel or voxel.
     """
-    program = 1e8  # of Python and its libraries
+    program = 1e8  # of Python and its libraries, which are small beside any grid that matters
     elements = math.prod([n * division for n in shape])
     return program + BYTES_PER_ELEMENT[len(shape)] * elements
 
@@ -29,10 +30,12 @@ def needed_memory(shape: Sequence[int], division: int = 1) -> float:
 def require_memory(shape: Sequence[int], division: int = 1) -> None:
     """Refuse a grid whose solution needs more memory than this machine has.
 
-    The arguments are those of `needed_memory`.
+    Args:
+        shape: Number of pixels along y and x, or of voxels along z, y and x.
+        division: Number of finite elements along each side of a pixel or voxel.
 
     Raises:
-        RefusedError: The grid is too large; the cure says which size is not.
+        RefusedError: The grid is too large; the message says which size is not.
     """
     available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     needed = needed_memory(shape, division)

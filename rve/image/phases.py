@@ -45,9 +45,17 @@ class PhaseModuli:
 
     @classmethod
     def of_young(cls, modulus: float, poisson: float, dimension: int = 2) -> PhaseModuli:
-        """Return the moduli of a Young's modulus in Pa and a Poisson's ratio inside (−1, 0.5).
+        """Return the bulk and shear modulus of an isotropic material.
 
-        Dimension 2 is plane strain. A modulus from `RIGID` on is taken as infinite.
+        Args:
+            modulus: Young's modulus E in Pa; 0 is a pore, 1e18 and more is rigid, with infinite
+                moduli.
+            poisson: Poisson's ratio ν, inside (−1, 0.5).
+            dimension: 2 for plane strain, whose bulk modulus is K + G/3; 3 for space.
+
+        Raises:
+            RefusedError: ν lies outside, or E is negative or so small or large that a modulus is
+                outside (1e-60, 1e60) Pa.
         """
         is_stable = -1 < poisson < 0.5
         require(is_stable, "Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
@@ -71,12 +79,20 @@ class ModuliInterval:
     def of_young(
         cls, modulus: tuple[float, float], poisson: tuple[float, float], dimension: int = 2
     ) -> ModuliInterval:
-        """Return the smallest and largest moduli over intervals of E (Pa) and of ν.
+        """Return the smallest and largest bulk and shear moduli over intervals of E and of ν.
 
         Args:
-            modulus: Lower and upper end of Young's modulus.
-            poisson: Lower and upper end of Poisson's ratio.
-            dimension: 2 for plane strain, 3 for space.
+            modulus: Lower and upper end of Young's modulus E in Pa; 0 is a pore, 1e18 and more is
+                rigid.
+            poisson: Lower and upper end of Poisson's ratio ν, inside (−1, 0.5).
+            dimension: 2 for plane strain, whose bulk modulus is K + G/3; 3 for space.
+
+        Returns:
+            The moduli `lower` and `upper`; the bulk and the shear modulus of each need not belong
+            to the same ν.
+
+        Raises:
+            RefusedError: ν lies outside, or a modulus is negative or outside (1e-60, 1e60) Pa.
         """
         # At a fixed E the modulus G falls and K rises with ν. K + G/3 = E/(2 (1 + ν) (1 − 2 ν)) is
         # convex in ν and smallest at ν = −1/4; so this ν, moved into the interval, counts as well.
@@ -126,17 +142,21 @@ class ModuliImages:
         """Return the moduli that fields of one side of the bounds are computed with.
 
         Stiffer phases make a stiffer cell. So the lower bound holds with a rigid phase that is too
-        soft, the upper one with a pore that is a little too stiff. Rigid phases take 1e4 times the
-        largest finite modulus: a larger factor takes a multiple of the iterations. Pores take 1e-6
-        of the smallest one: with a smaller factor iterations grow by its logarithm.
+        soft, and the upper one with a pore that is a little too stiff. Rigid phases take 1e4 times
+        the largest finite modulus: a larger factor takes a multiple of the iterations. Pores take
+        1e-6 of the smallest one: with a smaller factor iterations grow by its logarithm.
 
         Args:
-            stress: Whether the fields are stresses with the lower moduli, where pores keep the
-                modulus 0; else they are displacements with the upper moduli.
+            stress: True for stresses, which take the lower moduli and prove the lower bound; pores
+                keep the modulus 0. False for displacements, which take the upper moduli and prove
+                the upper bound.
 
         Returns:
-            Bulk and shear moduli, shape (2, *grid); None where a rigid phase leaves no
-            displacements to bound from above.
+            Bulk and shear moduli in Pa, shape (2, y, x) or (2, z, y, x). None for displacements
+            beside a rigid phase: there is no upper bound.
+
+        Raises:
+            ValueError: No modulus is positive and finite.
         """
         moduli = self.lower if stress else self.upper
         if not stress and np.isinf(moduli).any():
@@ -157,13 +177,18 @@ class ModuliImages:
 
 
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Ints, Ints]:
-    """Return the lowest and highest number of the phase that each pixel may be of.
+    """Return the lowest and the highest number of the phase that each pixel may be of.
 
-    A pixel is of phase k if k of the thresholds are at most its grey value.
+    A pixel is of phase k if k of the thresholds are at most its grey value. Each threshold is known
+    within an interval.
 
     Args:
         grey: Grey values of pixels or voxels, of any shape.
-        thresholds: Lower and upper end of each threshold, both rising.
+        thresholds: Lower and upper end of each threshold; the lower ends ascend from threshold to
+            threshold, and so do the upper ones. Without thresholds all pixels are of phase 0.
+
+    Returns:
+        Lowest and highest number, two arrays of the shape of `grey`.
     """
     # Thresholds surely at most the grey value have their upper end there, possible ones the lower.
     lower, upper = np.array(thresholds).reshape(-1, 2).T
@@ -173,12 +198,20 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
 
 
 def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> ModuliImages:
-    """Return the lower and upper moduli of each pixel over all phases it may be of.
+    """Return the lower and upper moduli of each pixel or voxel over all phases that it may be of.
 
     Args:
-        first: Lowest number of the phase of each pixel or voxel.
-        last: Highest number of it, of the same shape; the phases between are possible as well.
-        phases: Moduli of the phases.
+        first: Lowest number, from 0, of the phase of each pixel or voxel, shape (y, x) or (z, y,
+            x).
+        last: Highest number of it, of the same shape and not below `first`. All phases between both
+            are possible as well.
+        phases: Smallest and largest bulk and shear modulus of each phase, in the order of the
+            numbers.
+
+    Returns:
+        Bulk and shear moduli in Pa: `lower`, the smallest of the possible phases, and `upper`, the
+        largest of them, each of shape (2, y, x) or (2, z, y, x). They need not be those of one
+        phase.
     """
     lower = np.array([(phase.lower.bulk, phase.lower.shear) for phase in phases])
     upper = np.array([(phase.upper.bulk, phase.upper.shear) for phase in phases])
@@ -195,12 +228,17 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
 def require_phases(grey: Array, thresholds: Sequence[tuple[float, float]]) -> None:
     """Refuse thresholds that may leave a phase without a pixel.
 
+    Every pixel whose grey value is at least a threshold is of the next phase.
+
     Args:
-        grey: Grey values of pixels or voxels.
-        thresholds: Lower and upper end of each threshold.
+        grey: Grey values of pixels or voxels, of any shape but empty.
+        thresholds: Lower and upper end of each threshold, in the order of the phases. Without any
+            the function does nothing.
 
     Raises:
-        RefusedError: A threshold lies outside the grey values, or no pixel surely lies between two.
+        RefusedError: Some threshold may be at most the smallest grey value or above the largest
+            one, or there is no pixel that lies surely between two thresholds that follow one
+            another.
     """
     low = float(grey.min())
     high = float(grey.max())
