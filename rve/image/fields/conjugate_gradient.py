@@ -56,12 +56,26 @@ class ConjugateGradient:
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
     def solve(self, system: System) -> Fields:
-        """Return a field whose energy error is within the accuracy.
+        """Return a field whose energy error is at most `self.accuracy` times `system.scale`.
+
+        It is the square of the distance from the exact solution in the norm of the operator.
+        `self.watch` is called before each iteration, and what it raises is not caught.
+
+        Args:
+            system: The equation operator(x) = load, whose load has the shape (1, unknowns of a
+                cell, y, x) or (1, unknowns of a cell, z, y, x). Its preconditioner is the inverse
+                of the operator of a constant material, and `min_energy_ratio` the positive lower
+                bound of the energy of any field over that in this material. `system.start`, the
+                first guess or None for zero, is not changed.
+
+        Returns:
+            New array in the shape of the load, in its library (NumPy or CuPy).
 
         Raises:
-            FailedError: The largest number of iterations does not suffice.
+            FailedError: 2000 iterations do not suffice.
         """
-        max_iterations = 2000  # with the preconditioner, contrasts of 1e6 need fewer
+        # With the preconditioner, contrasts of 1e6 between phases need fewer.
+        max_iterations = 2000
         if system.start is None:
             x = namespace(system.load).zeros_like(system.load)
             residual = system.load.copy()
@@ -89,8 +103,9 @@ class ConjugateGradient:
             last_gamma = gamma
             gamma = inner(residual, preconditioned)
             beta = gamma / last_gamma
-            # the Gauss-Radau rule with the node min_energy_ratio (Meurant and Tichý 2013); rounding
-            # may exhaust what is left of the factor, and the bound without the steps holds then
+            # The Gauss-Radau rule with the node min_energy_ratio (Meurant and Tichý 2013) sharpens
+            # the bound by the lengths of the steps. Rounding may exhaust what is left of it;
+            # then the bound without the steps, by the smallest eigenvalue alone, holds.
             excess = error_factor - step
             error_factor = 1 / system.min_energy_ratio
             if excess > 0:

@@ -168,11 +168,12 @@ class Element:
 
     @property
     def trace_in_deviator(self) -> float:
-        """Largest c with ∫ deviator² ≥ c ∫ trace² for every periodic fluctuation.
+        """Largest c with ∫ deviator² ≥ c ∫ trace² for every periodic fluctuation of the field.
 
-        The strain of a wave of displacements has 2 dev:dev = 2 (1 − 1/n) tr² + |rotation|². The
-        stress of a wave is a tensor in the n − 1 directions across the wave, so that its σ:σ is at
-        least tr²/(n − 1).
+        Here deviator² is 2 dev:dev. The strain of a wave of displacements in n dimensions has 2
+        dev:dev = 2 (1 − 1/n) tr² + |rotation|². The stress of a wave in equilibrium is a tensor in
+        the n − 1 directions across the wave, so that its σ:σ is at least tr²/(n − 1), and 2 dev:dev
+        = 2 σ:σ − 2 tr²/n.
         """
         n = self.dimension
         return 2 / (n * (n - 1)) if self.stress else 2 * (1 - 1 / n)
@@ -186,10 +187,19 @@ class Element:
 
 
 def isotropic_parts(dimension: int, *, stress: bool) -> Array:
-    """Return the matrix from Voigt components to the trace (row 0) and the parts of the deviator.
+    """Return the matrix from Voigt components of a tensor to its trace and parts of its deviator.
 
-    The squares of the parts of the deviator sum to 2 dev:dev. Shear components of strains are twice
-    those of the tensor.
+    Row 0 is the trace. The squares of the other rows' values sum to 2 dev:dev, twice the squared
+    norm of the deviator. They belong to 11 − 22, in space to (11 + 22 − 2·33)/√3, and to the
+    shears.
+
+    Args:
+        dimension: 2 for the components 11, 22, 12, or 3 for 11, 22, 33, 23, 13, 12.
+        stress: Whether shear components are those of the tensor, as of a stress; else they are
+            twice those, as of a strain.
+
+    Returns:
+        Matrix of shape (3, 3) in the plane, (6, 6) in space.
     """
     shears = len(SHEARS[dimension])
     parts = np.zeros((dimension + shears, dimension + shears))
@@ -206,7 +216,21 @@ def isotropic_parts(dimension: int, *, stress: bool) -> Array:
 
 @cache
 def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
-    """Return the element of stresses or of displacements of a cell with `sides` along the axes."""
+    """Return the finite element of stresses or of displacements of a pixel or voxel.
+
+    The stress is made of second derivatives of potentials, so that it is in equilibrium exactly.
+    The result is kept: equal arguments give the same object.
+
+    Args:
+        sides: Sides of a pixel along y and x, or of a voxel along z, y and x, over that along x;
+            another number is a KeyError.
+        stress: Whether the unknowns are potentials of stresses; else they are displacements.
+
+    Returns:
+        The unknowns that act on a cell, with the matrix from them to modes: coefficients of the
+        trace and of the parts of the deviator of the strain or stress in products of Legendre
+        polynomials that are orthonormal on the cell, constant first.
+    """
     n = len(sides)
     basis = BASES[n, stress]
     derivatives = stress_derivatives(n) if stress else strain_derivatives(n)
@@ -214,8 +238,9 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     tables = np.array([_derivative_modes(basis.functions, side) for side in sides])
     spline_products = _spline_products(tables, derivatives, names)
 
-    # Matrices to the modes of each Voigt component are Kronecker products over the axes; the axes
-    # of `components` are (component, mode, unknown function, function of the basis).
+    # Functions and modes are products over the axes, so that matrices to the modes of each Voigt
+    # component are Kronecker products; the axes of `components` are (component, mode, unknown
+    # function, function of the basis). An unknown function is a displacement or a potential.
     functions = list(product(range(len(basis.functions)), repeat=n))
     components = np.zeros((len(derivatives), len(functions), len(names), len(functions)))
     for k, factor in enumerate(spline_products.factors):
@@ -261,13 +286,30 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
 def _spline_products(
     tables: Array, derivatives: Derivatives, names: Sequence[tuple[int, int]]
 ) -> SplineProducts:
-    """Return the terms of strains or stresses, in the order that kernels work in."""
+    """Return the terms of strains or stresses, in the order that compiled kernels work in.
+
+    Args:
+        tables: Matrices from functions of one coordinate to Legendre modes of their derivatives of
+            order 0, 1 and 2, shape (axes of the grid, orders, modes, functions).
+        derivatives: Terms, each a factor times a derivative of an unknown function, of each Voigt
+            component. Their orders are along x, y and z.
+        names: Indices of the unknown functions, displacements or potentials, in the order in which
+            their unknowns are numbered. Each term's function is among them.
+
+    Returns:
+        `tables` as given; `terms`, rows of (Voigt component, number of the unknown function, order
+        of the derivative along each axis of the grid, x last); `groups`, ranges [first, last) of
+        rows with the same function and order along x, shape (groups, 2); and `factors`, one for
+        each row.
+    """
     rows = [
         (component, names.index(term.function), *term.orders[::-1], term.factor)
         for component, terms in enumerate(derivatives)
         for term in terms
     ]
-    rows.sort(key=lambda row: (row[1], row[-2]))  # kernels share derivatives along x
+    # By the function and the order along x: kernels take the derivatives along x of an unknown once
+    # for all terms of a group.
+    rows.sort(key=lambda row: (row[1], row[-2]))
     table: Ints = np.array(rows)
     terms = table[:, :-1].copy()
     is_first = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
@@ -311,14 +353,22 @@ def strain_derivatives(dimension: int) -> Derivatives:
 
 
 def stress_derivatives(dimension: int) -> Derivatives:
-    """Return the terms of Beltrami's stresses.
+    """Return the terms of Beltrami's stresses, second derivatives of potentials Φ_mn.
 
     With i, j and k all different they are
 
         σ_ii = ∂j² Φ_kk + ∂k² Φ_jj − 2 ∂j ∂k Φ_jk,
         σ_ij = ∂i ∂k Φ_jk + ∂j ∂k Φ_ik − ∂i ∂j Φ_kk − ∂k² Φ_ij.
 
-    In the plane Φ_33 is left alone, which varies with x and y.
+    In the plane Φ_33 is left alone, Airy's function, which varies with x and y.
+
+    Args:
+        dimension: 2 for the plane; 3 for space.
+
+    Returns:
+        For each component in Voigt's order (11, 22, 12, or 11, 22, 33, 23, 13, 12) a list of terms:
+        the factor, the indices (m, n) of Φ_mn from 0 with m ≤ n, and the orders of its derivative
+        along x, y and, in space, z.
     """
     axes = {0, 1, 2}
     by_component = []
@@ -341,6 +391,7 @@ def stress_derivatives(dimension: int) -> Derivatives:
         by_component.append(terms)
     if dimension == 3:
         return by_component
+    # Of derivatives along x and y alone, of Φ_33, the indices (2, 2), each component has one.
     plane = []
     for component in (0, 1, 5):  # 11, 22 and 12
         for factor, function, (x, y, z) in by_component[component]:
@@ -357,23 +408,29 @@ def _derivative(
 
 
 def _derivative_modes(basis: Polynomials, side: float) -> Array:
-    """Return matrices from functions to orthonormal Legendre modes of their derivatives.
+    """Return matrices from functions of one coordinate to Legendre modes of their derivatives.
+
+    The modes are coefficients in the Legendre polynomials on [0, 1], scaled to be orthonormal.
 
     Args:
-        basis: Functions of x/side on [0, 1].
+        basis: Functions of x/side on [0, 1], each by its coefficients of 1, x, x², …; at most
+            cubic.
         side: Side of the cell along this axis.
 
     Returns:
-        For the derivatives of order 0, 1 and 2 along the axis, shape (3, modes, functions). An
-        entry is an exact integral that is rounded, times a root and a power of the side.
+        Matrices for the derivatives along x of order 0, 1 and 2, shape (3, modes, functions); there
+        are as many modes as the longest function has coefficients. An entry is an exact integral
+        that is rounded, times a root and a power of the side.
     """
     legendre: Polynomials = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
     functions = list(basis)
     count = max(map(len, basis))
+    # ∫ P_k² over [0, 1] is 1/(2k + 1) for the shifted Legendre polynomials P_k.
     norms = np.sqrt(2 * np.arange(float(count)) + 1)
     matrices = []
     for order in range(3):
-        exact = [_integral(*pair) for pair in product(legendre[:count], functions)]
+        # fractions of whole numbers, so that a table's error is that of one rounding
+        exact = [_integral(mode, f) for mode in legendre[:count] for f in functions]
         matrix = np.array(exact, dtype=float).reshape(count, len(functions))
         matrices.append(matrix * norms[:, None] / side**order)
         functions = [_differentiated(f) for f in functions]

@@ -56,11 +56,13 @@ class Energies:
 
     @property
     def rounding(self) -> Array:
-        """Bound of the absolute error of each product, shape (2, fields, fields).
+        """Bound of the absolute error of each energy product, shape (2, fields, fields).
 
-        With errors δa, δb of modes, a b is off by |a| δb + |b| δa + δa δb at most. By Cauchy and
-        Schwarz the mean of each summand is at most a product of roots of mean squares. So is the
-        mean of the magnitudes |a b|, to which the rounding of sums is relative.
+        The first axis is trace and deviator, as of `value`. With errors δa, δb of modes, a b is off
+        by |a| δb + |b| δa + δa δb at most. By Cauchy and Schwarz the mean of each summand is at
+        most a product of roots of mean squares, of modes and of their errors (`mode_errors`). So is
+        the mean of the magnitudes |a b|, to which `summed`, the relative rounding of products and
+        sums, belongs.
         """
         size = np.sqrt(SAFETY * np.maximum(np.diagonal(self.value, axis1=1, axis2=2), 0))
         by_one = _outer(size, self.mode_errors)
@@ -70,7 +72,11 @@ class Energies:
 
     @property
     def upper(self) -> Array:
-        """A matrix above the total energy in the Loewner order, shape (fields, fields)."""
+        """A matrix above that of the true total energies, shape (fields, fields).
+
+        Above means in the Loewner order: the difference is positive semidefinite. The total energy
+        of each pair of fields is the sum of the products by trace and by deviator.
+        """
         value = self.value.sum(axis=0)
         error_of_sum = 2 * (len(self.value) + 2) * UNIT * np.abs(self.value).sum(axis=0)
         error = self.rounding.sum(axis=0) + error_of_sum
@@ -92,16 +98,28 @@ def energies(
     coefficients: tuple[Fields, Fields],
     field_errors: Fields | None = None,
 ) -> Energies:
-    """Return mean energy products of all pairs of fields, with a bound of their rounding errors.
+    """Return mean energy products of all pairs of fields, with bounds of their rounding errors.
+
+    The product of two fields is the mean over the grid of coefficient · mode · mode, summed over
+    the modes of the trace, and over those of the deviator. Modes are coefficients in polynomials
+    that are orthonormal on a cell, so that their products are energies.
 
     Args:
-        element: Unknowns and modes of a cell.
-        fields: Periodic fluctuations, shape (fields, unknowns, *grid).
+        element: Element of displacements, with modes of the strain, or of stresses.
+        fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
+            the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        coefficients: Coefficients of trace and of deviator, of the shape of the grid, not negative,
-            each with a rounding error of up to `COEFFICIENT` units.
+        coefficients: Coefficients of the squares of trace and of deviator in each cell, of the
+            shape of the grid, not negative, each with a relative error of up to 8 rounding units of
+            2⁻⁵³.
         field_errors: Bounds of the distances of `fields` from those that are meant, of the same
             shape; None for no distance.
+
+    Returns:
+        Energies with `value`, the symmetric products by trace and by deviator, shape (2, fields,
+        fields); `mode_errors`, bounds of the roots of the mean squares of the weighted errors of
+        modes, shape (2, fields); and `summed`, a bound of the relative rounding of products and
+        sums.
     """
     xp = namespace(fields)
     count = fields.shape[0]
@@ -150,7 +168,20 @@ class SlabModes(NamedTuple):
 def modes_of(
     element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
 ) -> Iterator[SlabModes]:
-    """Yield the modes of fields plus uniform fields by slabs; the arguments are of `energies`."""
+    """Yield the strain or stress modes of fields plus uniform fields, by groups of cells.
+
+    Args:
+        element: Element of displacements, with modes of the strain, or of stresses.
+        fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
+            the grid is (y, x) or (z, y, x).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
+        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
+            shape; None for no distance.
+
+    Yields:
+        SlabModes with `slab`, the index of the cells in an array of the grid's shape, `modes`,
+        shape (modes, fields, cells), and a bound of their errors.
+    """
     if isinstance(fields, np.ndarray) and element.dimension == 3:
         return _modes_by_rows(element, fields, mean_modes, field_errors)
     return modes_by_matrices(element, fields, mean_modes, field_errors)
@@ -159,7 +190,23 @@ def modes_of(
 def modes_by_matrices(
     element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
 ) -> Iterator[SlabModes]:
-    """As `modes_of`, with the element's matrix, in any library: what kernels are judged by."""
+    """Yield the modes of fields plus uniform fields by the element's matrix, in slabs of the grid.
+
+    This is the reference of the compiled kernels for voxels, and takes arrays of NumPy or CuPy.
+
+    Args:
+        element: Element of displacements, with modes of the strain, or of stresses.
+        fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
+            the grid is (y, x) or (z, y, x).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
+        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
+            shape; None for no distance.
+
+    Yields:
+        SlabModes for each slice of the first axis of the grid: `slab`, that slice; `modes`, shape
+        (modes, fields, cells of the slab); and a matrix A and magnitudes b of local unknowns with
+        which modes are off by at most A b + 2⁻⁵³ |modes|.
+    """
     xp = namespace(fields)
     matrix = xp.asarray(element.modes)
     magnitude = xp.asarray(element.magnitude)
@@ -181,12 +228,28 @@ def modes_by_matrices(
 def _modes_by_rows(
     element: Element, fields: Array, mean_modes: Array, field_errors: Array | None
 ) -> Iterator[SlabModes]:
-    """As `modes_of`, in pieces of a layer of voxels, so that few modes are in memory."""
+    """Yield the modes of fields of voxels plus uniform fields, by compiled kernels.
+
+    Args:
+        element: Element of displacements of voxels, with modes of the strain, or of stresses.
+        fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a voxel, z, y, x).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
+        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
+            shape; None for no distance.
+
+    Yields:
+        SlabModes for some rows of a layer, so that few modes are in memory: `slab`, the index (z,
+        rows); `modes`, shape (modes, fields, voxels); and a matrix A and magnitudes b of the
+        unknowns of a voxel with which modes are off by at most A b + 2⁻⁵³ |modes|.
+    """
     nz, ny, nx = fields.shape[2:]
     n_rows = max(1, SLAB_CELLS // (len(fields) * nx))
     width = 1 + element.reach
     unknown = np.array([local.unknown for local in element.local])
     by_unknown = [element.magnitude[:, unknown == u].sum(axis=1) for u in range(element.unknowns)]
+    # A kernel's mode is off by `ROUNDINGS` units of the sum of the magnitudes of its terms. Terms
+    # of one unknown share its largest value over the voxels around, a larger bound that takes less
+    # memory.
     amplification = ROUNDINGS * UNIT * np.stack(by_unknown, axis=1)
     for z in range(nz):
         layers = np.arange(z, z + width) % nz
@@ -243,19 +306,29 @@ def solve_side(
     division: int = 1,
     start: Fields | None = None,
 ) -> SideSolution | None:
-    """Return fields of least energy under the unit loads; None where pores leave no stress.
+    """Return fields of nearly least energy under unit loads: one side of the bounds.
 
-    Stresses vanish in pores, whose bulk or shear modulus is 0; see `pores`.
+    Fields of displacements bound the stiffness from above. Fields of stresses in equilibrium bound
+    its inverse from above; they vanish exactly in pores, by potentials that are prescribed there.
 
     Args:
-        element: Element of displacements, whose energy bounds the stiffness from above, or of
-            stresses, whose energy bounds the compliance.
-        bulk: Bulk modulus of each cell (of the plane: K + G/3), in any unit.
-        shear: Shear modulus, of the same shape and unit; of displacements both are positive.
+        element: Element of displacements or of stresses.
+        bulk: Bulk modulus of each cell (of the plane: K + G/3), in any unit, shape (y, x) or (z, y,
+            x).
+        shear: Shear modulus, of the same shape and unit. A cell where either modulus is 0 is a
+            pore, which is allowed for stresses alone. All are finite.
         solver: Solver with its stopping rule.
         division: Number of elements along each side of a cell: the same image, a larger space of
             fields.
-        start: Fields to start from, in the shape of the result.
+        start: Fields to start from, in the shape of the result's fields; None for zero.
+
+    Returns:
+        `fields`, shape (loads, unknowns of a cell, *grid), the grid being finer by `division`, with
+        the unit loads in Voigt's order; and `energy` of all pairs of them. None for stresses where
+        a pore meets its own periodic image.
+
+    Raises:
+        FailedError: The solver does not converge.
     """
     xp = namespace(bulk)
     for axis in range(element.dimension):
@@ -294,16 +367,25 @@ def _least_energy_fields(
 ) -> Fields:
     """Return fields under unit loads whose energy is nearly the least.
 
+    The loads that are solved for are near the eigenvectors of an isotropic stiffness; the fields
+    are combined to those of the unit loads afterwards.
+
     Args:
         element: Element of displacements or of stresses.
-        trace: Coefficient of the trace of each cell, positive.
-        deviator: Coefficient of the deviator of each cell, positive.
+        trace: Coefficient of the square of the trace in each cell, positive, shape (y, x) or (z, y,
+            x).
+        deviator: Coefficient of the square of the deviator in each cell, positive, of the same
+            shape.
         solver: Solver with its stopping rule.
         potentials: Space of the potentials whose stress vanishes in pores; None without pores.
         start: First guess, in the shape of the result; None for zero.
 
     Returns:
-        Fields of shape (loads, unknowns, *grid).
+        Unknowns of the periodic fluctuations, shape (loads, unknowns of a cell, *grid), for a unit
+        mean strain or stress in each component in Voigt's order.
+
+    Raises:
+        FailedError: The solver does not converge.
     """
     xp = namespace(trace)
     loads = solved_loads(element.dimension)
@@ -340,11 +422,25 @@ def _least_energy_fields(
 def _solve_beside_pores(
     solver: ConjugateGradient, system: System, potentials: PorePotentials, load: Array
 ) -> Fields:
-    """Return the field of a system whose stress under the mean stress `load` vanishes in pores.
+    """Return the field of a system whose stress under a mean stress vanishes in pores.
 
-    `load` has the shape (1, components). With Q the orthogonal projection on the differences of
-    such fields, the system for a difference is Q A Q, and Q M Q its preconditioner, M being that of
-    A. The energy of a difference is that of A, so that `min_energy_ratio` holds.
+    Such fields are an affine space: a particular field plus differences. With Q the orthogonal
+    projection on the differences, A the operator and M its preconditioner, the system for a
+    difference is Q A Q, and Q M Q its preconditioner. The energy of a difference is that of A, so
+    that `system.min_energy_ratio` holds.
+
+    Args:
+        solver: Solver with its stopping rule.
+        system: The system without pores, for potentials of shape (1, unknowns of a cell, *grid);
+            its `start` may be None.
+        potentials: Space of the potentials whose total stress vanishes in the pores.
+        load: Mean stress in Voigt's order, shape (1, components).
+
+    Returns:
+        New array in the shape of `system.load`.
+
+    Raises:
+        FailedError: The solver does not converge.
     """
     particular = potentials.particular_fields(load, system.load)
     start = system.start
@@ -361,10 +457,16 @@ def _solve_beside_pores(
 
 
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:
-    """Return a lower bound of the energy of any fields with given mean modes, shape (loads,).
+    """Return a lower bound of the mean energy of any fields with given mean modes, shape (loads,).
 
-    By Cauchy and Schwarz the mean of c m² is at least the harmonic mean of c times the square of
-    the mean of m. `modes` has the shape (modes, loads).
+    By the inequality of Cauchy and Schwarz the mean of c m² is at least the harmonic mean of c
+    times the square of the mean of m.
+
+    Args:
+        element: Element, which tells the modes of the trace from those of the deviator.
+        trace: Coefficient c of the squared modes m of the trace, positive, of the grid's shape.
+        deviator: Coefficient of those of the deviator, positive, of the same shape.
+        modes: Mean modes of each load, shape (modes, loads).
     """
     total = np.zeros(modes.shape[1])
     for rows, coefficient in zip(element.parts, (trace, deviator), strict=True):

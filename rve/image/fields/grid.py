@@ -28,9 +28,14 @@ Fields = Any
 
 
 def namespace(array: Fields) -> ModuleType:
-    """Return the library of an array, with the functions of the array standard."""
+    """Return the module of an array's library, with the functions of the array standard.
+
+    NumPy's own module for its arrays; otherwise that of array_api_compat, for CuPy's arrays.
+    ImportError without that package, TypeError for an object that is no array of any library.
+    """
     if isinstance(array, np.ndarray):
         return np
+    # Imported only for arrays of a device: the package is needed by nobody else.
     from array_api_compat import array_namespace
 
     library: ModuleType = array_namespace(array)
@@ -43,10 +48,13 @@ def on_host(array: Fields) -> Array:
 
 
 def device_array(device: str) -> Callable[[Array], Fields]:
-    """Return the function that takes NumPy's arrays to a device, "cpu" or "cuda".
+    """Return the function that takes NumPy's arrays to a device.
+
+    Args:
+        device: "cpu", for the arrays as they are, or "cuda" for CuPy's arrays on the first device.
 
     Raises:
-        RefusedError: CuPy or a device is missing, or the name is another.
+        RefusedError: Another name; or CuPy, array-api-compat, the driver or the device is missing.
     """
     if device == "cpu":
         return np.asarray
@@ -57,7 +65,8 @@ def device_array(device: str) -> Callable[[Array], Fields]:
         import cupy
 
         cupy.zeros(1)
-    except Exception as error:  # no package, no driver, no device
+    # CuPy raises errors of many kinds without a package, a driver or a device.
+    except Exception as error:
         reason = str(error).splitlines()[0]
         raise RefusedError("device", f"cuda ({reason})", "cpu", cure) from None
     to_device: Callable[[Array], Fields] = cupy.asarray
@@ -83,7 +92,18 @@ class Operator:
         return self.apply_by_matrices(fields)
 
     def apply_by_matrices(self, fields: Fields) -> Fields:
-        """As `apply`, with the element's matrices, in any library: what kernels are judged by."""
+        """Return the nodal forces of fields by the element's matrices.
+
+        This is the reference of the compiled kernels for voxels, and takes arrays of NumPy or CuPy.
+        The energy of the fields is half their product with the forces.
+
+        Args:
+            fields: Unknowns, shape (fields, unknowns of a cell, *grid), where the grid has the
+                shape of the coefficients `self.trace` and `self.deviator`.
+
+        Returns:
+            New array in the shape of `fields`.
+        """
         xp = namespace(fields)
         result = xp.zeros_like(fields)
         trace_modes, deviator_modes = (self.element.modes[rows] for rows in self.element.parts)
@@ -99,9 +119,15 @@ class Operator:
         return result
 
     def load(self, mean_modes: Array) -> Fields:
-        """Return minus the nodal forces of uniform fields, shape (fields, unknowns, *grid).
+        """Return minus the nodal forces of uniform fields: the load of their fluctuations.
 
-        `mean_modes` are their modes, shape (modes, fields).
+        Args:
+            mean_modes: Modes of the uniform fields, the rows of the trace first, shape (modes,
+                fields).
+
+        Returns:
+            New array of shape (fields, unknowns of a cell, *grid), in the library of the
+            coefficients.
         """
         xp = namespace(self.trace)
         count = mean_modes.shape[1]
@@ -109,12 +135,12 @@ class Operator:
         if xp is np and self.element.dimension == 3:
             return apply_by_rows(self.element, self.trace, self.deviator, result, -mean_modes)
         ones = (1,) * self.element.dimension
-        trace_force, deviator_force = (
-            xp.reshape(
-                xp.asarray(-(self.element.modes[rows].T @ mean_modes[rows])), (-1, count, *ones)
-            )
-            for rows in self.element.parts
-        )
+        # Forces on the local unknowns of a cell with a coefficient of 1, alike for all cells.
+        unit_forces = []
+        for rows in self.element.parts:
+            force = xp.asarray(-(self.element.modes[rows].T @ mean_modes[rows]))
+            unit_forces.append(xp.reshape(force, (-1, count, *ones)))
+        trace_force, deviator_force = unit_forces
         for slab in slabs(result):
             forces = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
             scatter(self.element, forces, result, slab)
@@ -122,7 +148,15 @@ class Operator:
 
 
 def slabs(fields: Fields) -> Iterator[slice]:
-    """Yield slices of the first axis of the grid, each of about `SLAB_CELLS` cells times fields."""
+    """Yield slices of the first axis of the grid, which bound the memory of work on fields.
+
+    Args:
+        fields: Array of shape (fields, unknowns, *grid) whose grid has one axis or more.
+
+    Yields:
+        Slices that cover the axis in its order. Each has as many layers as make 6144 cells times
+        fields in NumPy and 2²⁰ on a device, but one at least; the last one may be shorter.
+    """
     layers = fields.shape[2]
     size = SLAB_CELLS
     if not isinstance(fields, np.ndarray):
@@ -134,7 +168,17 @@ def slabs(fields: Fields) -> Iterator[slice]:
 
 
 def gather(element: Element, fields: Fields, slab: slice) -> Fields:
-    """Return the local unknowns of the cells of a slab, shape (local unknowns, fields, *slab)."""
+    """Return the local unknowns of the cells of a slab: those of their own and of cells further on.
+
+    Args:
+        element: Element, whose local unknowns k are the unknown `local[k].unknown` of the cell that
+            lies `local[k].offset` further along each axis of the periodic grid.
+        fields: Unknowns, shape (fields, unknowns of a cell, *grid).
+        slab: Slice of the first axis of the grid, with explicit ends.
+
+    Returns:
+        New array of shape (local unknowns, fields, layers of the slab, *rest of the grid).
+    """
     xp = namespace(fields)
     local = xp.empty((len(element.local), *fields[:, 0, slab].shape))
     for k, (unknown, offset) in enumerate(element.local):
@@ -144,13 +188,15 @@ def gather(element: Element, fields: Fields, slab: slice) -> Fields:
 
 
 def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> None:
-    """Add the forces on the cells of a slab to the nodal forces of the grid, in place.
+    """Add the forces on the cells of a slab to the nodal forces of the periodic grid, in place.
 
     Args:
-        element: Element of the cells.
-        forces: Forces on the local unknowns, shape (local unknowns, fields, *slab).
-        result: Nodal forces, shape (fields, unknowns, *grid); changed.
-        slab: Slice of the first axis of the grid.
+        element: Element, whose local unknowns k are the unknown `local[k].unknown` of the cell that
+            lies `local[k].offset` further along each axis.
+        forces: Forces on the local unknowns, shape (local unknowns, fields, layers of the slab,
+            *rest of the grid).
+        result: Nodal forces, shape (fields, unknowns of a cell, *grid); changed.
+        slab: Slice of the first axis of the grid, with explicit ends.
     """
     xp = namespace(result)
     # One local unknown after another: of an index that repeats, an array adds one force alone.
