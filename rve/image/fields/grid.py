@@ -95,7 +95,7 @@ class Operator:
         """Return the nodal forces of fields by the element's matrices.
 
         This is the reference of the compiled kernels for voxels, and takes arrays of NumPy or CuPy.
-        The energy of the fields is half their product with the forces.
+        The forces are the derivatives of half the energy trace·tr² + deviator·2 dev:dev.
 
         Args:
             fields: Unknowns, shape (fields, unknowns of a cell, *grid), where the grid has the

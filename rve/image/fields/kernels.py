@@ -13,11 +13,10 @@ component, an unknown and the orders of its derivative along z, y, x. Modes have
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import kernel
 from alphacut.rve.image.fields.element import Element, isotropic_parts
 
@@ -34,21 +33,24 @@ fast = kernel(fastmath={"contract", "nsz"})  # fused products round less; the or
 def apply_by_rows(
     element: Element, trace: Array, deviator: Array, fields: Array, mean_modes: Array
 ) -> Array:
-    """Return the nodal forces of fields of voxels plus uniform fields.
+    """Return the nodal forces of fields of voxels plus uniform fields, by compiled kernels.
+
+    Forces are the derivatives by the unknowns of half the energy.
 
     Args:
-        element: Element of voxels.
-        trace: Coefficient of the trace of each voxel, shape (z, y, x).
-        deviator: Coefficient of the deviator, of the same shape.
-        fields: Shape (fields, unknowns, z, y, x).
-        mean_modes: Modes of the uniform fields, shape (modes, fields).
+        element: Element of displacements or of stresses of a voxel.
+        trace: Coefficient of the squared trace in each voxel, shape (z, y, x).
+        deviator: Coefficient of the squared deviator (2 dev:dev), of the same shape.
+        fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
 
     Returns:
-        Forces in the shape of `fields`.
+        New array in the shape of `fields`.
     """
     result = np.zeros_like(fields)
     parts = isotropic_parts(3, stress=element.stress)
-    uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])  # by component
+    # Kernels work in Voigt components: the constant modes of the uniform fields are turned back.
+    uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
     tables, terms, groups, factors = element.products
     for number, field in enumerate(fields):
         _apply(tables, terms, groups, factors, parts[3, 3] ** 2, uniform[:, number].copy(),
@@ -57,10 +59,18 @@ def apply_by_rows(
 
 
 def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int) -> Array:
-    """Return the modes in some rows of a layer of voxels, shape (modes, fields, voxels).
+    """Return the strain or stress modes of fields in some rows of a layer of voxels.
 
-    The rows are those from `first` up to but without `last` in layer `z`. Each mode is off by at
-    most `ROUNDINGS` rounding units of the sum of the magnitudes of its terms.
+    Args:
+        element: Element of displacements or of stresses of a voxel.
+        fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
+        z: Index of the layer.
+        first: First row along y.
+        last: One past the last row, greater than `first`.
+
+    Returns:
+        Modes, those of the trace first, shape (modes, fields, voxels of the rows). Each is off by
+        at most `ROUNDINGS` = 32 rounding units of the sum of the magnitudes of its terms.
     """
     components = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
     tables, terms, groups, factors = element.products
@@ -70,7 +80,13 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
 
 
 def call_kernels(elements: Iterable[Element]) -> None:
-    """Call all kernels once, on a field of zeros on one voxel; see `KernelThreads`."""
+    """Call all kernels for voxels once, so that they are compiled or loaded before they are needed.
+
+    They are called on a field of zeros on a single voxel. Nothing is changed but Numba's cache.
+
+    Args:
+        elements: Elements of voxels whose kernels are called.
+    """
     coefficient = np.ones((1, 1, 1))
     for element in elements:
         fields = np.zeros((1, element.unknowns, 1, 1, 1))
@@ -81,15 +97,31 @@ def call_kernels(elements: Iterable[Element]) -> None:
 
 @fast
 def _apply(
-    tables: Any, terms: Any, groups: Any, factors: Any, shear_factor: float, uniform: Any,
-    trace: Any, deviator: Any, field: Any, result: Any,
+    tables: Array, terms: Ints, groups: Ints, factors: Array, shear_factor: float, uniform: Array,
+    trace: Array, deviator: Array, field: Array, result: Array,
 ) -> None:  # fmt: skip
-    """Add the forces of one field, shape (unknowns, z, y, x), to `result` in place.
+    """Add the nodal forces of one field on voxels to `result` in place.
 
-    The energy of the modes of a voxel is trace·tr² + deviator·2 dev:dev. Its derivative by a normal
-    component is mean + 2 deviator · component, with mean = (trace − 2/3 deviator)·tr; its
-    derivative by a shear component is shear_factor · deviator · component. `uniform` has the Voigt
-    components of a uniform field that is added, shape (6,).
+    The energy of the modes of a voxel is trace·tr² + deviator·2 dev:dev. Half its derivative by a
+    normal component is mean + 2 deviator · component, with mean = (trace − 2/3 deviator)·tr; by a
+    shear component it is shear_factor · deviator · component. The modes are found axis by axis,
+    multiplied by these, and passed back to the unknowns by the transposed products.
+
+    Args:
+        tables: Matrices from the n functions of one coordinate to Legendre modes of their
+            derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
+            functions).
+        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
+            orders of its derivative along z, y, x).
+        groups: Ranges [first, last) of terms with the same unknown and order along x, shape
+            (groups, 2).
+        factors: Factor of each term.
+        shear_factor: Factor of shear components: 1 for strains, 4 for stresses.
+        uniform: Voigt components of a uniform field to add, shape (6,).
+        trace: Coefficient of the squared trace in each voxel, shape (z, y, x).
+        deviator: Coefficient of the squared deviator, of the same shape.
+        field: Unknowns of the field, shape (unknowns of a voxel, z, y, x).
+        result: Nodal forces of the same shape; changed.
     """
     n = tables.shape[-1]
     nz, ny, nx = trace.shape
@@ -152,12 +184,26 @@ def _apply(
 
 @fast
 def _fill_modes(
-    tables: Any, terms: Any, groups: Any, factors: Any, fields: Any,
-    z: int, first: int, last: int, modes: Any,
+    tables: Array, terms: Ints, groups: Ints, factors: Array, fields: Array,
+    z: int, first: int, last: int, modes: Array,
 ) -> None:  # fmt: skip
-    """Set the modes of the Voigt components in the rows from `first` to `last` of layer `z`.
+    """Write the modes of the Voigt components of fields in some rows of a layer of voxels.
 
-    `modes` is changed in place; its shape is (component and its modes, fields, voxels).
+    Args:
+        tables: Matrices from the n functions of one coordinate to Legendre modes of their
+            derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
+            functions).
+        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
+            orders of its derivative along z, y, x).
+        groups: Ranges [first, last) of terms with the same unknown and order along x, shape
+            (groups, 2).
+        factors: Factor of each term.
+        fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
+        z: Index of the layer.
+        first: First row along y.
+        last: One past the last row.
+        modes: Overwritten; shape (6 components × n modes along z × n along y × n along x, fields,
+            voxels of the rows).
     """
     n = tables.shape[-1]
     nx = fields.shape[-1]
@@ -178,18 +224,37 @@ def _fill_modes(
 
 @fast
 def _fill_strips(
-    tables: Any, terms: Any, groups: Any, factors: Any, field: Any, z: int, y: int,
-    shifted: Any, lines: Any, strips: Any,
+    tables: Array, terms: Ints, groups: Ints, factors: Array, field: Array, z: int, y: int,
+    shifted: Array, lines: Array, strips: Array,
 ) -> None:  # fmt: skip
-    """Pass the row y of the n planes from z on to modes along x, and these to modes along z.
+    """Pass a row of unknowns along x on to modes along x and z, and keep them as a strip.
 
-    The result is written to `strips`, shape (terms, modes along z, y % n, modes along x).
-    `shifted` and `lines` are work arrays for a row moved by each function, and for modes along x.
+    The modes along x of row y are found in the n layers of unknowns from layer z on, around the
+    periodic grid; their combinations along z are the modes of the voxels in layer z.
+
+    Args:
+        tables: Matrices from the n functions of one coordinate to Legendre modes of their
+            derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
+            functions).
+        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
+            orders of its derivative along z, y, x).
+        groups: Ranges [first, last) of terms with the same unknown and order along x, shape
+            (groups, 2).
+        factors: Factor of each term.
+        field: Unknowns of a periodic field, shape (unknowns of a voxel, z, y, x).
+        z: Index of the layer of voxels.
+        y: Index of the row of unknowns, taken modulo the size of the grid.
+        shifted: Work array for a row of each layer moved by each function, shape (n, n, x).
+        lines: Work array for modes along x of each layer, shape (n, n × x).
+        strips: Modes of each term, shape (terms, n modes along z, n, n modes along x × x). The
+            third index is y modulo n; the entries of row y are overwritten but for the highest
+            modes, which are zero where a derivative lowers the degree.
     """
     n = tables.shape[-1]
     nz, ny, nx = field.shape[1:]
     for start, stop in groups:  # terms of one unknown and one derivative along x
         _, u, _, _, dx = terms[start]
+        # Work arrays are emptied here, since combinations are added to what they hold.
         lines[:] = 0.0
         # along x: function f of voxel x has its unknown f voxels further, around the periodic row
         for a in range(n):
@@ -213,10 +278,20 @@ def _fill_strips(
 
 
 @fast
-def _modes_of_row(tables: Any, terms: Any, strips: Any, y: int, modes: Any) -> None:
-    """Pass the strips of the n rows from y on to modes along y, and add up the terms in `modes`.
+def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Array) -> None:
+    """Combine n strips of rows of unknowns to the modes of the Voigt components in a row of voxels.
 
-    `modes` is overwritten; its shape is (components, n, n, modes along x).
+    Args:
+        tables: Matrices from the n functions of one coordinate to Legendre modes of their
+            derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
+            functions).
+        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
+            orders of its derivative along z, y, x).
+        strips: Modes along z and x of each term in the rows of unknowns y … y + n − 1, shape
+            (terms, n modes along z, n, n modes along x × x). The third index is the row modulo n.
+        y: Index of the row of voxels.
+        modes: Overwritten by the sums of the terms; shape (6 components, n modes along z, n modes
+            along y, n modes along x × x).
     """
     n = tables.shape[-1]
     nx = modes.shape[-1] // n
@@ -234,19 +309,37 @@ def _modes_of_row(tables: Any, terms: Any, strips: Any, y: int, modes: Any) -> N
 
 @fast
 def _add_forces(
-    tables: Any, terms: Any, groups: Any, factors: Any, sums: Any, z: int, y: int,
-    lines: Any, shifted: Any, result: Any,
+    tables: Array, terms: Ints, groups: Ints, factors: Array, sums: Array, z: int, y: int,
+    lines: Array, shifted: Array, result: Array,
 ) -> None:  # fmt: skip
-    """Pass the sums of the row y back along z and x, add them to `result`, and empty them.
+    """Pass the sums of a row of unknowns back along z and x, and add them to the nodal forces.
 
-    This is the transpose of `_fill_strips`. `sums` has the shape (terms, y % n, modes along z,
-    modes along x); `lines` and `shifted` are work arrays.
+    This is the transpose of the pass from unknowns to strips, `_fill_strips`.
+
+    Args:
+        tables: Matrices from the n functions of one coordinate to Legendre modes of their
+            derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
+            functions).
+        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
+            orders of its derivative along z, y, x).
+        groups: Ranges [first, last) of terms with the same unknown and order along x, shape
+            (groups, 2).
+        factors: Factor of each term.
+        sums: What the modes of voxels exert on each term of a row, shape (terms, n, n modes along
+            z, n modes along x × x). The second index is y modulo n; the entries of row y are set to
+            zero.
+        z: Index of the layer of voxels, whose unknowns lie in the n layers from z on.
+        y: Index of the row of unknowns, taken modulo the size of the grid.
+        lines: Work array for modes along x of each layer, shape (n, n × x).
+        shifted: Work array for the forces of each function, shape (n, n, x).
+        result: Nodal forces, shape (unknowns of a voxel, z, y, x); changed.
     """
     n = tables.shape[-1]
     nz, ny, nx = result.shape[1:]
     for start, stop in groups:
         _, u, _, _, dx = terms[start]
         shifted[:] = 0.0
+        # Work arrays are emptied here, since combinations are added to what they hold.
         lines[:] = 0.0
         for term in range(start, stop):
             dz = terms[term, 2]
@@ -268,11 +361,17 @@ def _add_forces(
 
 @fast
 def _add_combination(
-    out: Any, size: int, taps: int, factor: float, weights: Any, sources: Any
+    out: Array, size: int, taps: int, factor: float, weights: Array, sources: Array
 ) -> None:
     """Add factor · Σ_k weights[k] sources[k] to the first `size` values of a row, in place.
 
-    `taps`, the number of terms of the sum, is at most 3.
+    Args:
+        out: The row that is changed; shape (size or more,).
+        size: Number of values.
+        taps: Number of terms of the sum, 1, 2 or 3: the degrees of splines are at most 2.
+        factor: Factor of the sum.
+        weights: Weights of the terms, shape (taps or more,).
+        sources: Rows that are added, shape (taps or more, size or more).
     """
     a = factor * weights[0]  # sources are indexed in the loops: a view of a row takes as long
     if taps == 3:

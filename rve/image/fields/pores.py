@@ -47,10 +47,21 @@ class PoreNodes:
 
     @classmethod
     def of_mask(cls, is_pore: Mask, reach: int) -> Self | None:
-        """Return the nodes of all pores of a periodic grid; None where a pore meets its own image.
+        """Return the nodes of all closed pores of a periodic grid.
 
-        Cells belong to one pore if a function reaches into both: if they are at most `reach` cells
-        apart along each axis.
+        Cells belong to one pore if a function of the element reaches into both: if they are at most
+        `reach` cells apart along each axis, also through the sides of the grid.
+
+        Args:
+            is_pore: Whether each cell is a pore, shape (y, x) or (z, y, x), with one pore at least.
+            reach: Largest number of cells along an axis over which a function of the element
+                extends beyond its own cell.
+
+        Returns:
+            For K nodes, each listed once: the index of the node's cell in the grid, the number of
+            its pore, and its integer coordinates about the centre of the pore, which do not jump at
+            the sides of the grid. None where a pore meets its own periodic image, so that it is not
+            closed.
         """
         shape = np.array(is_pore.shape)
         cells = np.argwhere(is_pore)
@@ -70,7 +81,8 @@ class PoreNodes:
         owner, number = np.divmod(first, len(offsets))
         position = unwrapped[owner] + offsets[number]
         sums = np.stack([np.bincount(pore[owner], x) for x in position.T], axis=1)
-        # whole numbers keep the coordinates of nodes exact
+        # A centre in whole numbers keeps the coordinates of nodes exact; anywhere near the middle
+        # will do, since it only keeps the monomials of the coordinates small.
         centre = np.round(sums / np.bincount(pore[owner])[:, None])
         return cls(nodes[first], pore[owner], position - centre[pore[owner]])
 
@@ -93,15 +105,20 @@ def _unwrapped_pieces(
 ) -> _Pieces | None:
     """Return how pieces of pores are joined through the sides of a periodic grid.
 
+    A piece is a set of pore cells that are connected within the grid, without its sides.
+
     Args:
-        label: Number of the piece of each pore cell, shape (C,).
-        cells: Indices of the pore cells, shape (C, dimension).
-        labels: Number of the piece of each cell from 1, and 0 outside pores, of the grid's shape.
-        count: Number of pieces.
-        reach: Largest distance of neighbouring cells along an axis.
+        label: Number of the piece of each of the C pore cells, from 0, shape (C,).
+        cells: Indices of these cells along the axes of the grid, shape (C, dimension).
+        labels: Number of the piece of each cell of the grid from 1, and 0 outside pores, of the
+            grid's shape.
+        count: Number of pieces, at least 1.
+        reach: Largest distance along an axis, in cells, of cells that belong together.
 
     Returns:
-        The pieces; None where a pore meets its own periodic image.
+        For each piece the number of its pore, shape (count,), and the periods of the grid by which
+        it is moved along the axes to lie beside the others of its pore, shape (count, dimension).
+        None where a pore meets its own periodic image.
     """
     # Links (piece, neighbouring piece, periods from one to the other along each axis). Pieces are
     # few where cells are many, so that links are compared by piece and each kind counts once.
@@ -116,7 +133,8 @@ def _unwrapped_pieces(
     second = links[:, 1]
     periods = links[:, 2:]
 
-    # Breadth first from a root that is linked to the first piece of each pore
+    # Breadth first from an added root that is linked to the first piece of each pore, so that one
+    # search reaches all pores. Its number is `count`.
     graph = csr_array((np.ones(len(links)), (first, second)), (count, count))
     _, pore = connected_components(graph, directed=False)
     _, starts = np.unique(pore, return_index=True)
@@ -154,7 +172,20 @@ class _Polynomials(NamedTuple):
 
 
 def _polynomials(element: Element) -> _Polynomials:
-    """Return the polynomials of the potentials of an element of stresses."""
+    """Return the potentials of second degree with a unit stress, and those without stress.
+
+    Coordinates are in cells. A polynomial has a coefficient for each potential and each monomial of
+    degree 2 at most along all axes together.
+
+    Args:
+        element: Element of stresses, whose potentials and sides are used.
+
+    Returns:
+        `particular`, polynomials whose stress is −1 in one Voigt component and 0 in the others,
+        shape (components, potentials, monomials); `gauge`, a basis of all polynomials without
+        stress, shape (J, potentials, monomials); and `monomials`, the degrees of each along (y, x)
+        or (z, y, x).
+    """
     monomials = [x for x in product(range(3), repeat=element.dimension) if sum(x) <= 2]
     derivatives = stress_derivatives(element.dimension)
     potentials = unknown_functions(derivatives)
@@ -173,6 +204,7 @@ def _polynomials(element: Element) -> _Polynomials:
             unit[index] = area / (term.factor * max(degrees))  # ∂² x² = 2, ∂x ∂y x y = 1
             units.append(unit)
         particular[component] = -units[0]
+        # Two polynomials of stress 1 in this component, and none in others, differ by one without.
         gauge += [unit - units[0] for unit in units[1:]]
     for index in np.argwhere(is_free):
         alone = np.zeros(shape)
@@ -182,14 +214,20 @@ def _polynomials(element: Element) -> _Polynomials:
 
 
 def _coefficients(element: Element, position: Array, degrees: tuple[int, ...]) -> Array:
-    """Return the coefficients of a monomial at nodes, shape (unknowns of a node, K).
+    """Return the coefficients of the element's functions that make up a monomial, at nodes.
 
-    They are exact: multiples of 1/8 of whole numbers.
+    The monomial is a product of powers of the coordinates, of degree 2 at most. The coefficients
+    are exact: multiples of 1/8 of whole numbers.
 
     Args:
         element: Element of stresses.
-        position: Coordinates of the nodes in cells along the axes, shape (K, dimension).
-        degrees: Degrees of the monomial along the axes.
+        position: Whole coordinates of K nodes in cells along the axes, shape (K, dimension).
+        degrees: Degrees of the monomial along these axes.
+
+    Returns:
+        Coefficients, shape (unknowns of a potential at a node, K). In the plane the unknowns are
+        Hermite's: value, slope along x, slope along y, mixed derivative; in space there is one, of
+        a quadratic B-spline.
     """
     along_axes: list[list[Array]] = []
     for axis, degree in enumerate(degrees):
@@ -205,16 +243,18 @@ def _coefficients(element: Element, position: Array, degrees: tuple[int, ...]) -
 def _node_matrix(
     polynomials: Array, coefficients: Array, first_column: Ints, n_columns: int
 ) -> csr_array:
-    """Return the matrix from factors of polynomials to the unknowns at nodes.
+    """Return the matrix from factors of polynomials to the unknowns at the nodes of pores.
 
     Args:
-        polynomials: Polynomials of the potentials, shape (N, potentials, monomials).
-        coefficients: Coefficients of the monomials, shape (monomials, unknowns of a node × K).
-        first_column: Column of the first polynomial for each of these unknowns.
+        polynomials: N polynomials of the potentials, shape (N, potentials, monomials).
+        coefficients: Coefficients of the monomials at the K nodes, shape (monomials, unknowns of a
+            potential at a node × K).
+        first_column: Column of the first of the N polynomials for each of these unknowns, of the
+            pore that the node belongs to, shape (unknowns × K,).
         n_columns: Number of columns.
 
     Returns:
-        Matrix with a row for each potential, unknown of a node, and node, in this order.
+        Sparse matrix with a row for each potential, unknown at a node, and node, in this order.
     """
     number, potential, monomial = np.nonzero(polynomials)
     size = coefficients.shape[1]
@@ -248,7 +288,20 @@ class PorePotentials:
 
     @classmethod
     def of_nodes(cls, element: Element, nodes: PoreNodes) -> Self:
-        """Return the potentials of an element of stresses, for the nodes of closed pores."""
+        """Return the potentials whose total stress vanishes in closed pores.
+
+        In each pore the potentials are polynomials of second degree about the pore's centre: a
+        particular one for each component of the mean stress, plus any combination of J without
+        stress.
+
+        Args:
+            element: Element of stresses, of the grid's dimension.
+            nodes: Nodes of the closed pores, at least one, with pores numbered from 0 without gaps.
+
+        Returns:
+            The affine space of the unknowns at these nodes, with matrices from mean stresses and
+            from the J parameters of each pore.
+        """
         polynomials = _polynomials(element)
         n_gauge = len(polynomials.gauge)
         n_pores = int(nodes.pore.max()) + 1
@@ -286,25 +339,29 @@ class PorePotentials:
         return self._put(fields, self.gauge @ self._parameters(self._at_nodes(fields)))
 
     def particular_fields(self, loads: Array, like: Fields) -> Fields:
-        """Return fields of the space that vanish outside the pores' nodes.
+        """Return potentials whose total stress under given mean stresses vanishes in pores.
+
+        They are zero outside the nodes of the pores.
 
         Args:
             loads: Mean stresses in Voigt order, shape (loads, components).
-            like: Array of the shape and the library of the result.
+            like: Array of shape (loads, unknowns of a cell, *grid), whose shape and library the
+                result has; it is not changed.
         """
         return self._put(namespace(like).zeros_like(like), self.particular @ loads.T)
 
     def impose(self, fields: Fields) -> Fields:
-        """Put fields for unit loads into the space, in place, and bound what rounding leaves.
+        """Put fields for unit loads into the space of potentials without stress in pores, in place.
 
-        At the pores' nodes the fields become those of the nearest polynomials, whose stress
-        vanishes in exact arithmetic.
+        At the pores' nodes the fields become those of the nearest polynomials, whose total stress
+        vanishes in exact arithmetic. What rounding leaves is bounded.
 
         Args:
-            fields: Fields for unit loads in Voigt order, shape (loads, unknowns, *grid); changed.
+            fields: Potentials under unit mean stresses in Voigt order, shape (loads, unknowns of a
+                cell, *grid); changed at the pores' nodes.
 
         Returns:
-            Bounds of the distances of the numbers there from the exact polynomials, of the shape of
+            Bounds of the distances of the numbers there from the exact polynomials, in the shape of
             `fields`; 0 elsewhere.
         """
         particular = self.particular.toarray()
@@ -319,14 +376,17 @@ class PorePotentials:
         return self._put(namespace(fields).zeros_like(fields), terms * unit * size)
 
     def _at_nodes(self, fields: Fields) -> Array:
-        """Return the unknowns at the pores' nodes, shape (unknowns × K, fields)."""
+        """Return the unknowns at K nodes of pores in NumPy, shape (unknowns × K, fields)."""
         found = on_host(fields[self.index])
         return np.asarray(found.reshape(len(found), -1).T)
 
     def _put(self, fields: Fields, at_nodes: Array) -> Fields:
-        """Set the unknowns at the pores' nodes in place, as `_at_nodes` returns them.
+        """Set the unknowns at the pores' nodes in place, and return the changed array.
 
-        Returns the changed array.
+        Args:
+            fields: Array of shape (fields, unknowns of a cell, *grid); changed at the K nodes
+                alone.
+            at_nodes: Values, shape (unknowns of a cell × K, fields), the unknown as the slow index.
         """
         values = at_nodes.T.reshape(len(fields), fields.shape[1], -1)
         fields[self.index] = namespace(fields).asarray(values)

@@ -42,7 +42,18 @@ class Reference:
 
     @classmethod
     def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
-        """Return the material at the geometric means of a grid's extremes: a narrow spectrum."""
+        """Return the constant material of a preconditioner, between the extremes of a grid.
+
+        With c of `element.trace_in_deviator`, the largest with ∫ deviator² ≥ c ∫ trace² for a
+        fluctuation, the two combinations that bound the spectrum are the coefficient s of the
+        deviator and b + c s with the coefficient b of the trace. The geometric means of their
+        extremes in the grid make the spectrum narrow.
+
+        Args:
+            element: Element of displacements or of stresses.
+            trace: Coefficient of the squared trace in each cell, not negative, of the grid's shape.
+            deviator: Coefficient of the squared deviator in each cell, positive, of the same shape.
+        """
         c = element.trace_in_deviator
         min_deviator = float(deviator.min())
         max_deviator = float(deviator.max())
@@ -50,7 +61,8 @@ class Reference:
         max_sum = float(trace.max()) + c * max_deviator
         mean_sum = float(np.sqrt(min_sum * max_sum))
         mean_deviator = float(np.sqrt(min_deviator * max_deviator))
-        # for the stress of the plane the third square of the head of this file is zero
+        # For the stress of the plane ∫ deviator² = c ∫ trace² exactly, so that b + c s alone
+        # counts; s then keeps the ratio of the grid's smallest coefficients.
         if element.stress and element.dimension == 2:
             mean_deviator = mean_sum * min_deviator / min_sum
         return cls(mean_sum - c * mean_deviator, mean_deviator, c)
@@ -58,7 +70,15 @@ class Reference:
     def min_energy_ratio(self, trace: Fields, deviator: Fields) -> float:
         """Return a lower bound of the energy of fluctuations in a grid over that in this material.
 
-        It is reduced by more than the preconditioner's rounding; see `FourierPreconditioner`.
+        For a fluctuation ∫ deviator² = c ∫ trace² + a third square, with the number c of
+        `self.trace_in_deviator`. So its energy is (b + c s) ∫ trace² + s times the third square,
+        with the coefficients b of the trace and s of the deviator; the ratio of two materials is at
+        least the smaller ratio of s and of b + c s. It is reduced by .001, more than the rounding
+        of a preconditioner in single precision.
+
+        Args:
+            trace: Coefficient of the squared trace in each cell, not negative, of the grid's shape.
+            deviator: Coefficient of the squared deviator in each cell, positive, of the same shape.
         """
         rounding = 1e-3
         shear = float(deviator.min())
@@ -95,7 +115,20 @@ class FourierPreconditioner:
     def of_material(
         cls, element: Element, constant: Reference, shape: tuple[int, ...], xp: ModuleType = np
     ) -> FourierPreconditioner:
-        """Return the inverse for a constant material; what has no energy has a pseudo-inverse."""
+        """Return the inverse of the stiffness operator of a constant material on a periodic grid.
+
+        Fields without energy, such as potentials without stress, have a pseudo-inverse.
+
+        Args:
+            element: Element of displacements or of stresses.
+            constant: Coefficients of the squares of trace and deviator of the material.
+            shape: Numbers of cells along each axis of the grid, (y, x) or (z, y, x).
+            xp: Module of the library of the arrays that the inverse is applied to.
+
+        Returns:
+            Real blocks by wave number, in double precision for pixels and in single precision for
+            voxels.
+        """
         waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
         waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
         # Blocks of pixels span many orders of energy at long waves: they need doubles. Voxels have
@@ -130,7 +163,17 @@ class FourierPreconditioner:
         return cls(inverse, phases, shape, scale)
 
     def apply(self, fields: Fields) -> Fields:
-        """Return the inverse applied to fields of shape (fields, unknowns, *grid)."""
+        """Return the inverse of the operator applied to fields, by fast Fourier transforms.
+
+        For voxels it is in single precision: off by 1e-7 of the argument.
+
+        Args:
+            fields: Nodal forces, shape (fields, unknowns of a cell, *grid), with the grid that the
+                inverse was made for.
+
+        Returns:
+            New array of doubles in the shape of `fields`.
+        """
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
         # SciPy transforms several axes faster than NumPy, and takes no arrays of a device.
@@ -142,9 +185,18 @@ class FourierPreconditioner:
 
 
 def _phases(element: Element, waves: Sequence[Array], xp: ModuleType) -> Fields:
-    """Return exp(i k·place), times i for odd unknowns, shape (*waves, unknowns).
+    """Return exp(i k·place) of each unknown of a cell, times i for odd unknowns.
 
-    `waves` are the wave numbers along each axis, per cell.
+    With these phases the blocks of the Fourier symbol are real. An unknown is odd if it changes its
+    sign when space is mirrored at a point, as a slope does.
+
+    Args:
+        element: Element, with the place of each unknown in its cell.
+        waves: Wave numbers k along each axis of the grid, in radians per cell, shape (waves,) each.
+        xp: Module of the result's array library.
+
+    Returns:
+        Complex array of shape (*waves along each axis, unknowns of a cell).
     """
     phases = xp.asarray(np.where(element.is_odd, 1j, 1.0))
     for axis, k in enumerate(waves):
@@ -156,12 +208,22 @@ def _phases(element: Element, waves: Sequence[Array], xp: ModuleType) -> Fields:
 def _block_of_uniform_fields(
     element: Element, constant: Reference, waves: Sequence[Array]
 ) -> Array:
-    """Return the pseudo-inverse of the block of fields that do not vary from cell to cell.
+    """Return the pseudo-inverse of the Fourier block of fields that do not vary from cell to cell.
 
     Of splines alone such a field has no energy but rounding; the block is then zero.
+
+    Args:
+        element: Element of displacements or of stresses.
+        constant: Coefficients of the squares of trace and deviator of the constant material.
+        waves: Wave numbers along each axis of the grid, whose first one is 0; only that is used.
+
+    Returns:
+        Symmetric matrix of shape (unknowns of a cell, unknowns of a cell).
     """
     n = element.unknowns
     block = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
+    # The sum of the squared entries of a matrix M is at least the largest eigenvalue of MᵀM. It is
+    # the scale of what counts as no energy.
     max_energy = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
     if np.linalg.norm(block, 2) <= GAUGE * max_energy:
         return np.zeros((n, n))
@@ -169,10 +231,17 @@ def _block_of_uniform_fields(
 
 
 def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
-    """Return the inverse of symmetric positive blocks, (…, n, n), that neglects what has no energy.
+    """Return the inverse of symmetric positive semidefinite blocks, without what has no energy.
 
-    Potentials without stress have no energy. With X = (B + ε)⁻¹ they are large in X and vanish in
-    X B X, which for the others is near B⁻¹.
+    Potentials without stress have no energy. With X = (B + ε)⁻¹ they are large in X and vanish in X
+    B X, which for the others is near B⁻¹. Here ε is 1e-6 of the trace of each block.
+
+    Args:
+        xp: Module of the array library of `blocks`.
+        blocks: Blocks B, real, not zero, shape (…, n, n).
+
+    Returns:
+        New array of the shape of `blocks`.
     """
     size = blocks.shape[-1]
     trace = xp.einsum("...ii->...", blocks)[..., None, None]
@@ -183,9 +252,18 @@ def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
 def fourier_blocks(
     element: Element, constant: Reference, waves: Sequence[Array], xp: ModuleType = np
 ) -> Fields:
-    """Return the Fourier symbol of a constant material, shape (*waves, unknowns, unknowns).
+    """Return the Fourier symbol of the stiffness operator of a constant material on a grid.
 
-    `waves` are the wave numbers along each axis of the grid, per cell.
+    A field u(cell) = exp(i k·cell) U has the nodal forces exp(i k·cell) S(k) U with the block S(k).
+
+    Args:
+        element: Element of displacements or of stresses.
+        constant: Coefficients of the squares of trace and deviator of the constant material.
+        waves: Wave numbers k along each axis of the grid, in radians per cell, shape (waves,) each.
+        xp: Module of the result's array library.
+
+    Returns:
+        Hermitian blocks, shape (*waves along each axis, unknowns of a cell, unknowns of a cell).
     """
     # energy of the local unknowns of a cell: by the trace and by the deviator
     trace, deviator = (element.modes[rows].T @ element.modes[rows] for rows in element.parts)
