@@ -25,8 +25,6 @@ from alphacut.rve.image.white import PHOTOMETRIC, as_shown, stored_values, tags_
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-TAKE_VOXEL = "a volume takes cell.voxel in place of cell.pixel"
-TAKE_PIXEL = "a picture takes cell.pixel in place of cell.voxel"
 SLICES = (".tif", ".tiff", ".png", ".bmp")
 """Endings of the pictures of a folder that are its slices."""
 
@@ -34,28 +32,36 @@ SLICES = (".tif", ".tiff", ".png", ".bmp")
 def read_grid(path: Path, sides: Sequence[float]) -> Array:
     """Return grey values or labels, shape (y, x) of a picture or (z, y, x) of a volume.
 
+    A picture is read with its bottom row first, so that y points up. A volume stays as its file
+    orders it. Values are bright as large numbers, in the type of the file.
+
     Args:
         path: Picture (PNG, TIFF …) or ``.npy``; of a volume a TIFF stack, a folder of pictures in
             the order of the numbers in their names, ``.npy``, ``.mhd`` or ``.nhdr``/``.nrrd``.
-        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit.
+        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit; their
+            number says which of both is read.
 
     Raises:
-        RefusedError: The file is none of these, of another dimension, too large for memory, or says
-            that its pixels or voxels have sides of other ratios.
+        RefusedError: The file is missing, damaged, none of these, of another dimension, complex,
+            with less than 2 numbers along an axis or some that are not finite, too large for
+            memory, or says that its pixels or voxels have sides of other ratios.
+        MemoryError: The file did not fit into memory while it was read.
     """
     dimension = len(sides)
+    take_voxel = "a volume takes cell.voxel in place of cell.pixel"
     if dimension == 2:
         allowed_file = "an image or an array"
         allowed_shape = "one plane of 2 × 2 numbers or more"
-        cures = {3: TAKE_VOXEL}  # by the dimension of an array of another one
-        require(not path.is_dir(), path.name, "a folder", "a picture", TAKE_VOXEL)
+        cures = {3: take_voxel}  # by the dimension of an array of another one
+        require(not path.is_dir(), path.name, "a folder", "a picture", take_voxel)
     else:
         allowed_file = "a volume"
         allowed_shape = "numbers along three axes (z, y, x), 2 × 2 × 2 or more"
-        cures = {2: TAKE_PIXEL}
+        cures = {2: "a picture takes cell.pixel in place of cell.voxel"}
     try:
         if path.suffix.lower() == ".npy":
-            # mapped: one too large for memory must come as far as the question of how large it is
+            # The file is mapped, not read: one too large for memory must come as far as the
+            # question of how large it is.
             values = np.asarray(read_npy(path, kinds="buifc"))
         elif dimension == 2:
             values = _read_picture(path, has_square_pixels=sides[0] == sides[1])
@@ -69,7 +75,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     is_grid = values.ndim == dimension and not is_thin and values.dtype.kind in "buif"
     what = f"{values.dtype} of shape {values.shape}"
     require(is_grid, path.name, what, allowed_shape, cures.get(values.ndim, ""))
-    # before the numbers of a mapped array are touched
+    # This comes before the numbers of a mapped array are touched.
     require_memory(values.shape)
     n_not_finite = int((~np.isfinite(values)).sum())
     what = f"with {n_not_finite} values that are not finite"
@@ -87,7 +93,17 @@ def files_of(path: Path) -> list[Path]:
 
 
 def _read_volume(path: Path, sides: Sequence[float]) -> Array:
-    """Return the numbers of a volume along the axes (z, y, x)."""
+    """Return the numbers of a volume along the axes (z, y, x), in the type of its file.
+
+    Args:
+        path: TIFF stack, folder of pictures, or head of MetaImage or NRRD.
+        sides: Sides of a voxel along (z, y, x), in any unit.
+
+    Raises:
+        RefusedError: The file has another ending (the message says how to convert some), is too
+            large for memory, or states voxels whose sides have other ratios.
+        Exception: What readers raise of damaged files, of many kinds.
+    """
     if path.is_dir():
         return _read_slices(path, has_square_pixels=sides[-1] == sides[-2])
     ending = path.suffix.lower()
@@ -104,8 +120,9 @@ def _read_volume(path: Path, sides: Sequence[float]) -> Array:
         ".hdf5": from_hdf5,
         ".vti": 'm = pyvista.read("v.vti"); '
         'np.save("v.npy", m.active_scalars.reshape(m.dimensions[::-1]))',
-        **dict.fromkeys((*SLICES, ".jpg", ".jpeg"), TAKE_PIXEL),
     }
+    for picture_suffix in (*SLICES, ".jpg", ".jpeg"):
+        cures[picture_suffix] = "a picture takes cell.pixel in place of cell.voxel"
     cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
     for suffix in path.suffixes:  # "v.nii.gz" has two
         cure = cures.get(suffix.lower(), cure)
@@ -116,16 +133,29 @@ def _read_volume(path: Path, sides: Sequence[float]) -> Array:
 def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
     """Return the pictures of a folder as a volume, in the order of the numbers in their names.
 
+    Args:
+        folder: Folder whose .tif, .tiff, .png and .bmp files are the slices along z; others in it
+            are ignored.
+        has_square_pixels: Whether voxels are as long along y as along x; a picture may then not
+            state other pixels.
+
+    Returns:
+        Numbers in the type of the pictures, shape (slices, rows, columns), the top row first.
+
     Raises:
-        RefusedError: There are fewer than two, a number is missing, or they are not alike.
+        RefusedError: There are fewer than two slices, their numbers are missing, repeated or not in
+            a row, they differ in size or type, one has colours or several pages, or memory is too
+            small.
+        OSError: A file is no picture, or damaged.
     """
     files = files_of(folder)
     count = len(files)
     allowed = "a folder of slices, PNG, TIFF or BMP"
     require(count > 1, folder.name, f"{count} pictures", allowed)
     by_number = dict(zip(_numbers_in_names(files), files, strict=True))
+    # A repeated number leaves fewer entries than files, so that some number of the row is missing.
     lowest = min(by_number)
-    # a slice that is missing, or twice there, would move all above it
+    # A slice that is missing, or twice there, would move all above it.
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
@@ -145,7 +175,11 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
 def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     """Return the number of each slice: of the numbers in its name the last one that changes.
 
-    Where the names differ in words too, it is the last number.
+    Where the names differ in words too, or no number changes, it is the last number.
+
+    Args:
+        files: Files of the slices, one at least. Names that have the same words have equally many
+            numbers.
 
     Raises:
         RefusedError: A name has no number.
@@ -157,6 +191,7 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
     words = {re.sub(r"\d+", "#", file.stem) for file in files}
     place = -1
     if len(words) == 1:
+        # Numbers of all names at the same place, to see which place changes from slice to slice.
         columns = list(zip(*numbers, strict=True))
         changing = [k for k, column in enumerate(columns) if len(set(map(int, column))) > 1]
         place = max(changing, default=-1)
@@ -164,15 +199,16 @@ def _numbers_in_names(files: Sequence[Path]) -> list[int]:
 
 
 def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
-    """Return the grey values of an image file, shape (rows, columns), top row first.
+    """Return the grey values of an image file, bright large, shape (rows, columns), top row first.
 
     Args:
-        path: The file.
-        has_square_pixels: Whether the case says that pixels are square.
+        path: File that Pillow reads.
+        has_square_pixels: Whether the case says that pixels are square, to within 1 %.
 
     Raises:
         RefusedError: The file has several pages, or colours that are not grey, or states other
-            pixels than the case, or has values that Pillow changes.
+            pixels than the case, or has values that Pillow changes; or memory is too small.
+        OSError: The file is no picture, or damaged.
     """
     with opened_picture(path) as picture:
         # Colours may be grey values, if red, green and blue are equal.
@@ -198,7 +234,17 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
 
 
 def _require_right_sign(name: str, picture: Image, values: Array) -> None:
-    """Refuse integers that Pillow takes for signed ones where they are not, or the reverse."""
+    """Refuse a picture whose integers Pillow takes for signed where they are not, or reversely.
+
+    Args:
+        name: Name of the file, for the message.
+        picture: The open picture.
+        values: Its values as Pillow gives them.
+
+    Raises:
+        RefusedError: The values are wrong: unsigned integers of 32 bits above 2³¹ − 1, which become
+            negative, or signed ones of 8 bits, whose negative ones become large.
+    """
     sample_format = 339  # TIFF's tag, 2 for signed integers
     is_signed = tags_of(picture).get(sample_format) == (2,)
     is_wrapped = not is_signed and picture.mode == "I" and values.min() < 0  # of unsigned 32 bits
@@ -211,8 +257,11 @@ def _grey_of_colours(name: str, values: Array) -> Array:
     """Return the grey values of an opaque picture whose red, green and blue are equal.
 
     Args:
-        name: Name of the file.
-        values: Red, green, blue and opacity, shape (rows, columns, 4), 255 where opaque.
+        name: Name of the file, for messages.
+        values: Red, green, blue and opacity from 0 to 255, shape (rows, columns, 4); 255 is opaque.
+
+    Returns:
+        New array of shape (rows, columns), of the type of `values`.
 
     Raises:
         RefusedError: It has colours, or is transparent somewhere.

@@ -65,12 +65,18 @@ class ImageModel:
     device: str = "cpu"
 
     def __post_init__(self) -> None:
+        """Check the settings; RefusedError for one that is not allowed.
+
+        Sides are two of a pixel or three of a voxel, each between .001 and 1000 times that along x,
+        the division is a whole number from 1, and the average is "axes" or "isotropic".
+        """
         require_average(self.average)
         allowed = "two of a pixel or three of a voxel"
         require(len(self.sides) in (2, 3), "sides", self.sides, allowed)
         is_whole = isinstance(self.division, int) and self.division >= 1
         require(is_whole, "division", self.division, "a whole number from 1")
-        max_ratio = 1e3  # beyond it rounding spoils the fields
+        # Beyond this ratio rounding spoils the fields, and the bounds become wide.
+        max_ratio = 1e3
         for side in self.sides:
             require(
                 1 / max_ratio <= side <= max_ratio,
@@ -103,7 +109,12 @@ class ImageModel:
         is_stopped = Event()
 
         def raise_if_stopped() -> None:
-            """End this thread where the other one has ended; called before each iteration."""
+            """Stop this solution where the other one has ended; called before each iteration.
+
+            Two threads run, one for each side of the bounds, and share the event `is_stopped`. What
+            `self.solver.watch` raises, such as Ctrl-C, sets the event and is raised again; so the
+            other thread ends at its next iteration, by an InterruptedError.
+            """
             if is_stopped.is_set():
                 raise InterruptedError("the other side's solution was stopped")
             try:
@@ -150,19 +161,25 @@ class ImageModel:
         start: SideSolution | None,
         watch: Callable[[], None] | None = None,
     ) -> SideSolution | None:
-        """Return stresses or displacements of least energy for given moduli.
+        """Return stresses or displacements of nearly least energy under unit loads.
 
         Args:
             moduli: Bulk modulus (of the plane K + G/3) and shear modulus of each pixel or voxel in
-                Pa, shape (2, *grid).
+                Pa, finite, shape (2, y, x) or (2, z, y, x). Pores, with a modulus of 0, are allowed
+                for stresses alone.
             stress: Whether to solve for stresses, whose energy bounds the compliance from above;
                 else for displacements, whose energy bounds the stiffness from above.
-            start: Solution whose fields are the first guess.
-            watch: Function in place of that of the solver.
+            start: Solution of the same kind, whose fields are the first guess; None for zero.
+            watch: Function called before each iteration in place of that of the solver.
 
         Returns:
-            The solution; None where pores percolate, so that no stress is found that vanishes in
-            them.
+            `fields` under unit mean strains or stresses in Voigt's order, and `energy`, whose
+            `upper` is the bound; None where pores percolate, so that no stress is found that
+            vanishes in them.
+
+        Raises:
+            FailedError: The solver does not converge.
+            RefusedError: The device "cuda" is missing.
         """
         to_device = device_array(self.device)
         first_guess = None
@@ -186,9 +203,23 @@ class ImageModel:
         """Return nested bounds of stiffness, E, ν and engineering constants at each α-level.
 
         Args:
-            images: Lower and upper moduli at each level, for rising α.
-            crisp: A pair of images and its solution by the same model, the first guess.
-            progress: Function that is called with the fraction of the levels that is done.
+            images: Lower and upper moduli of each pixel or voxel at each level, for rising α, one
+                at least. Those of each level contain those of higher ones.
+            crisp: A pair of images and their solution by a model of the same division, whose fields
+                are the first guess.
+            progress: Function that is called with the fraction of the levels that is done, after
+                each.
+
+        Returns:
+            One ImageCut a level, in the order of `images`: `bounds` of the stiffness, `modulus` E
+            in Pa and `poisson` ν of the average, each with a lower and an upper end, and
+            `constants` along the axes, shape (constants, 2). All but `bounds` contain those of
+            higher levels.
+
+        Raises:
+            FailedError: A solution does not converge, or a bound is singular to rounding.
+            RefusedError: The images have another dimension than the model, or the device is
+                missing.
         """
         # Cuts are solved from the narrowest to the widest: the fields of each are so near to those
         # of the next that one iteration may do (one or two in place of fifteen at a step of 5 % in
@@ -216,21 +247,24 @@ class ImageModel:
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
         """Refuse cuts that contradict the bounds of an image inside them.
 
-        Two images with moduli in the middle of the narrowest and of the widest cut are solved anew,
-        without a first guess and with ten times the energy error: a coarser solution is cheaper and
-        sees less.
+        This tests the proof itself. Two images with the geometric means of the lower and upper
+        moduli of the narrowest and of the widest cut are solved anew, without a first guess and
+        with ten times the energy error: a coarser solution is cheaper and sees less.
 
         Args:
             images: Lower and upper moduli at each level, for rising α.
-            cuts: Their cuts, in the same order.
+            cuts: Bounds of E and ν at these levels, in the same order.
 
         Raises:
-            FailedError: E or ν of such an image lies outside a cut.
+            FailedError: The bounds of E or ν of such an image have no number in common with a cut
+                that should contain it; or the solver does not converge.
         """
         solver = replace(self.solver, accuracy=min(10 * self.solver.accuracy, 0.1))
         coarse_model = replace(self, solver=solver)
         narrowest = images[-1].geometric_mean
         widest = images[0].geometric_mean
+        # The middle of the widest cut lies in no other cut for sure, so that it tests that one
+        # alone.
         tests = [(narrowest, cuts)]  # it lies in every cut
         if not narrowest.equals(widest):
             tests.append((widest, cuts[:1]))
@@ -259,10 +293,15 @@ def _require_overlap(name: str, inside: Enclosure, cut: Enclosure) -> None:
 
 
 def usual_division(images: ModuliImages) -> int:
-    """Return the number of elements along each side of a pixel or voxel, 1 or 2.
+    """Return the number of finite elements along each side of a pixel or voxel, 1 or 2.
 
-    It is 2 for images of up to 2¹⁹ pixels and contrasts of up to 10. Of a voxel it is 1, since two
-    elements take eight times as long and narrow the bounds by half.
+    It is 2 for images of up to 2¹⁹ pixels whose largest bulk and shear moduli are each at most 10
+    times the smallest. Of a voxel it is 1, since two elements take eight times as long and narrow
+    the bounds by half.
+
+    Args:
+        images: Lower and upper moduli, shape (2, y, x) or (2, z, y, x). With pores or rigid phases
+            the contrast is infinite, and the division 1.
     """
     pairs = zip(images.lower, images.upper, strict=True)  # of bulk, and of shear moduli
     is_mild = all(upper.max() <= 10.0 * lower.min() for lower, upper in pairs)
@@ -286,19 +325,24 @@ class ImageSolution:
 
 
 def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
-    """Return proved bounds of a periodic image of pixels or voxels.
+    """Return proved bounds of the stiffness of a periodic image of pixels or voxels.
 
     Args:
         bulk: Bulk modulus in Pa, 0 in pores, infinite where rigid, shape (y, x) with that of plane
             strain, K + G/3, or (z, y, x).
-        shear: Shear modulus in Pa, of the same shape.
-        settings: Those of `ImageModel`.
+        shear: Shear modulus in Pa, of the same shape, 0 and infinite likewise.
+        settings: Arguments of `ImageModel`: sides (of a pixel or voxel along the axes, over that
+            along x; equal ones by default), division (elements along each side, 1 by default),
+            solver, average ("isotropic" or "axes") and device ("cpu" or "cuda").
 
     Returns:
-        Solution whose `bounds` have the methods `young`, `poisson`, `shear` and `constants`.
+        Solution whose `bounds` have the methods `young`, `poisson`, `shear` and `constants`, and
+        whose `upper` and `lower` hold the displacements and stresses that prove them.
 
     Raises:
-        RefusedError: The arrays are not alike, or hold negative numbers or none but 0 and infinity.
+        RefusedError: The arrays are not alike, or hold negative numbers or NaN, or none but 0 and
+            infinity; or a setting is not allowed.
+        FailedError: The solver does not converge.
     """
     shape = np.shape(bulk)
     is_grid = shape == np.shape(shear) and len(shape) in (2, 3)

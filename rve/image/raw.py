@@ -52,10 +52,13 @@ class RawHead:
         return tuple(self.stored_shape[axis] for axis in self.order)
 
     def read(self) -> Array:
-        """Return the numbers along z, y, x.
+        """Return the numbers of the volume along z, y, x, in the byte order of this machine.
+
+        Axes that run backwards are turned. The file is read as a whole.
 
         Raises:
             RefusedError: The file has another size than the head says, or cannot be unpacked.
+            OSError: The file cannot be read.
         """
         expected = math.prod(self.stored_shape) * self.dtype.itemsize
         found = self.data.stat().st_size
@@ -69,6 +72,7 @@ class RawHead:
             values = np.frombuffer(content, self.dtype)
         else:
             offset = self.offset
+            # A skip of −1 means that the numbers are the last bytes, whatever stands before them.
             if offset < 0:
                 offset = found - expected
             if offset > 0:
@@ -80,7 +84,16 @@ class RawHead:
         return np.asarray(np.flip(values, self.reversed_axes).transpose(self.order))
 
     def _decompressed(self, expected: int) -> bytes:
-        """Return at most one byte more than expected, whatever the file would unpack to."""
+        """Return the unpacked numbers of the file: one byte more than expected at most.
+
+        Args:
+            expected: Bytes that the head promises. A result of another length tells that it is
+                wrong.
+
+        Raises:
+            RefusedError: The data is not compressed by gzip or zlib, or is damaged.
+            OSError: The file cannot be read.
+        """
         with self.data.open("rb") as file:
             file.seek(max(self.offset, 0))
             packed = file.read()
@@ -142,9 +155,9 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     layout = _layout(name, entries)
     lengths = layout.lengths[np.argsort(layout.axes)]  # along x, y, z
     require_spacing(name, [float(length) for length in lengths], sides)
-    keys = "binarydatabyteordermsb", "elementbyteordermsb", "endian"
+    endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
     byte_order: Literal[">", "<"] = "<"
-    if entries.value(*keys).lower() in ("big", *yes):
+    if endian.lower() in ("big", *yes):
         byte_order = ">"
     offset = entries.size
     if data != path:
@@ -182,9 +195,19 @@ class _Entries:
     def of_file(cls, path: Path) -> _Entries:
         """Read the lines "key = value" of MetaImage, or "key: value" of NRRD, up to the last one.
 
+        The head ends with an empty line, or with the line of ElementDataFile; raw data may follow.
+
+        Args:
+            path: File that begins with the head.
+
+        Returns:
+            Values by keys in small letters, of equal keys the last one; lines without a separator
+            have an empty value. And the bytes of the head, with the line that ends it.
+
         Raises:
             RefusedError: The file does not end its head within 64 KiB; usual heads are shorter than
                 1 KiB.
+            OSError: The file cannot be read.
         """
         longest_head = 1 << 16
         values: dict[str, str] = {}
@@ -207,12 +230,17 @@ class _Entries:
 
 
 def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:
-    """Return the bytes before the numbers in a file beside the head; −1 if they are its last bytes.
+    """Return the bytes to skip before the numbers in a file beside the head.
 
     Args:
         name: Name of the head, for messages.
-        entries: Its entries.
+        entries: Its entries; those of HeaderSize (MetaImage), byte skip and line skip (NRRD) are
+            used.
         is_packed: Whether the numbers are compressed.
+
+    Returns:
+        0 where the head says nothing; −1 if the numbers are the last bytes of the file, which only
+        those that are not compressed can be.
 
     Raises:
         RefusedError: The head states lines to skip, or no whole number of bytes.
@@ -243,16 +271,28 @@ class _Layout(NamedTuple):
 
 
 def _layout(name: str, entries: _Entries) -> _Layout:
-    """Return how the axes of the file lie.
+    """Return how the axes of a volume's file lie, from the directions and spacings of its head.
+
+    Args:
+        name: Name of the head, for messages.
+        entries: Its entries.
+
+    Returns:
+        For each axis of the file, the fastest first: which of x, y and z it runs along, as 0, 1 or
+        2; −1 if it runs backwards, else 1; and the distance of voxels along it, NaN where the head
+        does not state it. Each has the shape (3,). Without directions the axes are x, y and z, none
+        backwards.
 
     Raises:
-        RefusedError: The axes do not run along x, y and z, each once.
+        RefusedError: There are not three spacings or nine numbers of directions, one is no finite
+            number, or the axes do not run along x, y and z, each once.
     """
     spacing = _numbers(name, entries.value("elementspacing", "spacings", "elementsize"))
     require(len(spacing) in (0, 3), name, f"{len(spacing)} spacings", "three")
     lengths = np.array(spacing or [math.nan] * 3)
-    keys = "space directions", "transformmatrix", "rotation", "orientation"
-    directions = _numbers(name, re.sub("[()]", " ", entries.value(*keys)))
+    # NRRD writes vectors in brackets, which may be as long as a voxel; MetaImage has three names.
+    text = entries.value("space directions", "transformmatrix", "rotation", "orientation")
+    directions = _numbers(name, re.sub("[()]", " ", text))
     if not directions:
         return _Layout(np.arange(3), np.ones(3), lengths)
 
@@ -275,7 +315,15 @@ def _layout(name: str, entries: _Entries) -> _Layout:
 
 
 def _numbers(name: str, text: str) -> list[float]:
-    """Return the finite numbers or nans of a text, between blanks or commas."""
+    """Return the numbers of a text, finite or NaN, between blanks or commas; none of an empty text.
+
+    Args:
+        name: Name of the head, for messages.
+        text: The text.
+
+    Raises:
+        RefusedError: A word is no number, or is infinite.
+    """
     try:
         numbers = [float(word) for word in re.split(r"[\s,]+", text.strip()) if word]
     except ValueError:

@@ -10,16 +10,20 @@ from alphacut.base.errors import require
 
 
 def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) -> None:
-    """Refuse voxels whose sides have other ratios than those of the case.
+    """Refuse voxels of a file whose sides have other ratios than those of the case.
+
+    Only ratios are compared, of the sides that the file states; one alone has none.
 
     Args:
-        name: Name of the file.
-        stated: Distances of voxels along x, y, z that the file states, in any unit; nan where it
+        name: Name of the file, for messages.
+        stated: Distances of voxels along x, y, z that the file states, in any unit; NaN where it
             states none.
-        sides: Sides of a voxel of the case along (z, y, x), in any unit.
+        sides: Sides of a voxel of the case along z, y, x, in any unit, positive.
 
     Raises:
-        RefusedError: A stated distance is not above 0, or the ratios differ by more than 1 %.
+        RefusedError: A stated distance is not above 0 and finite, or the ratios differ by more than
+            1 %.
+        ValueError: The numbers of distances and sides differ.
     """
     # The case's sides are those of the array's axes (z, y, x), a file states x, y, z.
     expected = list(reversed(sides))
@@ -36,9 +40,15 @@ def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) 
 
 
 def ome_spacing(head: str) -> tuple[float, float, float]:
-    """Return the distances of voxels along x, y, z in a head of OME-XML; nan where it has none.
+    """Return the distances of voxels along x, y, z in a head of OME-XML.
 
-    They are in µm if all their units are known, else without a unit.
+    Args:
+        head: Text of the head, of which the attributes PhysicalSizeX, …Unit and so on are used.
+
+    Returns:
+        Distances in µm if all units that are stated are known; a side without a unit counts as µm.
+        If one unit is not known, the three plain numbers. NaN for a distance that is missing or no
+        number.
     """
     micrometres = {
         "pm": 1e-6, "nm": 1e-3, "µm": 1.0, "um": 1.0, "μm": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6,

@@ -29,9 +29,14 @@ def read_stack(path: Path, sides: Sequence[float]) -> Array:
         path: The file.
         sides: Sides of a voxel along (z, y, x), in any unit.
 
+    Returns:
+        Array of three axes, in the type of the file.
+
     Raises:
-        RefusedError: The file has other axes, promises more than it can hold or memory takes, or
-            states voxels of other ratios.
+        RefusedError: tifffile is not installed; or the file has colours or other axes, promises
+            more than it can hold or memory takes, states voxels of other ratios, or is compressed
+            in a way that is not read.
+        Exception: What tifffile raises of a damaged file, of many kinds.
     """
     try:
         import tifffile
@@ -43,7 +48,25 @@ def read_stack(path: Path, sides: Sequence[float]) -> Array:
 
 
 def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
-    """Return the pages of an open file; see `read_stack`."""
+    """Return the pages of an open TIFF file as a volume along (z, y, x), bright as large numbers.
+
+    The sizes that the heads promise are held against the memory and the length of the file before
+    anything is read.
+
+    Args:
+        path: The file.
+        file: The same file, opened by tifffile.
+        sides: Sides of a voxel along (z, y, x), in any unit.
+
+    Returns:
+        Array of three axes, in the type of the file. Axes of length 1 are left out.
+
+    Raises:
+        RefusedError: The file has no single axis of two pages or more beside rows and columns, or
+            colours, promises more than it can hold or memory takes, states voxels of other ratios,
+            or has pages of unlike brightness.
+        Exception: What tifffile raises of a damaged file, of many kinds.
+    """
     # tifffile calls pages that belong together a series. Pages that are alike but are not said to
     # belong together are a series each.
     name = path.name
@@ -97,17 +120,32 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
 
 
 def _max_bytes_per_byte(compression: int) -> float:
-    """Return how many bytes a byte of a file can stand for, by TIFF's number of its compression.
+    """Return how many bytes of numbers a byte of a file can stand for at most.
 
-    The known ones are none, LZW, deflate by its two numbers, and PackBits. Others are limited by
-    the memory alone.
+    Args:
+        compression: TIFF's number of the compression. Known are 1 (none), 5 (LZW), 8 and 32946
+            (deflate) and 32773 (PackBits, which repeats a byte up to 128 times by two bytes). Of
+            others the ratio is infinite: the memory alone limits them.
     """
     ratios = {1: 1, 5: LZW_RATIO, 8: DEFLATE_RATIO, 32946: DEFLATE_RATIO, 32773: 64}
     return ratios.get(compression, math.inf)
 
 
 def _pages_by_pillow(path: Path, dtype: np.dtype[Any]) -> Array:
-    """Return the stored values of all pages, shape (pages, rows, columns), read by Pillow."""
+    """Return the stored values of all pages of a TIFF file, read by Pillow.
+
+    Args:
+        path: The file, whose pages are alike.
+        dtype: Type of the numbers by the heads.
+
+    Returns:
+        Array of type `dtype` and shape (pages, rows, columns), not inverted where white is zero.
+
+    Raises:
+        RefusedError: The type is not unsigned of 8 or 16 bits.
+        OSError: Pillow cannot read the file.
+        ValueError: The pages are not alike.
+    """
     cure = "save it without compression"
     is_read = dtype in (np.uint8, np.uint16)
     require(is_read, path.name, f"{dtype} compressed by LZW", "8 or 16 bits, unsigned", cure)
@@ -120,7 +158,13 @@ def _pages_by_pillow(path: Path, dtype: np.dtype[Any]) -> Array:
 
 
 def _spacing(file: TiffFile) -> tuple[float, float, float]:
-    """Return the distances of voxels along x, y, z by heads of OME, ImageJ and TIFF, or nan."""
+    """Return the distances of voxels along x, y, z that the heads of OME, ImageJ or TIFF state.
+
+    They are in any common unit; NaN where no head states one. TIFF itself has none along z.
+
+    Args:
+        file: The open file.
+    """
     if file.is_ome and file.ome_metadata:
         return ome_spacing(file.ome_metadata)
     x = _pixel_side(file, "XResolution")

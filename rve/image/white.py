@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 PHOTOMETRIC = 262
 """Number of TIFF's tag PhotometricInterpretation."""
-WHITE_IS_ZERO = 0
-"""Its value where a stored zero is white."""
+WHITE_IS_ZERO = 0  # the tag's value where a stored zero is white
 
 
 def tags_of(picture: Image) -> Mapping[int, object]:
@@ -28,7 +27,10 @@ def tags_of(picture: Image) -> Mapping[int, object]:
 def stored_values(picture: Image) -> Array:
     """Return the values of a picture as its file stores them, shape (rows, columns).
 
-    Pillow inverts pictures of 8 bits, and no others, whose stored zeros are white.
+    Pillow inverts pictures of 8 bits, and no others, whose stored zeros are white; that is undone.
+
+    Args:
+        picture: Picture of a single channel that Pillow has opened.
     """
     values = np.asarray(picture)
     if picture.mode == "L" and tags_of(picture).get(PHOTOMETRIC) == WHITE_IS_ZERO:
@@ -40,13 +42,14 @@ def as_shown(name: str, values: Array, photometric: object) -> Array:
     """Return the stored values of a picture or a stack such that bright is large.
 
     Args:
-        name: Name of the file.
-        values: Values as stored, of any shape.
-        photometric: The file's PhotometricInterpretation.
+        name: Name of the file, for messages.
+        values: Values as stored, of any shape; returned as they are unless white is zero.
+        photometric: The file's PhotometricInterpretation: 0 says that a stored zero is white; other
+            values, and None, that it is black.
 
     Raises:
         RefusedError: White is zero in a mask of two values, whose phases programs exchange, or
-            beside numbers whose largest is not known.
+            beside numbers that are not unsigned integers, whose largest is not known.
     """
     if photometric != WHITE_IS_ZERO:
         return values
