@@ -80,19 +80,24 @@ class GreyImage:
 
 
 def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyImage:
-    """Read an image, or a volume.
+    """Read an image, or a volume, with the sides of its pixels or voxels.
 
     Args:
         path: Picture (PNG, TIFF), or an array in .npy; of a volume a TIFF stack, a folder of
             slices, .npy, .mhd or .nhdr.
-        spacing: Side of a pixel or voxel in m; or its sides, along (x, y) of a picture or along
-            (x, y, z) of a volume. A TIFF file is a volume where there are three.
+        spacing: Side of a pixel or voxel in m; or its sides, along (x, y) of a picture or along (x,
+            y, z) of a volume. A TIFF file is a volume where there are three.
+
+    Returns:
+        `values`, grey values or labels of shape (y, x) with y pointing up, or (z, y, x); and
+        `lengths`, the sides in m in the order of these axes.
 
     Raises:
-        RefusedError: The file is none of these, too large for memory, or states other sides.
+        RefusedError: The file is missing, none of these, damaged, too large for memory, or states
+            sides of other ratios; or `spacing` is not positive or of another number.
     """
     file = Path(path)
-    # Three sides tell a volume in a TIFF file, which may as well be a picture.
+    # A TIFF file may be a picture or a stack of slices: three sides say that it is a volume.
     lengths = (float(spacing),) if isinstance(spacing, float | int) else tuple(spacing)
     dimension = len(lengths) if len(lengths) > 1 else _dimension_of(file)
     require(len(lengths) in (1, dimension), "spacing", spacing, f"one length, or {dimension}")
@@ -127,7 +132,16 @@ class ImagePhase:
 
     @classmethod
     def of(cls, values: Mapping[str, FuzzyNumber | float]) -> ImagePhase:
-        """Return the phase of a mapping with modulus, poisson and, if asked for, loss."""
+        """Return the phase of a mapping with modulus, poisson and, if asked for, loss.
+
+        Args:
+            values: "modulus", Young's modulus in Pa, 0 of a pore and 1e18 or more of a rigid phase;
+                "poisson", Poisson's ratio; and "loss", the loss factor tan δ. Each is a number or a
+                fuzzy number.
+
+        Raises:
+            RefusedError: The mapping has another key, or lacks modulus or poisson.
+        """
         numbers = {}
         for name, value in values.items():
             require_choice("key of a phase", name, ("modulus", "poisson", "loss"))
@@ -172,7 +186,11 @@ class ImageStudy:
 
     @property
     def extent(self) -> str:
-        """Number of pixels or voxels along each axis, and memory of their solution, in words."""
+        """Size of the image and memory of its solution, in words.
+
+        They read as "512 × 512 pixels (y, x), about 0.5 GB of memory". The memory is an estimate
+        for all α-levels. A volume has "voxels (z, y, x)".
+        """
         nominal = self.images(None, None)
         shape = nominal.shape
         sizes = " × ".join(map(str, shape))
@@ -181,7 +199,19 @@ class ImageStudy:
         return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
 
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
-        """Return the lower and upper moduli of each pixel, at levels of threshold and phases."""
+        """Return the lower and upper moduli of each pixel or voxel at given α-levels.
+
+        Args:
+            threshold: α-level of the thresholds; None for their nominal values.
+            phases: α-level of the moduli of the phases; None for their nominal values.
+
+        Returns:
+            Bulk and shear moduli in Pa, `lower` and `upper` of shape (2, y, x) or (2, z, y, x); in
+            the plane the bulk modulus is that of plane strain, K + G/3.
+
+        Raises:
+            RefusedError: A phase has moduli that are not allowed.
+        """
         moduli = []
         for phase in self.phases:
             modulus = _cut_or_nominal(phase.modulus, phases)
@@ -191,14 +221,21 @@ class ImageStudy:
         return moduli_images(first, last, moduli)
 
     def model(self, *, average: str = ISOTROPIC, device: str = "cpu") -> ImageModel:
-        """Return the model of the usual division and accuracy.
+        """Return the model that solves the image with the usual number of elements and accuracy.
+
+        Args:
+            average: "isotropic" or "axes": the average over directions that E and ν of the plane
+                are of.
+            device: "cpu", or "cuda" by CuPy; whether it is there is found out when the model
+                solves.
 
         Raises:
-            RefusedError: The image does not fit into memory, or the average is none.
+            RefusedError: The image does not fit into memory, or the average has another name.
         """
         nominal = self.images(None, None)
         division = usual_division(nominal)
         require_memory(nominal.shape, division)
+        # Bounds are then within 3e-5 of those that fully solved fields would give.
         solver = ConjugateGradient(accuracy=1e-5)
         return ImageModel(self.image.sides, division, solver, average, device)
 
@@ -228,17 +265,26 @@ def image_study(
     thresholds: Sequence[FuzzyNumber | float] = (),
     labels: Sequence[float] = (),
 ) -> ImageStudy:
-    """Return the study of an image whose phases labels or thresholds of its greys tell apart.
+    """Return an image whose phases labels, or thresholds of its grey values, tell apart.
+
+    Where the thresholds are plain numbers, noise and uneven light of a picture leave the phase of
+    some pixels open, as its segmentation estimates; that is part of the result. Fuzzy thresholds
+    are taken to say all that is not known.
 
     Args:
-        image: The image.
+        image: Grey values or labels, shape (y, x) or (z, y, x).
         phases: Its phases, dark first; a mapping has modulus (Pa), poisson and, if wanted, loss.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
 
+    Returns:
+        Study with the phases, their names, and the function `phase_ranges` from an α-level, or None
+        for nominal values, to the lowest and highest phase of each pixel.
+
     Raises:
-        RefusedError: A phase lacks a modulus, a threshold or a label does not fit the image, or its
-            sides are too unlike.
+        RefusedError: A phase lacks a modulus or has another key, none has a modulus between 0 and
+            rigid, thresholds and labels are both or neither given, one does not fit the image,
+            noise leaves too much of a picture open at the thresholds, or its sides are too unlike.
     """
     ImageModel(image.sides)  # refuses sides too unlike
     count = len(labels) or len(thresholds) + 1
@@ -246,6 +292,11 @@ def image_study(
     require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
     require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
     listed = tuple(x if isinstance(x, ImagePhase) else ImagePhase.of(x) for x in phases)
+    # Pores and rigid phases alone have no energy that could be bounded.
+    is_solid = any(0 < phase.modulus.support.lower < RIGID for phase in listed)
+    what = "0 or infinite at a level in every phase"
+    allowed = f"a phase whose lower ends are above 0 and below {RIGID:g} Pa"
+    require(is_solid, "modulus of the phases", what, allowed)
     if labels:
         return _labelled_study(image, listed, labels)
 
@@ -259,8 +310,13 @@ def image_study(
         segmentation.require_certain()
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
-        """Return the lowest and the highest phase of each pixel at a level."""
-        # noise and light leave phases open, unless a fuzzy threshold says all that is not known
+        """Return the lowest and the highest phase of each pixel at an α-level.
+
+        At the level None (nominal values) and with fuzzy thresholds the pixels are compared with
+        the thresholds' cuts; else a picture's noise and light leave phases open. Two integer arrays
+        of the image's shape.
+        """
+        # A fuzzy threshold says all that is not known, noise and light included.
         if segmentation is not None and level is not None and not is_fuzzy:
             return segmentation.ranges()
         return threshold_ranges(grey, [_cut_or_nominal(number, level) for number in numbers])
@@ -275,7 +331,19 @@ def image_study(
 def _labelled_study(
     image: GreyImage, phases: tuple[ImagePhase, ...], labels: Sequence[float]
 ) -> ImageStudy:
-    """Return the study of a labelled image; RefusedError where labels and values are not alike."""
+    """Return the study of an image whose values are labels of its phases.
+
+    Args:
+        image: Labels, shape (y, x) or (z, y, x).
+        phases: Its phases, in the order of `labels`.
+        labels: Label of each phase; of equal ones the last phase counts.
+
+    Returns:
+        Study in which the phase of each pixel is known at all α-levels.
+
+    Raises:
+        RefusedError: A value of the image is no label, or a label does not occur.
+    """
     grey = image.values
     # Labels are compared as they are, whatever the order of the numbers.
     phase = np.full(grey.shape, -1)
@@ -349,7 +417,12 @@ class FuzzyImageStiffness:
         return dict(zip(CONSTANT_NAMES[len(self.lengths)], values, strict=True))
 
     def __str__(self) -> str:
-        """Return the guarantee, a line for each constant, and the fractions."""
+        """Return a text of some lines without a newline at the end.
+
+        The first line has the guarantee and the wall time; then follow the bounds of E and of each
+        constant along the axes on the first and the last α-level, in SI and rounded outwards, and
+        the fractions of the phases.
+        """
         kind = "image" if len(self.lengths) == 2 else "volume"
         lines = [f"bounds {GUARANTEE} of the {kind}, repeated periodically; {self.seconds:.2g} s"]
         for name, bounds in {"E": self.young, **self.constants}.items():
@@ -362,7 +435,14 @@ class FuzzyImageStiffness:
     __repr__ = __str__
 
     def to_csv(self, path: str) -> None:
-        """Write a row for each constant and level: bounds in SI."""
+        """Write a CSV file with a row for each constant and each α-level, E first.
+
+        The columns are constant, alpha, lower, upper (bounds in Pa, of Poisson's ratios without a
+        unit) and guarantee.
+
+        Args:
+            path: Name of the file, which is replaced; an OSError if it cannot be written.
+        """
         rows = []
         for name, bounds in {"E": self.young, **self.constants}.items():
             for row, alpha in enumerate(self.alpha):
@@ -373,10 +453,16 @@ class FuzzyImageStiffness:
         Path(path).write_text(text, encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return a dataset of the bounds on each level, in SI, and of the phase of each pixel.
+        """Return a dataset of the bounds on each α-level, in SI, and of each pixel's phase.
 
-        `phase` is the one at the nominal threshold, `is_open` says whether the threshold leaves it
-        open on the lowest level.
+        Returns:
+            Dataset with the variables "E", one for each constant along the axes, "loss_E" and so on
+            where phases have loss factors, all of shape (alpha, bound), where bound is "lower" or
+            "upper"; "stiffness", shape (alpha, bound, row, column) in Voigt's order; and, on the
+            axes (y, x) or (z, y, x), "phase", the number of the phase at the nominal threshold, and
+            "is_open", 1 where the threshold leaves it open on the lowest level. Attributes are
+            "nature" (the guarantee), "lengths" (sides of a pixel in m along its axes) and "phases"
+            (their names).
         """
         import xarray
 
@@ -392,11 +478,11 @@ class FuzzyImageStiffness:
             "is_open": (grid, self.is_open.astype(np.uint8)),
         }
         voigt = ["11", "22", "33", "23", "13", "12"] if len(grid) == 3 else ["11", "22", "12"]
-        axes = {"alpha": self.alpha, "bound": [*SIDES], "row": voigt, "column": voigt}
+        axes = {"alpha": self.alpha, "bound": list(SIDES), "row": voigt, "column": voigt}
         attributes = {
             "nature": str(GUARANTEE),
             "lengths": self.lengths,
-            "phases": [*self.fractions],
+            "phases": list(self.fractions),
         }
         return xarray.Dataset(variables, axes, attributes)
 
@@ -421,19 +507,30 @@ def fuzzy_image_stiffness(
 ) -> FuzzyImageStiffness:
     """Return proved bounds of the stiffness of an image or volume on α-levels.
 
+    The image is one cell of a periodic medium, in plane strain where it is a picture.
+
     Args:
-        image: The periodic cell; see `read_image`.
-        phases: For each phase, dark first, its modulus (Pa), poisson and, if asked for, loss.
+        image: The cell; see `read_image`.
+        phases: For each phase, dark first (by rising grey value), its modulus E (Pa), poisson ν
+            and, if asked for, loss tan δ, each a number or a fuzzy number; modulus 0 is a pore,
+            1e18 and more is rigid.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
-        alpha: Rising levels.
-        average: Average of a plane stiffness that E and ν are of, "isotropic" or "axes".
+        alpha: Rising levels from 0 to 1, one at least.
+        average: Average over directions that E and ν of the plane are of: "isotropic" for Hill's
+            mean, or "axes". Of a volume it is Hill's.
         device: "cpu", or "cuda" by CuPy.
-        progress: Called with the completed fraction; a bar on a terminal if not given.
+        progress: Function called with the completed fraction; False for none; a bar on a terminal
+            by default.
+
+    Returns:
+        Bounds at each level of E, ν and the constants along the axes, what widens them, and the
+        loss factors where phases have some.
 
     Raises:
         RefusedError: A value is not allowed, or the image does not fit into memory.
-        FailedError: The bounds do not tell that E is positive, or contradict each other.
+        FailedError: The bounds do not tell that E is positive, or contradict each other; or the
+            solver does not converge.
     """
     study = image_study(image, phases, thresholds=thresholds, labels=labels)
     with progress_reporter(progress) as tick:
@@ -445,22 +542,38 @@ def fuzzy_image_stiffness(
 def solve_study(
     study: ImageStudy, *, alpha: Sequence[float], average: str, device: str, tick: Progress
 ) -> FuzzyImageStiffness:
-    """Return the bounds of a study on α-levels, and what widens them.
+    """Return proved bounds of the stiffness of an image on α-levels, and what widens them.
 
-    The arguments and exceptions are those of `fuzzy_image_stiffness`; `tick` is called with the
-    completed fraction.
+    Args:
+        study: The image with its phases and thresholds.
+        alpha: Rising levels from 0 to 1, one at least.
+        average: "isotropic" or "axes": the average over directions that E and ν of the plane are
+            of.
+        device: "cpu", or "cuda" by CuPy.
+        tick: Function that is called with the completed fraction, up to 1 before the last steps.
+
+    Returns:
+        Bounds at each level, widths of E by cause at the lowest level where both bounds exist, loss
+        factors at nominal moduli where phases have some, classical bounds, and the phase of each
+        pixel.
+
+    Raises:
+        RefusedError: A value is not allowed, only some phases have loss factors, or the image does
+            not fit into memory.
+        FailedError: The bounds do not tell that E is positive, or contradict each other; or the
+            solver does not converge.
     """
     start = perf_counter()
     model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     solution = model.solve(nominal)
-    # progress by solutions, which take about the same time
+    # Progress is counted by solutions, which take about the same time.
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
     images = [study.images(level, level) for level in alpha]
     progress_of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
     cuts = model.cuts(images, (nominal, solution), progress_of_cuts)
-    # a test of the proof itself, by solutions that share nothing with those of the cuts
+    # A test of the proof itself, by solutions that share nothing with those of the cuts.
     model.require_consistent(images, cuts)
     _require_positive(cuts[0])
     tick((len(alpha) + 3) / n_solutions)
@@ -469,7 +582,7 @@ def solve_study(
     references = None
     if np.isfinite(cuts[0].bounds.width):
         widths = _widths_by_cause(study, model, solution, lowest=alpha[0])
-        # classical bounds are of phases with finite moduli
+        # Classical bounds are of phases with positive and finite moduli.
         if all(phase.is_solid for phase in study.phases):
             references = _reference_bounds(study)
     first, last = study.phase_ranges(alpha[0])
@@ -492,15 +605,27 @@ def solve_study(
 def _widths_by_cause(
     study: ImageStudy, model: ImageModel, solution: ImageSolution, *, lowest: float
 ) -> dict[str, float]:
-    """Return the width of E in Pa by its cause, the largest first.
+    """Return the width of the bounds of E by its cause, in Pa, the largest first.
 
     The width at nominal values comes from the discretisation. What a fuzzy threshold or fuzzy
-    phases add alone, at the level `lowest`, comes from these. `solution` is that of the nominal
-    values.
+    phases add alone, at the lowest level, comes from these.
+
+    Args:
+        study: The image with its phases and thresholds.
+        model: Model by which it is solved.
+        solution: Solution at nominal values, the first guess.
+        lowest: The lowest α-level.
+
+    Returns:
+        Widths by "discretisation" and, where thresholds or phases are fuzzy, "threshold" and
+        "phases". They need not add up to that of the cut.
+
+    Raises:
+        FailedError: The solver does not converge.
     """
 
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
-        """Return the width at levels of the threshold and of the phases."""
+        """Return the width of E in Pa at α-levels of threshold and phases; None is nominal."""
         nominal = study.images(None, None)
         (cut,) = model.cuts([study.images(threshold, phases)], (nominal, solution))
         return float(cut.modulus.upper - cut.modulus.lower)
@@ -519,9 +644,21 @@ def _widths_by_cause(
 def _proved_losses(
     study: ImageStudy, model: ImageModel, solution: ImageSolution, alpha: Sequence[float]
 ) -> dict[str, Array]:
-    """Return bounds of loss factors at nominal moduli, shape (levels, 2), by constant.
+    """Return bounds of the loss factors of an image at nominal moduli, to first order.
 
-    They are empty where no phase has a loss factor. `solution` is that of the nominal values.
+    Args:
+        study: The image; its phases have loss factors, fuzzy or not, or none.
+        model: Model of `solution`.
+        solution: Solution at the nominal values, with both bounds of the stiffness.
+        alpha: α-levels of the loss factors of the phases.
+
+    Returns:
+        Lower and upper bound at each level, shape (levels, 2), of "E" and "G" of the average, "K",
+        "E_x", "E_y" and, of a volume, "E_z". Empty where no phase has a loss factor.
+
+    Raises:
+        RefusedError: Some phases have a loss factor, and others have none.
+        FailedError: The solver does not converge.
     """
     phases = study.phases
     losses = [phase.loss for phase in phases if phase.loss is not None]
@@ -531,10 +668,11 @@ def _proved_losses(
     fractions = energy_fractions(
         model, solution, study.images(None, None), study.nominal_phase, len(phases)
     )
+    # each cut holds the lowest and the highest loss factor of each phase
+    loss_cuts = phase_loss_cuts(losses, alpha)
     proved = {}
     for name, of_constant in fractions.items():
-        ends = [mean_loss(of_constant, *cut) for cut in phase_loss_cuts(losses, alpha)]
-        proved[name] = np.array(ends)
+        proved[name] = np.array([mean_loss(of_constant, low, high) for low, high in loss_cuts])
     return {"E": loss_of_young(solution.bounds, proved, model.average), **proved}
 
 
@@ -546,7 +684,18 @@ def _reference_bounds(study: ImageStudy) -> ReferenceBounds:
 
 
 def _require_positive(widest: ImageCut) -> None:
-    """Refuse bounds that do not tell that E is positive, where there are two."""
+    """Refuse bounds of E that do not tell that it is positive, where both bounds exist.
+
+    Without a lower or an upper bound (percolating pores, rigid phases) there are no better ones,
+    and nothing is refused.
+
+    Args:
+        widest: Bounds at the lowest α-level: `modulus`, E of the average in Pa, and `constants`
+            along the axes, of which the first ones are E_x, E_y and, of a volume, E_z.
+
+    Raises:
+        FailedError: The lower bound of E is not above 0; the message has the bounds along the axes.
+    """
     if widest.modulus.lower > 0 or not np.isfinite(widest.bounds.width):
         return  # beside pores and rigid phases there are no better ones
     low, high = (end / 1e9 for end in widest.modulus)

@@ -41,12 +41,17 @@ class ImageFields:
     stress: Array | None
 
     def write(self, path: Path | str) -> None:
-        """Write phases, strains and stresses as values of cells into a file NAME.vti.
+        """Write phases, strains and stresses as values of cells into a file NAME.vti, for ParaView.
 
-        Arrays are named as strain_22_under_12: the component 22 under the mean strain 12.
+        Arrays are named as strain_22_under_12: the component 22 under the unit mean strain 12. A
+        strain or stress that is None is left out.
+
+        Args:
+            path: Name of the file, which is replaced.
 
         Raises:
-            RefusedError: The name has another ending.
+            RefusedError: The name does not end in .vti.
+            OSError: The file cannot be written.
         """
         named: dict[str, Array | Ints] = {"phase": self.phase}
         axes = {2: ("11", "22", "12"), 3: ("11", "22", "33", "23", "13", "12")}[self.phase.ndim]
@@ -69,13 +74,22 @@ def image_fields(
     """Return the strains and stresses in each pixel or voxel of an image at nominal values.
 
     Args:
-        image: The periodic cell; see `read_image`.
-        phases: Of each phase, dark first, its modulus (Pa) and poisson.
+        image: One cell of a periodic medium; see `read_image`.
+        phases: Of each phase, dark first, its modulus E (Pa) and poisson ν. The nominal values of
+            fuzzy numbers are used.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
 
+    Returns:
+        Means over each pixel or voxel of the strain under each unit mean strain, and of the stress
+        under each unit mean stress, shape (loads, components, *grid) in Voigt's order; the strain
+        is None beside rigid phases, the stress where pores percolate. And the phases, shape (y, x)
+        or (z, y, x).
+
     Raises:
-        RefusedError: A value is not allowed, or the image does not fit into memory.
+        RefusedError: A value is not allowed, noise leaves too much of a picture open at the
+            thresholds, or the image does not fit into memory.
+        FailedError: The solver does not converge.
     """
     study = image_study(image, phases, thresholds=thresholds, labels=labels)
     model = study.model()
@@ -89,12 +103,15 @@ def image_fields(
 
 
 def _pixel_means(element: Element, side: SideSolution | None, division: int) -> Array | None:
-    """Return the means of a field over each pixel, shape (loads, components, *grid).
+    """Return the means of a field over each pixel or voxel, shape (loads, components, *grid).
+
+    Loads and components are in Voigt's order; the grid is (y, x) or (z, y, x).
 
     Args:
-        element: Unknowns and modes of a cell of the grid on which the field is solved.
-        side: The fluctuations under each load; None for no field.
-        division: Cells of that grid along each side of a pixel.
+        element: Element of displacements, for strains, or of stresses.
+        side: The periodic fluctuations under each unit load, on a grid with `division` cells along
+            each side of a pixel; None for no field, which gives None.
+        division: Number of these cells.
     """
     if side is None:
         return None
@@ -124,18 +141,24 @@ def write_vti(
     """Write values of pixels or voxels as VTK's image, which ParaView and PyVista read.
 
     Args:
-        path: Name of the file, which ends in .vti.
-        named: Arrays of one shape, (y, x) or (z, y, x), by the names that they get.
-        lengths: Sides of a pixel or voxel in m, along the axes of the arrays.
+        path: Name of the file, which ends in .vti; it is replaced.
+        named: Arrays of one shape, (y, x) or (z, y, x), one at least, by the names that they get.
+            They are written as doubles.
+        lengths: Sides of a pixel or voxel in m, along the axes of the arrays. A picture becomes a
+            layer that is as thick as a pixel is long along x.
 
     Raises:
         RefusedError: The name has another ending.
+        OSError: The file cannot be written.
     """
     require(Path(path).suffix == ".vti", "file", str(path), "a name that ends in .vti")
     shape = next(iter(named.values())).shape
-    # VTK orders axes as x, y, z, with x the fastest; a picture is one voxel thick.
-    sizes = [*shape[::-1], 1][:3]
-    sides = [*map(float, lengths[::-1]), float(lengths[-1])][:3]
+    # VTK orders axes as x, y, z, with x the fastest, as NumPy's last axis is.
+    sizes = list(shape[::-1])
+    sides = [float(length) for length in lengths[::-1]]
+    if len(sizes) == 2:  # a picture is one voxel thick
+        sizes.append(1)
+        sides.append(sides[0])
     spacing = " ".join(map(repr, sides))
     extent = " ".join(f"0 {size}" for size in sizes)
     rows = [

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import Triangular
 from alphacut.rve.image.fields.element import element_of, stress_derivatives
 from alphacut.rve.image.fields.energy import modes_of
 from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
+from alphacut.rve.image.study import GreyImage, fuzzy_image_stiffness
 
 E, NU = 1.0, 0.25
 K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)
@@ -193,3 +196,10 @@ def test_cuts_of_pores_of_a_fuzzy_extent_are_nested_and_consistent():
     wide, narrow = (cut.modulus for cut in cuts)
     assert 0 < wide[0] < narrow[0] < narrow[1] < wide[1]
     model.require_consistent(images, cuts)
+
+
+def test_an_image_that_may_be_void_throughout_is_refused():
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
+    phase = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
+    with pytest.raises(RefusedError, match="modulus of the phases is 0"):
+        fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
