@@ -77,16 +77,21 @@ class Box:
         truncation_tolerance: Array | None = None,
         outputs: Ints | slice = slice(None),
     ) -> LevelModels:
-        """Return models over the box of the response.
+        """Return models of the response over the box, with tables of its modes' responses.
 
         Args:
-            nodes: Numbers of the time nodes; all unless given.
-            truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). As
-                many modes as possible are enclosed unless it is given.
-            outputs: Numbers of the outputs; all unless given.
+            nodes: Indices of the time nodes that the models are for, rising, or a slice of them;
+                all unless given.
+            truncation_tolerance: Allowed error of each selected output by modes that are not
+                enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
+                unless it is given.
+            outputs: Indices of the outputs that are selected, shape (m,), or a slice; all unless
+                given.
 
         Raises:
-            UnprovedError: No mode of the structure can be enclosed.
+            UnprovedError: No mode of the structure can be enclosed, or the box is too wide for it
+                to oscillate and stay stable. The attribute `along` is the index, among all n
+                inputs, of the input whose bisection is most likely to help, or None.
         """
         try:
             whole = self.structure
@@ -104,14 +109,23 @@ class Box:
             raise
 
     def exact_values(self, unit: Array, node: Ints, output: Ints) -> RoundedValues:
-        """Return exact values of one output at one node for each of S points.
+        """Return one output at one time node for each of S points, exact but for rounding.
 
-        The modes of a point are found once for all its nodes and outputs, about.
+        The modes of equal points are found once for all their nodes and outputs; points are taken
+        in chunks that limit the memory.
 
         Args:
-            unit: Unit coordinates, shape (S, d).
-            node: Number of the node for each point, shape (S,).
-            output: Number of the output for each point, shape (S,).
+            unit: Points, shape (S, d), S ≥ 1: coordinates in [−1, 1] of the d inputs of nonzero
+                width.
+            node: Index of the time node of each point, shape (S,).
+            output: Index of the output of each point, shape (S,).
+
+        Returns:
+            `value`, shape (S,), in the units of the outputs, and `error`, shape (S,), a bound of
+            its rounding.
+
+        Raises:
+            UnprovedError: A mode does not oscillate at one of the points.
         """
         value = np.empty(len(unit))
         error = np.empty(len(unit))
@@ -137,9 +151,18 @@ class Box:
         return self._modes(np.zeros((1, len(self.active))))
 
     def midpoint_response(self, outputs: Ints | slice = slice(None)) -> RoundedValues:
-        """Return the exact outputs at the midpoint of the box, shape (T, m).
+        """Return outputs at the midpoint of the box at all time nodes, exact but for rounding.
 
-        Outputs are those of some numbers (m,), all unless given.
+        Args:
+            outputs: Indices of the outputs, shape (m,), or a slice; all unless given. At least one
+                must be left.
+
+        Returns:
+            `value`, shape (T, m) for T time nodes, in the units of the outputs, and `error` of the
+            same shape, a bound of its rounding.
+
+        Raises:
+            UnprovedError: A mode does not oscillate at the midpoint.
         """
         sigma = self.midpoint_modes.sigma[0]
         point = np.zeros(len(self.time), int)
@@ -155,13 +178,16 @@ class Box:
     def peak_over_time(
         self, unit: Array, between_nodes: Array, outputs: Ints | slice = slice(None)
     ) -> Array:
-        """Return an upper bound of max |output| over time at one point, also between nodes, (m,).
+        """Return upper bounds of max |output| over time at one point, also between nodes, (m,).
 
         Args:
-            unit: Unit coordinates of the point, shape (d,).
+            unit: The point, shape (d,): coordinates in [−1, 1] of the d inputs of nonzero width.
             between_nodes: Bounds of the distance of these outputs from a straight line in the step
-                before each node, shape (T, m).
-            outputs: Numbers of the outputs, shape (m,); all unless given.
+                that ends at each of the T time nodes, shape (T, m).
+            outputs: Indices of the outputs, shape (m,), or a slice; all unless given.
+
+        Raises:
+            UnprovedError: A mode does not oscillate at the point.
         """
         point = self.inputs(unit)
         at_point = replace(self, low=point, high=point)
@@ -188,10 +214,22 @@ class Box:
         return np.asarray((np.abs(found.value) + found.error).T)
 
     def midpoint_interpolation_error(self, outputs: Ints | slice = slice(None)) -> Array:
-        """Bound the distance of the outputs at the midpoint from a straight line in each step.
+        """Bound how far midpoint outputs lie from a straight line within each time step.
+
+        A response is at most the sum over modes of |output coefficient| |participation factor|
+        times that of an oscillator of unit participation, so the distances of the oscillators are
+        added with these weights.
+
+        Args:
+            outputs: Indices of the outputs, shape (m,), or a slice; all unless given.
 
         Returns:
-            Shape (T, m); row j belongs to the step that ends at node j.
+            Shape (T, m) for T time nodes; row j belongs to the step that ends at node j, and row 0
+            is 0.
+
+        Raises:
+            UnprovedError: A mode does not oscillate, or turns too far within one sample interval of
+                a load.
         """
         modes = self.midpoint_modes
         numbers = self._output_numbers(outputs)
@@ -222,14 +260,23 @@ def over_box(
 ) -> ClassicalStructure:
     """Return a structure as Taylor models in those inputs whose lower end is below the upper one.
 
+    A Taylor model is a polynomial over the unit box [−1, 1]^d with a bound of what it leaves out.
+    Here d is the number of inputs of nonzero width; their order is that of `names`. Inputs without
+    a width, and all other parameters of the structure, enter as constants.
+
     Args:
         system: The structure.
-        names: Its inputs, n of them; other parameters have the values of the structure.
-        low: Lower ends, shape (n,), in SI units.
-        high: Upper ends, shape (n,).
+        names: Names of its inputs, n of them.
+        low: Lower ends of the inputs, shape (n,), in SI units.
+        high: Upper ends, shape (n,); none may be below its lower end.
+
+    Returns:
+        Mass, stiffness, damping, initial state and output rows as Taylor models of d inputs.
 
     Raises:
-        UnprovedError: Its modes are not known to be classical.
+        UnprovedError: Dashpots couple the modes, an output row depends on inputs or mixes
+            displacements and velocities, or a matrix that is inverted may be singular in the box.
+        ValueError: `names` and the ends differ in length.
     """
     midpoint = (low + high) / 2
     radius = (high - low) / 2
@@ -245,7 +292,12 @@ def over_box(
 
 
 def sources(system: LinearSystem, structure: ClassicalStructure) -> tuple[str, ...]:
-    """Return the names of what moves a structure: its loads, then "velocity" and "start"."""
+    """Return the names of what sets a structure in motion, in the order of all arrays over sources.
+
+    They are "load" if the ground moves, then "force1", "force2", … of the distinct load histories,
+    then "velocity" if some initial velocity may differ from zero in the box of the inputs, then
+    "start" if some initial displacement may. A structure without any of them gives ().
+    """
     displacements, velocities = structure.initial_state.magnitude()
     names = list(histories(system))
     if velocities.any():

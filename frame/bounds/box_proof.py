@@ -112,10 +112,12 @@ class BoxProof(Protocol):
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Context manager that turns errors of matrices into a proof's refusal.
+    """Return a context manager that turns NumPy's errors of singular matrices into `UnprovedError`.
+
+    Other exceptions of the block pass unchanged.
 
     Raises:
-        UnprovedError: A matrix is singular.
+        UnprovedError: The block has raised numpy.linalg.LinAlgError; the message quotes it.
     """
     try:
         yield
@@ -158,18 +160,35 @@ class Hull:
         return np.asarray(np.maximum(largest, 0.0))
 
     def close(self, level: int, peaks: Mask, upper: Array) -> None:
-        """Raise the bounds of some peaks to those over one more sub-box, at all time nodes.
+        """Raise bounds of some peaks, in place, to those over one more sub-box, at all nodes.
+
+        A peak is the largest value over time of one side, −q or q, of one output q. The bounds over
+        the whole box, `self.upper`, are the largest over all sub-boxes that have been closed so
+        far.
 
         Args:
-            level: Row of the level.
-            peaks: Which outputs and sides the bounds are raised of, shape (m, 2).
-            upper: Guaranteed upper bounds over the sub-box, shape (T, m, 2).
+            level: Row of the α-cut, 0 for the widest.
+            peaks: Which peaks are closed, shape (m, 2): outputs, then sides −q, q. Others are
+                untouched.
+            upper: Guaranteed upper bounds of the sides over the sub-box, shape (T, m, 2) for T time
+                nodes.
         """
         hull = self.upper[level]
         hull[:, peaks] = np.maximum(hull[:, peaks], upper[:, peaks])
 
     def add_attained(self, level: int, bounds: BoxBounds) -> None:
-        """Add the attained values of a sub-box, its errors and its facts; not its upper bounds."""
+        """Add, in place, what trajectories of a sub-box attain, their errors, and work counts.
+
+        Upper bounds are not added; `close` does this when the sub-box needs no further bisection.
+
+        Args:
+            level: Row of the α-cut, 0 for the widest.
+            bounds: Results over the sub-box. For T time nodes, m outputs q and the sides −q, q:
+                `attained` of shape (T, m, 2) replaces smaller values together with the inputs
+                `attained_at`; `between_nodes` and `attained_error`, shape (T, m), raise the largest
+                ones so far; the upper ends of `least_peaks`, shape (m,), lower the smallest known
+                max |q| over time; and `facts` are merged by name.
+        """
         is_better = bounds.attained > self.attained[level]
         self.attained[level][is_better] = bounds.attained[is_better]
         self.attained_at[level][is_better] = bounds.attained_at[is_better]
@@ -185,12 +204,26 @@ class Hull:
             self.facts[name] = earlier + value if is_count else max(earlier, value)
 
     def envelope(self, method: str, notes: Iterable[str]) -> Envelope:
-        """Return the guaranteed envelope.
+        """Return the guaranteed envelope over the whole box, once all sub-boxes are closed.
 
-        `attained` and `attained_at` are raised in place to those of higher levels.
+        Attained values, and the inputs that attain them, are raised in place to those of narrower
+        α-cuts.
+
+        Args:
+            method: Name of the proof.
+            notes: Sentences for the reader of the envelope.
+
+        Returns:
+            Lower and upper bounds of each output q at all levels and time nodes; their `error` is
+            the distance of a bound from the attained value, the larger one of both sides. The facts
+            "gap" and "gap_of_peaks" are the largest errors in comparison with the scale of
+            tolerances and with the peaks.
 
         Raises:
-            FailedError: An attained value exceeds a guaranteed bound, so the proof is wrong.
+            FailedError: An attained value exceeds a guaranteed bound or is NaN, so the proof is
+                wrong.
+            RefusedError: A trajectory that is chosen as one of a small peak does not exist, or is
+                not finite.
         """
         # The α-cuts are nested. A bound over a wider cut holds over a narrower one, and a
         # trajectory of a narrower cut is one of the wider cut.
@@ -233,7 +266,17 @@ class Hull:
         )
 
     def _require_consistent(self, upper: Array) -> None:
-        """Raise FailedError where an attained value is not below its bound in `upper`, or NaN."""
+        """Raise FailedError where an attained value exceeds its guaranteed bound, or either is NaN.
+
+        Args:
+            upper: Guaranteed upper bounds, shape (A, T, m, 2): levels, time nodes, outputs q, and
+                the sides −q, q. Attained values `self.attained` have the same axes; both are in the
+                units of the outputs.
+
+        Raises:
+            FailedError: The message names the output of the first contradiction and the largest
+                excess.
+        """
         is_wrong = ~(self.attained <= upper)  # true also where one of both is NaN
         if not is_wrong.any():
             return
@@ -247,11 +290,18 @@ class Hull:
 
         The largest |q| over time of any trajectory of a level is such a bound. Where the proof has
         named no trajectory, one is chosen here from those that attain the largest values of −q and
-        of q, whose inputs `attained_at` must be known. `upper` are the bounds of (−q, q), shape
-        (A, T, m, 2).
+        of q, whose inputs `self.attained_at`, shape (A, T, m, 2, n), must be known.
+
+        Args:
+            upper: Guaranteed upper bounds, shape (A, T, m, 2): levels, time nodes, outputs q, and
+                the sides −q, q.
 
         Returns:
-            The array `min_peak_upper`, whose infinite entries have been replaced in place.
+            The array `self.min_peak_upper`, whose infinite entries have been replaced in place.
+
+        Raises:
+            RefusedError: The chosen trajectory does not exist, or is not finite.
+            StepError: A time step of it did not converge.
         """
         bounds = self.min_peak_upper
         for level, output in np.argwhere(~np.isfinite(bounds)):

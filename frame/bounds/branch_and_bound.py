@@ -59,17 +59,22 @@ def bound_problems(
 ) -> tuple[Array, int]:
     """Return upper bounds of side × output for all N problems, by spatial branch and bound.
 
-    Better points that are met replace those of `optima`, in place.
+    A problem is one side (−1 or 1) of one of m outputs at one of T time nodes; problem number (node
+    · m + output) · 2 + (0 for the side −1, 1 for 1). Points are in unit coordinates, in which each
+    of the d inputs runs over [−1, 1]. Outputs are those of the modal model: a bound of its error is
+    not added here.
 
     Args:
-        model: The modal model.
-        lower: Lower ends of the box in unit coordinates, shape (d,).
-        upper: Upper ends.
-        optima: The problems with their best points.
-        gap: Wanted distance of guaranteed bound and attained value, in units of the outputs.
-        budget: Most sub-boxes per problem on average; where it ends first, gaps are wider.
-        workers: Threads; the result does not depend on their number.
-        progress: Called with the completed fraction.
+        model: The modal model, polynomials of eigenvalues and coefficients of the modes.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends, shape (d,).
+        optima: Best point and value of each problem. Better points that are met replace them, in
+            place.
+        gap: Wanted distance of guaranteed bound and attained value, in units of the outputs, > 0.
+        budget: Most sub-boxes per problem on average. Where it ends the search, problems that are
+            still open have valid bounds with wider gaps.
+        workers: Number of threads; the result does not depend on it.
+        progress: Called with the fraction of problems that are closed, from 0 to 1.
 
     Returns:
         Guaranteed upper bounds, shape (N,), and the number of examined items, each a sub-box with a
@@ -116,13 +121,17 @@ def _take_better_points(
 ) -> None:
     """Replace optima, in place, where the midpoint of a sub-box has a higher value.
 
-    The best midpoint of each such problem is taken over, and refined by Newton's method.
+    The best midpoint of each such problem is taken over, and then refined by Newton's method.
+    Nothing changes where no midpoint is better by more than 1e-10 units.
 
     Args:
-        model: The modal model.
-        optima: The problems with their best points.
-        frontier: Sub-boxes that were examined.
-        value: Side × output at the midpoint of each item of the frontier.
+        model: The modal model, of which problem p is one side, −1 or 1, of one output at one time
+            node.
+        optima: Best points of the N problems, shape (N, d), in unit coordinates, and their values
+            (N,).
+        frontier: Sub-boxes that were examined, with I items, each a pair of a sub-box and a
+            problem.
+        value: Side × output at the midpoint of the sub-box of each item, shape (I,).
         min_gain: Predicted gain at which Newton's method ends, in units of the outputs.
     """
     # Differences up to 1e-10 units may be rounding.
@@ -148,14 +157,24 @@ class Piece(NamedTuple):
 def examine_items(
     model: ModalModel, remainder: RemainderBounds, target: Array, frontier: Frontier, piece: Piece
 ) -> Examination:
-    """Examine the items of some sub-boxes by `kernel.examine`.
+    """Examine sub-boxes by the compiled kernel: which problems are closed, how others go on.
+
+    A problem p is one side of an output at a time node, p = (node · m + output) · 2 + (0 for the
+    side −1, 1 for 1); an item is a sub-box with one of its open problems.
 
     Args:
-        model: The modal model.
-        remainder: What quadratic Taylor models leave out over the whole box.
-        target: Values below which problems are fathomed, shape (N,).
-        frontier: Open items.
-        piece: Which of its sub-boxes, with their items.
+        model: The modal model of n modes and m outputs in d inputs.
+        remainder: Bounds of the third derivatives of the outputs over the whole box, and of
+            rounding.
+        target: Values of side × output below which problems are closed, shape (N,).
+        frontier: All open items, ordered by sub-box and then by problem.
+        piece: Which sub-boxes of the frontier, and which items, are examined; the items must be all
+            items of these sub-boxes.
+
+    Returns:
+        For each item, in order: `code` (0: closed; 1 + i: bisect along input i; from 16 on: confine
+        to faces), `value` of side × output at the midpoint, and its guaranteed upper `bound` over
+        the sub-box.
     """
     geometry = frontier.geometry(piece.boxes)
     n = model.count
@@ -222,7 +241,20 @@ class Frontier:
         return len(self.box)
 
     def geometry(self, boxes: slice = slice(None)) -> Geometry:
-        """Return the geometry of some sub-boxes; all unless given."""
+        """Return midpoints and radii of some sub-boxes, and which of their faces are outer ones.
+
+        Along each axis a sub-box has a `position`: a dyadic interval 2^depth + index, index 0 …
+        2^depth − 1 from the lower end on, of the whole box; or `LOWER` = −1 or `UPPER` = −2 where
+        it is confined to that end and has no width.
+
+        Args:
+            boxes: Slice of the sub-boxes; all unless given.
+
+        Returns:
+            `midpoint` and `radius`, shape (B, d) each, in the coordinates of the whole box;
+            `is_outer`, shape (B, 2, d), says whether the lower and the upper face lie on those of
+            the whole box. Along an axis without width both are True.
+        """
         position = self.position[boxes]
         interval = np.maximum(position, 1)  # ends of the whole box are treated as all of it first
         width = 2.0 ** -np.floor(np.log2(interval + 0.5))  # fraction of the whole box: 2^−depth
@@ -236,9 +268,16 @@ class Frontier:
         )
 
     def pieces(self, max_items: int) -> Iterator[Piece]:
-        """Yield pieces of equally many sub-boxes, in order, with `max_items` items each on average.
+        """Yield pieces of about equally many sub-boxes, with `max_items` items on average.
 
-        A sub-box is not divided, however many items it has.
+        An item is a sub-box with one of its open problems. A sub-box is not divided, however many
+        items it has. An empty frontier yields nothing.
+
+        Args:
+            max_items: Items of a piece on average, at least 1.
+
+        Yields:
+            Slices of the consecutive sub-boxes, and of the items that belong to them.
         """
         n_boxes = len(self.position)
         count = min(-(-len(self) // max_items), n_boxes)
@@ -249,12 +288,20 @@ class Frontier:
             yield Piece(boxes, slice(int(first_items[k]), int(first_items[k + 1])))
 
     def children(self, code: Ints) -> Frontier:
-        """Return the halves and faces of sub-boxes with the items that are left open.
+        """Return the halves and faces of sub-boxes with the problems that are left open there.
 
-        A sub-box is halved along the axis that most of its items ask for.
+        An item is a sub-box with one of its open problems. A sub-box is halved along the axis that
+        most of its items ask for, the lowest one in a tie; all items that are to be halved go into
+        both halves. Items that are confined to faces go into the sub-box of these faces alone.
+        Nothing is changed in place.
 
         Args:
-            code: Code of each item by `kernel.examine`, shape (I,).
+            code: What `kernel.examine` says of each of I items, shape (I,): 0 closes it, 1 + i asks
+                for a bisection along axis i, and `FACES` + Σ_i 3^i (0: free, 1: lower end, 2: upper
+                end of axis i) confines it.
+
+        Returns:
+            The new items, ordered by sub-box and then by problem; no items if all codes are 0.
         """
         d = self.position.shape[1]
         is_to_halve = (code > 0) & (code < FACES)
@@ -280,7 +327,18 @@ class Frontier:
         return Frontier(self.lower, self.upper, distinct_positions, new_box, new_problem)
 
     def _child_positions(self, keys: Ints, children_of_box: int) -> Ints:
-        """Return the positions (K, d) of children by their keys, parent × children + number."""
+        """Return the positions of the children of sub-boxes, shape (K, d).
+
+        A position along an axis is 2^depth + index of a dyadic interval of the whole box, or
+        `LOWER` = −1 or `UPPER` = −2 for a sub-box that is confined to that end.
+
+        Args:
+            keys: Keys of K children, shape (K,): index of the parent × children_of_box + number.
+                The numbers 2 i and 2 i + 1 are the lower and the upper half along axis i; 2 d + Σ_i
+                3^i e_i is the child with the end e_i of each axis: 0 as the parent, 1 lower end, 2
+                upper end.
+            children_of_box: Number of possible children of a sub-box, 2 d + 3^d.
+        """
         d = self.position.shape[1]
         positions: Ints = self.position[keys // children_of_box].copy()
         number = keys % children_of_box
@@ -304,10 +362,22 @@ class Optima:
 
 
 def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float) -> Optima:
-    """Return local optima of all problems over a box.
+    """Return local optima of all problems over a box, to begin branch and bound with.
 
-    Each begins at the best of the midpoint and of Chebyshev points, and is refined by Newton's
-    method until that predicts a gain below `min_gain`, in units of the outputs.
+    A problem is to maximise one side, −1 or 1, of one output at one time node; problems run over
+    nodes, then outputs, then sides. Each begins at the best of the midpoint and of some Chebyshev
+    points (quasi-random, denser towards the ends), and is refined by Newton's method unless the box
+    is a point.
+
+    Args:
+        model: The modal model of m outputs at T time nodes.
+        lower: Lower ends of the box in unit coordinates, shape (d,).
+        upper: Upper ends, shape (d,).
+        min_gain: Predicted gain at which Newton's method ends, in units of the outputs.
+
+    Returns:
+        Points, shape (2 T m, d), and values of side × output there, shape (2 T m,). They are
+        attained by the model and thus lower bounds of the maxima, not guaranteed to be global.
     """
     samples = chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))
     unit = np.vstack([np.zeros((1, len(lower))), samples])
@@ -325,9 +395,18 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
 def refine(
     model: ModalModel, optima: Optima, problems: Ints, lower: Array, upper: Array, min_gain: float
 ) -> None:
-    """Improve the optima of some problems by Newton's method in a box, in place.
+    """Improve the best points of some problems by Newton's method within a box, in place.
 
-    A problem ends when its quadratic model predicts a gain of at most `min_gain`.
+    A problem ends when its quadratic model predicts a gain of at most `min_gain`, or after a fixed
+    number of steps. Values never decrease. Problems are taken in chunks that limit the memory.
+
+    Args:
+        model: The modal model, whose outputs are maximised with the sign of the problem's side.
+        optima: Points, shape (N, d), in unit coordinates, and values, shape (N,), of all problems.
+        problems: Numbers of the problems to improve, each once; none is allowed.
+        lower: Lower ends of the box, shape (d,), in unit coordinates.
+        upper: Upper ends, shape (d,).
+        min_gain: In units of the outputs.
     """
     size = max(int(numbers.NEWTON_PIECE) * 6 // max(lower.size, 6), 1)
     for piece in np.array_split(problems, -(-len(problems) // size) or 1):
@@ -351,6 +430,16 @@ def _newton(
     about the point (Conn, Gould, Toint 2000). A better point is taken over, whatever the step
     predicted. The radius of the cube grows where the gain is close to the predicted one, and
     shrinks where it is much smaller.
+
+    Args:
+        model: The modal model.
+        optima: Points, shape (N, d), in unit coordinates, and values, shape (N,), of all problems;
+            rows of `problems` are overwritten.
+        problems: Numbers of P problems, each once. A problem is dropped when no gain above
+            `min_gain` is predicted.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends, shape (d,).
+        min_gain: In units of the outputs.
     """
     box_width = 2.0  # of the unit box [−1, 1]^d
     radius: Array = np.full(len(problems), numbers.NEWTON_RADIUS)
@@ -398,7 +487,17 @@ def _newton(
 
 
 def _jets(model: ModalModel, points: Array, problems: Ints) -> _Jets:
-    """Return side × output of problems (P,) at their points (P, d), with derivatives."""
+    """Return side × output of P problems, each at a point of its own, with derivatives.
+
+    Args:
+        model: The modal model of m outputs in d inputs.
+        points: Unit coordinates of the points, shape (P, d).
+        problems: Numbers of the problems, shape (P,): (node · m + output) · 2 + (0 for the side −1,
+            1 for 1).
+
+    Returns:
+        `value` (P,), `gradient` (P, d) and `hessian` (P, d, d), by the unit coordinates.
+    """
     node, column = np.divmod(problems, 2 * len(model.flow.outputs))
     found = model.at(points, node, column // 2)
     side = 2.0 * (column % 2) - 1

@@ -99,8 +99,14 @@ loops = kernel(fastmath={"reassoc", "contract"})
 def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
     """Return an upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over the box [−1, 1]^d.
 
-    The coefficients q_ij are packed by rows. `u` is overwritten with a point at which the function
-    is near the bound.
+    The bound is the maximum itself where every input is fixed by its slope or enters alone; else
+    products of two free inputs are counted by their magnitudes.
+
+    Args:
+        linear: Coefficients of u, shape (d,); not changed.
+        quadratic: Coefficients q_ij packed by rows, q_11, q_12, …, q_22, …, shape (d (d + 1)/2,);
+            not changed.
+        u: Overwritten with a point of the box, shape (d,), at which the function is near the bound.
     """
     d = len(u)
     full = np.empty((d, d))  # q_ij, symmetric
@@ -155,7 +161,12 @@ def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
 
 @loops
 def products(u: Array, out: Array) -> None:
-    """Write the products u_i u_j with i ≤ j to `out`, packed by rows."""
+    """Write the products u_i u_j with i ≤ j, packed by rows, to `out`.
+
+    Args:
+        u: Inputs, shape (d,).
+        out: Overwritten with u_1 u_1, u_1 u_2, …, u_2 u_2, …, shape (d (d + 1)/2,).
+    """
     at = 0
     for i in range(len(u)):
         for j in range(i, len(u)):
@@ -183,17 +194,23 @@ def dot(a: Array, b: Array) -> float:
 def dual_value(
     mu: Array, cell: Ints, node: int, side: float, data: DualFunctionData, gradient: Array, u: Array
 ) -> float:
-    """Return the dual function D(μ) of side × output at a node, without constants and cubic terms.
+    """Return the dual function D(μ) of side × output at a node, less constants and cubic terms.
+
+    D(μ) is the sum of two maxima and of Σ_z |μ_z| R_z: the maximum, for each mode on its own, of
+    the response minus Σ μ_z z over points of a table of frequencies ω and decays g; and that of Σ
+    μ_z z(u) plus truncated modes over inputs u in [−1, 1]^L. Here z are Z = K (2 + S) variables,
+    scaled to [−1, 1]: ω, g and a participation factor for each of S sources, mode by mode.
 
     Args:
         mu: Multipliers μ, shape (Z,).
-        cell: First and last point along ω, then along q = g/ω, between which the table of each mode
-            is read, shape (K, 4).
-        node: Number of the time node.
+        cell: First and last point along ω, then along q = g/ω, of the range of the table of each of
+            K modes over which the maximum is taken, shape (K, 4).
+        node: Index of the time node.
         side: −1 or 1.
-        data: Models and tables; they and |μ| are at most `LARGEST`.
+        data: Models of the variables and tables of the responses; they and |μ| are at most
+            `LARGEST`.
         gradient: Overwritten with a subgradient of D, shape (Z,).
-        u: Overwritten with the inputs that maximise the term over the box, shape (L,).
+        u: Overwritten with inputs near the second maximum, shape (L,).
     """
     modes, sources = data.participation.shape
     gradient[:] = 0.0
@@ -234,10 +251,22 @@ def dual_value(
 def mode_maximum(
     mu: Array, k: int, cell: Ints, node: int, side: float, data: DualFunctionData, values: Array
 ) -> tuple[float, int]:
-    """Return the maximum of mode k's term in D(μ) over a cell of its table, and its table point.
+    """Return the maximum of one mode's term of D(μ) over a range of its table, and the point of it.
 
-    `values` (points of the table,) is scratch. Loops run over slices from 0, without which they are
-    not compiled to vector instructions.
+    The term is Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g, which `maximand` computes at each point.
+    Points of a table are numbered row by row of q = g/ω, with the frequency ω running fastest. Of
+    equal values the one of the lowest ω, then of the lowest q, is taken. Loops run over slices from
+    0, without which they are not compiled to vector instructions.
+
+    Args:
+        mu: Multipliers μ of all modes, shape (Z,).
+        k: Index of the mode.
+        cell: First and last point along ω, then first and last along q, inclusive, shape (4,).
+        node: Index of the time node.
+        side: −1 or 1.
+        data: Tables and ranges of the participation factors; `grid_points[0]` is the number of
+            points along ω.
+        values: Scratch, shape (points of the table,).
     """
     count = int(data.grid_points[0])  # points of a row of the table, along ω
     width = cell[1] + 1 - cell[0]
@@ -264,10 +293,22 @@ def mode_maximum(
 def maximand(
     mu: Array, k: int, first: int, node: int, side: float, data: DualFunctionData, values: Array
 ) -> None:
-    """Write Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g to `values`, from mode k's point `first` on.
+    """Write one mode's term of D(μ), Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g, at points of its table.
 
-    With e the response to source s and c ± r the range of its participation factor, c e + |r e −
-    μ_s| is the maximum of (c + r z) e − μ_s z over z in [−1, 1].
+    With e the response to source s and c ± r the range of its participation factor, times `side`, c
+    e + |r e − μ_s| is the maximum of (c + r z) e − μ_s z over z in [−1, 1].
+
+    Args:
+        mu: Multipliers of all modes, shape (Z,). Those of mode k begin at k (2 + sources): μ_ω,
+            μ_g, then μ_s of each source s.
+        k: Index of the mode.
+        first: Index of the table point of values[0].
+        node: Index of the time node.
+        side: −1 or 1.
+        data: `omega` and `decay`, scaled ω and g at the table's points, shape (modes, points);
+            `table`, responses e, shape (modes, sources, times, points); `participation` c and
+            `participation_radius` r, shape (modes, sources). There is at least one source.
+        values: Overwritten with the terms at consecutive points, shape (wanted points,).
     """
     sources = data.participation.shape[1]
     end = first + len(values)
@@ -292,7 +333,17 @@ def maximand(
 
 @loops
 def remainder_bound(mu: Array, data: DualFunctionData) -> float:
-    """Bound Σ μ (cubic terms) over the box, less what D(μ) has expected of it."""
+    """Bound Σ_z μ_z (cubic terms of z) over the box, less what D(μ) has already expected of it.
+
+    Each variable z of the modes is a polynomial of the inputs in [−1, 1]. D(μ) contains Σ |μ_z|
+    `expected_cubic[z]` in place of the cubic terms, which may be too little: the result, also if
+    negative, corrects it.
+
+    Args:
+        mu: Multipliers, shape (Z,).
+        data: `cubic`, the cubic coefficients of each variable, shape (Z, monomials), and
+            `expected_cubic`, shape (Z,).
+    """
     total = np.zeros(data.cubic.shape[1])
     expected = 0.0
     for z in range(len(mu)):
@@ -379,14 +430,23 @@ def minimise(
 def subgradient_step(
     mu: Array, gradient: Array, direction: Array, drop: float, spacing: float
 ) -> bool:
-    """Make a deflected subgradient step of the multipliers μ that aims at a fall of D by `drop`.
+    """Move the multipliers μ, in place, by a deflected subgradient step that aims at a fall of D.
 
-    `mu` and `direction` (Z,) are changed in place; `direction` holds that of the last step.
-    Multipliers are rounded to multiples of `spacing`: on this grid their path does not depend on
-    rounding, and any μ gives a bound.
+    The direction is the subgradient, plus a part of the last direction where both oppose one
+    another (Camerini, Fratta, Maffioli 1975). Multipliers are rounded to multiples of `spacing`: on
+    this grid their path does not depend on rounding, and any μ gives a valid bound.
+
+    Args:
+        mu: Multipliers, shape (Z,); changed in place.
+        gradient: A subgradient of D at μ, shape (Z,).
+        direction: Direction of the last step, or zeros at the first one, shape (Z,); overwritten
+            with the new one.
+        drop: Fall of D that is aimed at, ≥ 0.
+        spacing: Distance of the values that multipliers take, > 0.
 
     Returns:
-        False where the direction is zero, or a multiplier exceeds `LARGEST`.
+        False where the direction is zero and μ stays, or a multiplier exceeds `LARGEST`: the
+        iteration ends then, and μ may be changed in part. True otherwise.
     """
     along = 0.0
     squared_length = 0.0

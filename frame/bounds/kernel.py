@@ -63,7 +63,13 @@ class Examination(NamedTuple):
 def separable_bound(g: Array, H: Array, r: Array) -> float:
     """Return an upper bound of g·x + x·H·x/2 for |x_i| ≤ r_i, as a sum of bounds along each axis.
 
-    Mixed terms are moved to the diagonal: 2 x_i x_j ≤ x_i² r_j/r_i + x_j² r_i/r_j.
+    Mixed terms are moved to the diagonal: 2 x_i x_j ≤ x_i² r_j/r_i + x_j² r_i/r_j. Axes with r_i =
+    0 do not count; without any other the bound is 0.
+
+    Args:
+        g: Shape (d,).
+        H: Symmetric, shape (d, d).
+        r: Radii r_i ≥ 0, shape (d,).
     """
     total = 0.0
     for i in range(len(r)):
@@ -83,13 +89,17 @@ def separable_bound(g: Array, H: Array, r: Array) -> float:
 
 @compiled
 def has_cholesky_factor(H: Array, shift: Array, r: Array, factor: Array) -> bool:
-    """Return whether diag(s) − H is positive definite on the axes with a width.
+    """Return whether diag(s) − H is positive definite, by more than rounding, on axes with a width.
+
+    The factorisation counts a pivot as positive from 1e-12 (s_i + |H_ii|) on. Without any such axis
+    the result is True.
 
     Args:
         H: Symmetric, shape (d, d).
         shift: s, shape (d,).
         r: Radii, shape (d,); axes with 0 are left out.
-        factor: Scratch, shape (d, d).
+        factor: Scratch, shape (d, d); its lower triangle is overwritten with the Cholesky factor,
+            as far as it exists.
     """
     for i in range(len(r)):
         for j in range(i + 1):
@@ -110,11 +120,20 @@ def has_cholesky_factor(H: Array, shift: Array, r: Array, factor: Array) -> bool
 
 @compiled
 def stays_below(g: Array, H: Array, r: Array, allowed: float, work: Array, factor: Array) -> bool:
-    """Return whether g·x + x·H·x/2 ≤ `allowed` is shown for |x_i| ≤ r_i; False if it stays open.
+    """Return whether g·x + x·H·x/2 ≤ `allowed` is proved for |x_i| ≤ r_i; False if it stays open.
 
     The quadratic plus Σ s_i (r_i² − x_i²)/2 with s_i ≥ 0 lies above it (αBB: Adjiman, Floudas
     1998). Where that is concave, each of its tangent planes is a bound. They are taken at points of
-    an ascent along the axes, from 0. `work` (3, d) and `factor` (d, d) are scratch.
+    an ascent along the axes, from 0. The quadratic is 0 at x = 0, so `allowed` ≤ 0 is not tried and
+    gives False.
+
+    Args:
+        g: Shape (d,).
+        H: Symmetric, shape (d, d).
+        r: Radii r_i ≥ 0, shape (d,); axes with 0 are left out.
+        allowed: In the unit of the output.
+        work: Scratch, shape (3, d).
+        factor: Scratch, shape (d, d).
     """
     if allowed <= 0:
         return False
@@ -158,7 +177,12 @@ def stays_below(g: Array, H: Array, r: Array, allowed: float, work: Array, facto
 def expand_output(waves: Array, factors: Array, jet: Array) -> None:
     """Write value, gradient and packed Hessian of an output, Σ_k waves_k factors_k, to `jet`.
 
-    `waves` has the shape (K,), `factors` (K, q), `jet` (q,) with q = 1 + d + d (d + 1)/2.
+    Args:
+        waves: Values in time of the K terms of the output, shape (K,).
+        factors: Their factors as functions of d inputs, shape (K, q), q = 1 + d + d (d + 1)/2:
+            value, d first derivatives, and second derivatives by u_i and u_j for i ≤ j, packed by
+            rows.
+        jet: Overwritten with the sums, in the same order, shape (q,).
     """
     jet[:] = 0.0
     for k in range(len(waves)):
@@ -168,7 +192,15 @@ def expand_output(waves: Array, factors: Array, jet: Array) -> None:
 
 @compiled
 def unpack_derivatives(jet: Array, side: float, g: Array, H: Array) -> None:
-    """Write gradient (d,) and Hessian (d, d) of side × output to `g` and `H`."""
+    """Write gradient and Hessian of side × output to `g` and `H`.
+
+    Args:
+        jet: Value of the output, its d first derivatives, and its second derivatives by u_i and u_j
+            for i ≤ j, packed by rows, shape (1 + d + d (d + 1)/2,).
+        side: −1 or 1.
+        g: Overwritten, shape (d,).
+        H: Overwritten, symmetric, shape (d, d).
+    """
     d = len(g)
     a = 1 + d
     for i in range(d):
@@ -210,14 +242,22 @@ def model_errors(
 
 @compiled
 def rising_faces(g: Array, bend: Array, slope_error: Array, r: Array, is_outer: Mask) -> int:
-    """Return the faces of a sub-box to which an item can be confined, as added to `FACES`.
+    """Return the faces of a sub-box on which the highest point of an output must lie.
 
-    Along an axis on which the slope |g_i| at the midpoint exceeds all that it may change by, the
-    highest point lies on the face towards which the output rises.
+    Where the slope |g_i| at the midpoint exceeds all that it may change by within the sub-box, the
+    output rises along axis i towards one face, and its highest point lies there.
+
+    Args:
+        g: Gradient of side × output at the midpoint, shape (d,).
+        bend: Change of the slopes that the Hessian allows, Σ_j |H_ij| r_j, shape (d,).
+        slope_error: Error of the slopes of the quadratic model, shape (d,).
+        r: Radii of the sub-box, shape (d,); axes with 0 do not count.
+        is_outer: Whether the lower and the upper faces lie on those of the whole box, shape (2, d).
 
     Returns:
-        Σ over these axes of 3^axis, twice for upper faces; 0 if there are none. `INSIDE` if one of
-        the faces lies inside the whole box: then the neighbouring sub-box holds higher points.
+        Σ_i 3^i over these axes, twice that for upper faces; 0 if there are none. `INSIDE` = −1 if
+        one of the faces lies inside the whole box: then the neighbouring sub-box holds higher
+        points.
     """
     faces = 0
     stride = 1
@@ -233,7 +273,17 @@ def rising_faces(g: Array, bend: Array, slope_error: Array, r: Array, is_outer: 
 
 @compiled
 def bisection_code(bend: Array, slope_error: Array, r: Array) -> int:
-    """Return 1 + the axis that adds most to what is not known of an item; 0 without any width."""
+    """Return 1 + the axis whose bisection promises most for one sub-box, or 0 without any width.
+
+    The weight of axis i is r_i (2 slope_error_i + bend_i/2): what the error of the slope and the
+    change of the slope by the Hessian add to the bound along it. The first axis is taken of equal
+    ones.
+
+    Args:
+        bend: Σ_j |H_ij| r_j for the Hessian H of the output, shape (d,).
+        slope_error: Errors of the slopes of the quadratic model, shape (d,).
+        r: Radii of the sub-box, shape (d,).
+    """
     largest = -1.0
     code = 0
     for i in range(len(r)):
@@ -250,13 +300,27 @@ def examine(
 ) -> Examination:
     """Examine all items: what is done next with each, its value and its upper bound.
 
+    An item is one of B sub-boxes with a problem: one side, −1 or 1, of one of m outputs at one of T
+    time nodes. Side × output is a quadratic about the midpoint of the sub-box plus an error.
+
     Args:
-        items: The items.
-        boxes: Their sub-boxes.
-        waves: Waves of all modes at the rows, real and imaginary parts, shape (R, K).
-        remainder: Bounds of what quadratic models leave out.
-        target: Best known value plus the gap asked for of each problem, (T m 2,), in the order of
-            nodes, outputs, sides.
+        items: The items, ordered by sub-box, then by time node; a row holds those of one sub-box
+            and node. `first_row` (B + 1,) and `first_item` (R + 1,) say where each begins; `column`
+            is 2 output + (0 for the side −1, 1 for 1).
+        boxes: Radii of the sub-boxes (B, d), which of their faces are outer ones (B, 2, d), and the
+            factors of the K terms in value, gradient and packed Hessian of each output (B, m, K,
+            q).
+        waves: Values in time of these terms, real and imaginary parts, at the rows, shape (R, K).
+        remainder: Bounds over the whole box of the third derivatives of each output (T, m, d, d,
+            d), and of the rounding of values and slopes (T, m, 1 + d).
+        target: Best known value plus the wanted gap of each problem, shape (2 T m,), in the order
+            of nodes, outputs, sides.
+
+    Returns:
+        For each item: `code`, 0 where the item is closed (its bound is at most the target, or a
+        neighbouring sub-box holds higher points), 1 + i to bisect axis i, `FACES` + Σ 3^i (once for
+        lower, twice for upper ends) to confine it to faces; `value` of side × output at the
+        midpoint; and its guaranteed upper `bound` over the sub-box.
     """
     count = len(items.column)
     code = np.zeros(count, np.int64)
@@ -302,7 +366,11 @@ def examine(
 
 
 def call_examine() -> None:
-    """Call `examine` once without a sub-box; see `KernelThreads`."""
+    """Call `examine` once without a sub-box, so that Numba knows the types of its arguments.
+
+    Threads that call a kernel for the first time at once may end the process in some builds of
+    Numba; the pool of threads makes this call before it has a thread.
+    """
     none = np.zeros(0, np.int64)
     items = Items(first_row=none, first_item=none, node=none, column=none)
     boxes = BoxTables(

@@ -44,9 +44,21 @@ class CellEffort(NamedTuple):
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     """Return a lower bound of an output's smallest peak over a box, by best-first bisection.
 
+    The peak of a trajectory is its largest |output| over all time nodes. The bound holds for every
+    input in the box; it is the smallest over cells, ranges of the modes' frequencies and decays
+    that together cover those of the box. The cell of the lowest bound is halved until a fixed
+    number of bisections is reached or none is left to halve.
+
+    Args:
+        level: Models of the response over the box of d inputs of nonzero width.
+        output: Index of the output among those of `level`.
+
     Returns:
-        The bound, 0 or more, and the unit coordinates (d,) that the bound of the lowest cell names:
-        inputs at which the peak is expected to be small.
+        The bound, 0 or more, in the unit of the output, and inputs in unit coordinates, shape (d,),
+        that the bound of the lowest cell names: there the peak is expected to be small.
+
+    Raises:
+        UnprovedError: A number of the models exceeds the range of the dual function.
     """
     sides = [OutputBounds.initial(level, output, side, 0.0) for side in (0, 1)]
     data_of_sides = sides[0].data, sides[1].data
@@ -143,7 +155,11 @@ def _bound_cell(
 
 
 def call_bound_cell() -> None:
-    """Call the kernel of `least_peak` once without a mode; see `KernelThreads`."""
+    """Call the kernel of `least_peak` once without a mode, so that Numba knows its argument types.
+
+    Threads that call a kernel for the first time at once may end the process in some builds of
+    Numba.
+    """
     data = data_without_modes()
     none = np.zeros((0, 0))
     no_ends = np.zeros((0, 4), np.int64)
@@ -151,10 +167,21 @@ def call_bound_cell() -> None:
 
 
 def _halves(cell: PeakCell, data: DualFunctionData) -> tuple[Ints, Ints] | None:
-    """Return the ends (K, 4) of both halves of a cell; None where no range can be halved.
+    """Return both halves of a cell of the modes' tables; None where no range has a point inside.
 
-    It is halved along the ω or q of that mode whose contribution varies most along one of its axes
-    at the node of the bound.
+    The cell is halved along the frequency ω, or the quotient q = g/ω of decay and frequency, of
+    that mode whose contribution to the output at the node of the bound varies most along this axis.
+    The point in the middle belongs to both halves. The cell is not changed.
+
+    Args:
+        cell: `ends` are first and last point along ω, then along q, of each of K tables, shape (K,
+            4); `node` is the time node.
+        data: `table`, responses of each mode to unit sources, shape (K, sources, T, points) with ω
+            running fastest among the points, and `participation`, their factors, shape (K,
+            sources).
+
+    Returns:
+        The ends of the lower and of the upper half, shape (K, 4) each.
     """
     largest = -1.0
     chosen = None

@@ -52,16 +52,24 @@ class ResponseTable(NamedTuple):
 def response_tables(
     grids: Sequence[Grid], excitation: Excitation, orders: Sequence[int], inputs: int
 ) -> dict[int, ResponseTable]:
-    """Return tables of the responses of oscillators on grids, by the order of the derivative.
+    """Return tables of the responses of K oscillators on grids, by the order of the derivative.
 
     Args:
-        grids: Grid over the frequency and the damping of each oscillator; all of one size.
-        excitation: Loads, time nodes, and the names of the sources.
-        orders: Derivatives of the displacements that outputs take, each once.
+        grids: Grid over the frequency ω and the quotient q = decay/ω of each oscillator; all have
+            the same numbers of points.
+        excitation: Loads by name, T time nodes, and the names of the sources.
+        orders: Derivatives by time of the displacements (0, 1, 2) that outputs take, each once.
         inputs: Number of inputs of the sums that the responses enter, for their rounding.
 
+    Returns:
+        For each order: `value`, responses at the grids' points, shape (K, sources, T, points) with
+        ω running fastest; `max_magnitude`, shape (K, sources); `error`, bounds of the error of
+        bilinear interpolation and of rounding, and `interpolation_error`, bounds of the distance
+        from a straight line in the step before each node, shape (K, sources, T) each.
+
     Raises:
-        UnprovedError: A response is out of the range of the dual function.
+        UnprovedError: A response is not finite or above 1e100, or an oscillator turns too far
+            within a sample interval of a load.
     """
     loads, time, sources = excitation
     by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
@@ -88,10 +96,15 @@ def response_tables(
 def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[int, int]:
     """Return the numbers of table points along ω and along q = g/ω, the same for all modes.
 
-    The distance of points is a fraction of a mode's decay, since this is the width of the peak of
+    The distance of points is a fraction of a mode's decay g, since this is the width of the peak of
     its frequency response, or of the inverse duration where that is larger. More points make the
     interpolation error of the tables smaller, with the square of their distance, and the dual
-    function slower in proportion to their number.
+    function slower in proportion to their number. So 9 to 81 points are taken along ω and 4 to 13
+    along q, as many as the most demanding mode asks for.
+
+    Args:
+        oscillators: Modes with their ranges of ω, in rad/s, and of q.
+        duration: Time of the last node, in s; 0 if it is the first one.
     """
     along_omega = 2.0
     along_q = 2.0
@@ -128,11 +141,16 @@ class LevelModels:
     ) -> LevelModels:
         """Return models of a structure's response over its box, and tables of its oscillators.
 
-        `truncation_tolerance` is the allowed error of each output by truncated modes, shape (m,);
-        as many modes as possible are enclosed unless it is given.
+        Args:
+            structure: The structure as Taylor models over the box of the inputs.
+            excitation: Loads by name, T time nodes from 0 on, and the names of the sources.
+            truncation_tolerance: Allowed error of each of the m outputs by modes that are not
+                enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
+                unless it is given.
 
         Raises:
-            UnprovedError: None of its modes can be enclosed.
+            UnprovedError: None of its modes can be enclosed, one may not oscillate, or a response
+                is out of the range of the tables.
         """
         models = ModalResponseModels.from_structure(structure, excitation, truncation_tolerance)
         points = _table_points(models.oscillators, float(excitation.time[-1]))
@@ -144,9 +162,11 @@ class LevelModels:
         return cls(structure, models, grids, tables, excitation)
 
     def interpolation_error(self) -> Array:
-        """Bound how far outputs lie beyond both their values in the step to each node, (T, m).
+        """Bound how far outputs exceed both their values at the ends of a time step, shape (T, m).
 
-        Where no force jumps, it bounds the distance of outputs from a straight line in the step.
+        Row j belongs to the step that ends at node j. Where no force jumps in the step, the number
+        also bounds the distance of the outputs from a straight line. All is in the units of the
+        outputs and holds for every input of the box.
         """
         # Contributions whose signs within a step are not known, so that they cannot cancel.
         unresolved = self.models.interpolation_error + sum(
@@ -174,9 +194,20 @@ class LevelModels:
         return narrowed_at_jumps(responses, time, narrowed)
 
     def _feedthrough_of_truncated_modes(self, source: str, feedthrough: Response) -> Array:
-        """Bound what a unit of a force adds at once by modes that are no oscillators, (m,).
+        """Bound what a unit of a force adds to outputs at once by truncated modes, shape (m,).
 
-        `feedthrough` is what the force adds by all modes.
+        A force acts on accelerations at once, by M⁻¹ b f, of which the participation factors of the
+        oscillators are a part. The rest belongs to the truncated modes, which are not enclosed one
+        by one.
+
+        Args:
+            source: Name of the force, "force1", "force2", …
+            feedthrough: What the force adds by all modes: `coefficient` is its factor for each
+                output at the midpoint of the box, shape (m, 1, 1), and `coefficient_error[0]`
+                bounds its change over the box, shape (m,).
+
+        Returns:
+            Bounds of the magnitude; those of outputs that are no accelerations are 0.
         """
         index = self.excitation.sources.index(source)
         is_acceleration = self.structure.derivative_orders == 2
@@ -189,7 +220,17 @@ class LevelModels:
         return np.asarray(np.abs(midpoint) + radius)
 
     def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
-        """Yield each force's source and what it adds to accelerations at once, M⁻¹ b f."""
+        """Yield what each force adds to accelerations at once, M⁻¹ b f, with the name of the force.
+
+        Nothing is yielded if no output is an acceleration. Loads of the ground and initial states
+        add nothing at once.
+
+        Yields:
+            The name, "force1", "force2", …, and the response: `sigma` None, the load f itself times
+            `coefficient`, its factor for each output at the midpoint of the box, shape (m, 1, 1),
+            with `coefficient_error`, bounds of the change of its real and imaginary parts over the
+            box, shape (2, m). Factors of outputs that are no accelerations are 0.
+        """
         structure = self.structure
         takes_acceleration = (structure.derivative_orders == 2)[:, np.newaxis]
         rows = np.where(takes_acceleration, structure.output_rows, 0.0)
@@ -210,7 +251,20 @@ class LevelModels:
                 yield source, response
 
     def _responses(self, mode: Oscillator) -> Iterator[Response]:
-        """Yield what a mode adds to outputs by each source, without what forces add at once."""
+        """Yield what one mode adds to outputs, by each source and derivative, without feedthrough.
+
+        Each item is Re κ G with G = σ^order ρ, ρ the Duhamel integral of the source's load, on a
+        coarse grid over the mode's exponents σ = −g + iω.
+
+        Args:
+            mode: Ranges of ω and of g/ω over the box, and participation factors as Taylor models of
+                shape (sources, m).
+
+        Yields:
+            For each source, and each derivative of the displacements that some output takes: κ for
+            each output at the points of the grid, 0 for outputs of other derivatives, and bounds of
+            the change of Re κ and Im κ over the box.
+        """
         loads, _, sources = self.excitation
         orders = self.structure.derivative_orders
         points = int(numbers.DEVIATION_POINTS), 3
@@ -253,7 +307,20 @@ class OutputBounds:
     def initial(
         cls, level: LevelModels, output: int, side: int, wanted_gap: float, attained: float = 0.0
     ) -> OutputBounds:
-        """Return infinite bounds of a side of an output of a level's models, given by numbers."""
+        """Return bounds of one side of one output over a box that are infinite at all T time nodes.
+
+        Args:
+            level: Models of the response over the box.
+            output: Index of the output in these models.
+            side: 0 for −output, 1 for output.
+            wanted_gap: Distance of bound and attained value that suffices, in the unit of the
+                output.
+            attained: Largest value of side × output over time that some trajectory is known to
+                attain.
+
+        Raises:
+            UnprovedError: A number of the models exceeds the range of the dual function.
+        """
         data, constant = _dual_function_data(level, output, (-1.0, 1.0)[side])
         nodes = constant.shape[1]
         return cls(
@@ -286,7 +353,17 @@ class OutputBounds:
     def effort(
         self, cells: int, steps: int, slack_below_peak: float = 0.0, remainder_multiple: float = 0.0
     ) -> Effort:
-        """Return the effort for a node; the arguments are its fields of these names."""
+        """Return the effort for the bound at one time node.
+
+        Args:
+            cells: Most cells, ranges of the modes' frequencies and decays, that are bounded.
+            steps: Most evaluations of the dual function for a cell.
+            slack_below_peak: Addition to the wanted gap of a node, as a fraction of the distance of
+                its model value from the largest attained value; at 1 only bounds above the peak
+                count.
+            remainder_multiple: Smallest gap worth any effort, as a multiple of what the remainders
+                of the Taylor models add to the bound.
+        """
         return Effort(
             cells=cells,
             steps=steps,
@@ -301,9 +378,15 @@ class OutputBounds:
         )
 
     def improve(self, nodes: Ints, effort: Effort) -> None:
-        """Lower the bounds and raise the model values at rising nodes (J,), in place.
+        """Lower the bounds and raise the model values at some time nodes, in place.
 
-        Entries at other nodes are neither read nor written.
+        Bounds never rise and model values never fall, so that any number of calls is valid. Entries
+        at other nodes are neither read nor written: threads may improve different nodes at once.
+
+        Args:
+            nodes: Indices of the nodes, rising, shape (J,). Each begins at the multipliers of the
+                one before.
+            effort: Limits of the work for a node, and the gap that suffices.
         """
         upper_and_value = np.empty((2, len(nodes)))
         inputs = np.empty((len(nodes), self.model_inputs.shape[1]))
@@ -315,9 +398,15 @@ class OutputBounds:
         self.upper[nodes] = np.minimum(self.upper[nodes], new_upper)
 
     def improve_peak(self, nodes: Ints, effort: Effort) -> None:
-        """Lower the highest bound of nodes (J,): the highest first, until one remains the highest.
+        """Lower the largest of the bounds at some time nodes, in place, with few of the nodes.
 
-        Lower bounds at other nodes would not lower that of the peak.
+        Nodes are improved one by one from the highest bound down, until the next bound is not above
+        the highest one that is left: lower bounds there would not lower the peak. Without nodes
+        nothing happens.
+
+        Args:
+            nodes: Indices of the nodes, shape (J,).
+            effort: Limits of the work for a node, and the gap that suffices.
         """
         peak = -np.inf
         for node in nodes[np.argsort(-self.upper[nodes], kind="stable")]:
@@ -334,12 +423,18 @@ def improve_all(
     *,
     peaks_alone: bool = False,
 ) -> None:
-    """Improve bounds at nodes by threads, in place.
+    """Improve guaranteed bounds at time nodes by threads, in place.
 
-    Each job is some bounds, the nodes (J,) at which they are improved, and the effort for a node.
-    Efforts are fixed beforehand, so that no bound depends on which thread ends first. With
-    `peaks_alone` only the highest bound of each job is lowered, and others for its sake. `tick` is
-    called with the completed fraction.
+    Each job is the bounds of one side of one output, the indices of the nodes at which they are
+    improved, shape (J,), rising, and the effort for a node. Efforts are fixed beforehand, so that
+    no bound depends on which thread ends first. Jobs without nodes are skipped.
+
+    Args:
+        jobs: The jobs; two of the same bounds must have different nodes.
+        pool: Runs the tasks.
+        tick: Called after each task with the completed fraction, up to 1; never without tasks.
+        peaks_alone: Whether only the highest bound of each job is to fall: nodes are improved from
+            the highest bound down until none is above those that are done.
     """
     futures = []
     for bounds, nodes, effort in jobs:
@@ -435,11 +530,24 @@ class _TruncatedTerms(NamedTuple):
 
 
 def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_TruncatedTerms, Array]:
-    """Return the terms of truncated modes, and the constants (2, T) of `OutputBounds.constant`.
+    """Return what truncated modes add to side × output, as terms in the inputs and as constants.
 
-    Truncated modes add P m(t) ± R r(t) with a sum P of participation factors, an amplitude R, and
-    the midpoint m and the radius r of the interval of their responses (`TruncatedModes`). An upper
-    bound of side × output thus contains side P m + R r.
+    Truncated modes, which are not enclosed one by one, add P m(t) ± R r(t): a sum P of
+    participation factors and an amplitude R, both Taylor models of the d inputs, and the midpoint m
+    and the radius r of the interval of their responses. An upper bound of side × output thus
+    contains side P m + R r.
+
+    Args:
+        level: Models of the response over a box, with T time nodes.
+        output: Index of the output.
+        side: −1 or 1.
+
+    Returns:
+        The terms: `response`, m and side × r of each source in turn, shape (terms, T), and linear
+        (terms, d) and quadratic (terms, d (d + 1)/2) coefficients of their factors P and R; there
+        are no terms if no mode is truncated. And the constants, shape (2, T): what the terms have
+        at the midpoint of the box, and a bound of everything that is bounded by magnitude: coupling
+        of modes, errors of the tables of all modes, cubic terms, remainders, and rounding.
     """
     modes = level.models.oscillators
     table = level.tables[int(level.structure.derivative_orders[output])]
@@ -485,7 +593,17 @@ class _ScaledModels(NamedTuple):
 
 
 def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
-    """Return the coefficients of Taylor models, shape (Z,), divided by radii of this shape."""
+    """Return the coefficients of Z Taylor models of d inputs, each divided by a radius of its own.
+
+    Args:
+        models: The Taylor models, shape (Z,).
+        radius: Positive radii, shape (Z,).
+
+    Returns:
+        `linear` (Z, d), `quadratic` (Z, d (d + 1)/2), of u_i u_j for i ≤ j packed by rows, `cubic`
+        (Z, monomials of third degree), and `remainder` (Z,), which contains the rounding of the
+        coefficients. Constant coefficients are left out.
+    """
     pairs = monomials(models.inputs, 2)
     by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))  # the order i ≤ j that the kernels use
     remainder = np.asarray(models.remainder + gamma(8) * models.magnitude())

@@ -40,15 +40,25 @@ MAX_PARAMETERS = 6
 
 
 def proved_error(model: ModalModel) -> Array:
-    """Bound |modal model − true response| over the box, shape (T, m), in units of the outputs.
+    """Bound |modal model − true response| over the box of the inputs, in the units of the outputs.
 
-    Theorem: with the deviation e of the response, ‖e‖² = qᵀ K q + vᵀ M v and the defects d_k of q̇ =
-    v and e_k of the balance of forces of mode k,
+    The model is q(t) = 2 Re Σ_k φ_k w_k(t) over n modes and S sources, with φ_k and λ_k polynomials
+    of the inputs, w_k = exp(λ_k t) or its integral over a load, and the velocity 2 Re Σ_k ψ_k w_k.
+    The true response obeys M q̈ + D q̇ + K q = f. Theorem: with the norm ‖e‖² = qᵀ K q + vᵀ M v of
+    a deviation e = (q, v), and the defects of mode k in q̇ = v, d_k = λ_k φ_k − ψ_k, and in the
+    balance of forces, e_k = λ_k M ψ_k + D ψ_k + K φ_k,
 
-        ‖e(t)‖ ≤ ‖e(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(‖d_k‖²_K + ‖e_k‖²_M⁻¹),
+        ‖e(t)‖ ≤ ‖e(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(d_k* K d_k + e_k* M⁻¹ e_k),
 
-    since damping only takes energy. An output takes at most its norm of this deviation; the errors
-    of its coefficients C_k and of the tables of w add to it.
+    since damping only takes energy; for a load a, ‖e(0)‖ is the norm after a unit impulse times ∫
+    |a|. An output takes at most its norm of this deviation; the errors of its coefficients and of
+    the tables of w_k add to it.
+
+    Args:
+        model: Modal model of a structure that is known to lose energy everywhere in the box.
+
+    Returns:
+        Bounds at T time nodes for m outputs, shape (T, m).
 
     Raises:
         UnprovedError: The box is so wide that M or K may lose its definiteness.
@@ -78,13 +88,17 @@ def proved_error(model: ModalModel) -> Array:
 
 
 def direct_error_in_steps(model: ModalModel) -> Array:
-    """Bound the error of what forces add to outputs at once, within the step to each node.
+    """Bound the error of what forces add to outputs at once, within the step to each time node.
 
-    It is the error of the coefficient times the largest |f| in the step, which may be zero at its
-    ends.
+    A force acts on accelerations at once, by a factor that the model takes as a polynomial of the
+    inputs. Its error over the box is multiplied by the largest |f| in the step, since f may be zero
+    at both ends of it.
+
+    Args:
+        model: The modal model, with T time nodes and m outputs.
 
     Returns:
-        Shape (T, m), in units of the outputs.
+        Shape (T, m), in units of the outputs; zeros where no force acts on an output at once.
     """
     structure = model.structure
     error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
@@ -137,7 +151,17 @@ class EnergyNorms:
 
 
 def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bound the energy norm of the defects of each mode and source over |exp(λ t)|, (S, n)."""
+    """Bound the energy norm of the defects of each mode and source, over |exp(λ t)|, shape (S, n).
+
+    The defects are d = λ φ − ψ in q̇ = v and e = λ M ψ + D ψ + K φ in the balance of forces, and
+    their norm is √(d* K d + e* M⁻¹ e).
+
+    Args:
+        structure: M, D and K as Taylor models of N unknowns over the box.
+        modes: Polynomials of n modes for each of S sources: eigenvalues λ (n,), displacements φ
+            (`shape`) and velocities ψ (`velocity`), shape (S, n, N) each.
+        norms: Bounds of these energy norms over the box.
+    """
     eigenvalue = modes.eigenvalue[:, None]
     kinematic = eigenvalue * modes.shape - modes.velocity
     momentum = modes.velocity @ structure.mass
@@ -152,7 +176,18 @@ def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyN
 
 
 def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bound the energy norm of the defects of the initial state of each source, shape (S,)."""
+    """Bound the energy norm of what the modes miss of the initial state of each source, shape (S,).
+
+    A source starts the response with K q(0) = static force and M v(0) = impulse. The modes give
+    q(0) = 2 Re Σ_k φ_k and v(0) = 2 Re Σ_k ψ_k; the norm is √(qᵀ K q + vᵀ M v) of the difference.
+
+    Args:
+        structure: M and K as Taylor models over the box, and the static forces and impulses, shape
+            (unknowns, S) each.
+        modes: Polynomials of n modes: displacements φ (`shape`) and velocities ψ (`velocity`),
+            shape (S, n, unknowns) each.
+        norms: Bounds of the energy norm over the box.
+    """
     twice = np.full((1, modes.shape.shape[1]), 2.0)  # the sum over modes and their conjugates
     displacement = (twice @ modes.shape.real)[:, 0]
     velocity = (twice @ modes.velocity.real)[:, 0]
@@ -164,13 +199,18 @@ def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyN
 
 
 def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
-    """Return the parts of degree 0 to 3 in v of Σ |coefficient| (reach + v)^exponents.
+    """Return bounds of polynomials' derivatives over a box, as the coefficients of a majorant.
 
-    At v = 0 the derivatives of this majorant bound those of the polynomials, shape V, over the box
-    |u_i| ≤ reach_i.
+    The majorant is Σ |coefficient| (reach + v)^exponents. At v = 0 its derivatives bound the
+    magnitudes of those of the polynomials at all points with |u_i| ≤ reach_i.
+
+    Args:
+        polynomials: Polynomials of d inputs u, an array of shape V, real or complex.
+        reach: Half-widths, shape (d,), ≥ 0.
 
     Returns:
-        Coefficients by degree, shape (monomials, *V) each.
+        The coefficients of degree 0, 1, 2 and 3 in v, shape (monomials, *V) each; a coefficient is
+        the derivative divided by the factorials of its exponents.
     """
     magnitudes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
     around = magnitudes.on_subbox(reach - 1, reach + 1)
@@ -196,9 +236,20 @@ class ResponsePart:
 
 
 def response_parts(model: ModalModel, growth: Array) -> list[ResponsePart]:
-    """Return the free response of a model, then the part of each load, with bounds over time.
+    """Return the parts of a modal model's response, each with bounds over time.
 
-    `growth` (n,) are upper bounds g_k of Re λ_k, in 1/s.
+    A part is 2 Re Σ_k C_k w_k(t) over n modes: the free response with w = exp(λ t) first, then that
+    to each load a with w = ∫ exp(λ τ) a(t − τ) dτ, in the order of `model.loads`.
+
+    Args:
+        model: The modal model with T time nodes and m outputs.
+        growth: Upper bounds of Re λ_k over the box, shape (n,), in 1/s; may be positive.
+
+    Returns:
+        For each part: `coefficient` C, polynomials of shape (n, m); `waves`, bounds of |∂^r w/∂λ^r|
+        for r = 0 to 3, shape (4, T, n); `elapsed`, bounds of ∫ |w| from 0 to t, shape (T, n);
+        `impulse`, bounds of ∫ |a| up to t, shape (T,), 1 for the free response; and `table_error`,
+        the relative error of w in the model's tables, shape (n,).
     """
     time = model.flow.time[:, np.newaxis]
     divisor = np.where(growth == 0, 1.0, growth)
@@ -214,7 +265,21 @@ def response_parts(model: ModalModel, growth: Array) -> list[ResponsePart]:
 
 
 def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> ResponsePart:
-    """Return the part of a load a(t), with bounds of w = R = ∫ exp(λ τ) a(t − τ) dτ over time."""
+    """Return the response to one load a(t) as a part of a modal model, with bounds over time.
+
+    The part is 2 Re Σ_k C_k R_k(t) over n modes, R = ∫ exp(λ τ) a(t − τ) dτ. For what a force adds
+    to outputs at once, `Direct`, R of the first mode is a(t) itself and that of all others 0.
+
+    Args:
+        model: The modal model with T time nodes and m outputs.
+        growth: Upper bounds of Re λ_k over the box, shape (n,), in 1/s.
+        load: Tables of R, and C as polynomials, shape (n, m).
+
+    Returns:
+        C; `waves`, bounds of |∂^r R/∂λ^r| for r = 0 to 3, shape (4, T, n); `elapsed`, bounds of ∫
+        |R| from 0 to t, shape (T, n), and `impulse`, of ∫ |a|, shape (T,), which are 0 for a direct
+        part; and the relative error of the tables.
+    """
     time = model.flow.time
     if isinstance(load, Direct):  # w of the first mode is a(t), and that of all others 0
         waves: Array = np.zeros((4, len(time), model.count))
@@ -249,11 +314,22 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
 
 
 def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> RemainderBounds:
-    """Bound what quadratic Taylor models of the outputs leave out in a box, and their rounding.
+    """Bound what quadratic Taylor models of a modal model's outputs leave out in a box.
 
-    The bounds follow for the box [lower, upper], in unit coordinates of shape (d,), by majorants:
-    derivatives of C exp(λ t) over exp(λ₀ t) are at most those of Σ_p t^p C ρ^p / p! with majorants
-    of C and of ρ = λ − λ₀.
+    They may be expanded about any point of the box [lower, upper]. The bounds follow by majorants:
+    derivatives by the inputs of C exp(λ t) over exp(λ₀ t) are at most those of Σ_p t^p C ρ^p / p!
+    with majorants of C and of ρ = λ − λ₀, that is, with polynomials whose coefficients are positive
+    and whose derivatives are at least as large.
+
+    Args:
+        model: The modal model with T time nodes, m outputs and d inputs.
+        lower: Lower ends of the box in unit coordinates, shape (d,).
+        upper: Upper ends, shape (d,).
+
+    Returns:
+        `third`, bounds of the third derivatives by u_i, u_j, u_k, shape (T, m, d, d, d), symmetric
+        in the last three axes; and `rounding`, bounds of the rounding of an output and of its
+        slopes by the inputs, shape (T, m, 1 + d).
     """
     d = len(lower)
     n = model.count
@@ -297,14 +373,15 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
 
 
 def _relative_rounding(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
-    """Bound the relative rounding error of each mode's response at each node, shape (T, n).
+    """Bound the relative rounding error of each mode's response at each time node, shape (T, n).
 
     It is ε times the number of operations; the rounding of λ enters exp(λ t) times |λ| t.
 
     Args:
-        model: The modal model.
+        model: The modal model of n modes with T time nodes.
         rate: Bounds of |λ|, shape (n,), in 1/s.
-        load: The load of the part; None for the free response.
+        load: Tables of the response to a load, whose series have operations of their own; None for
+            the free response.
     """
     n_terms, d = model.eigenvalue.exponents.shape
     of_polynomial = n_terms + model.degree + 2

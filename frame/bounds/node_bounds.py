@@ -125,7 +125,11 @@ def bound_nodes(
 
 
 def call_bound_nodes() -> None:
-    """Call `bound_nodes` once without a node; see `KernelThreads`."""
+    """Call `bound_nodes` once without a node, so that Numba knows the types of its arguments.
+
+    Threads that call a kernel for the first time at once may end the process in some builds of
+    Numba; the pool of threads makes this call before it has a thread.
+    """
     none = np.zeros((2, 0))
     effort = Effort(
         cells=0,
@@ -148,7 +152,15 @@ def call_bound_nodes() -> None:
 def target_value(model_value: float, min_gap: float, effort: Effort, constant: Array) -> float:
     """Return the value of the dual function at which a node's bound is as tight as asked for.
 
-    `min_gap` is the smallest gap worth any effort, `constant` (2,) are the node's constants.
+    A node whose model value lies below the largest attained one, the incumbent, may have a wider
+    gap: by `slack_below_peak` times the distance.
+
+    Args:
+        model_value: Largest known value of side × output in the model, without its constants.
+        min_gap: Smallest gap worth any effort.
+        effort: `wanted_gap`, `incumbent` and `slack_below_peak`.
+        constant: What is added to the model value for the response, and to that for the bound,
+            (2,).
     """
     below_peak = max(0.0, effort.incumbent - model_value - constant[0])
     gap = max(effort.wanted_gap, min_gap) + effort.slack_below_peak * below_peak
@@ -167,11 +179,23 @@ def bound_cell(
     model_value: float,
     u: Array,
 ) -> float:
-    """Improve the dual bound of one of `cells`, in place; return the largest model value so far.
+    """Improve the dual bound of one cell at a time node; return the largest model value so far.
 
-    The multipliers and the disagreement of the cell are overwritten too. `model_value` is the
-    largest value of side × output in the model that is known before, at the inputs `u` (L,); where
-    a larger one is found, `u` is overwritten.
+    A cell is a range of each mode's table of responses over frequency and decay. The row `cell` of
+    `cells` is changed in place: its bound `value` never rises, its multipliers `mu` and the
+    `disagreement` of its variables are overwritten. Where the bound stays above the target, and
+    always in cell 0, an ascent looks for inputs with a larger model value.
+
+    Args:
+        cell: Index of the cell.
+        node: Index of the time node.
+        side: −1 or 1.
+        data: Models and tables of the output.
+        effort: Limits of the work: `steps`, `patience` and `ascents`.
+        target: Value of the dual function at which its minimisation ends.
+        cells: All cells; `ends` of this one must be set, and `mu` is where the minimisation begins.
+        model_value: Largest value of side × output in the model that is known before.
+        u: Inputs at which it is attained, shape (L,); overwritten where a larger one is found.
     """
     inputs = np.empty(len(u))
     bound = minimise(
@@ -198,13 +222,24 @@ def bound_cell(
 
 @compiled
 def halve_cell(cells: Cells, halved: int, count: int) -> bool:
-    """Halve a cell along the ω, or g by q = g/ω, of largest disagreement (see `minimise`).
+    """Halve a cell along the ω or q = g/ω on which both maxima of D(μ) disagree most.
 
-    The cell keeps the lower half, and cell number `count` becomes the upper one, with the same
-    multipliers and bound; both are changed in place.
+    The first maximum of the dual function is at a point of each mode's table, the second at inputs
+    u, and the bound is sharp where the frequencies ω and decays g of both agree. The cell keeps the
+    lower half, and cell number `count` becomes the upper one, with the same multipliers and bound;
+    both are changed in place. The point in the middle belongs to both.
+
+    Args:
+        cells: Cells with `ends`, first and last point along ω, then q, of each of K modes, shape
+            (cells, K, 4), and `disagreement` of the variables, mode by mode ω, g, participation
+            factors, shape (cells, Z).
+        halved: Index of the cell.
+        count: Number of cells so far, which is the index of the new one; it must be below the
+            length of the arrays.
 
     Returns:
-        False where no range of ω or q has a point of its table between its ends.
+        False, with nothing changed, where no range with a disagreement has a point between its
+        ends.
     """
     ends = cells.ends[halved]
     disagreement = cells.disagreement[halved]
@@ -235,9 +270,18 @@ def halve_cell(cells: Cells, halved: int, count: int) -> bool:
 def model_and_gradient(
     u: Array, node: int, side: float, data: DualFunctionData, gradient: Array
 ) -> float:
-    """Return side × output in the model at inputs u (L,), without its constants.
+    """Return side × output in the model at inputs u, without its constants, and its gradient.
 
-    `gradient` is overwritten with its derivatives by the inputs, shape (L,).
+    The model takes frequencies, decays and participation factors of the modes as quadratic
+    polynomials of the inputs, responses by bilinear interpolation in tables, and truncated modes as
+    a quadratic.
+
+    Args:
+        u: Inputs in [−1, 1], shape (L,).
+        node: Index of the time node.
+        side: −1 or 1.
+        data: Models and tables of the output.
+        gradient: Overwritten with the derivatives by the inputs, shape (L,).
     """
     u_products = np.empty(data.quadratic.shape[1])
     slopes = np.zeros(len(data.linear))  # by the intervening variables
@@ -270,10 +314,21 @@ def model_and_gradient(
 def response_and_gradient(
     u: Array, node: int, side: float, data: DualFunctionData, slopes: Array
 ) -> float:
-    """Return the sum of the modes' responses, side × output, in the model at inputs u (L,).
+    """Return the sum of the modes' responses, side × output, in the model at inputs u.
 
-    Responses are read by bilinear interpolation in the tables. `slopes` is overwritten with the
-    derivatives of the sum by all scaled intervening variables, shape (Z,).
+    Z variables z, scaled to [−1, 1], are quadratic polynomials of u: for each of K modes its
+    frequency ω, its decay g, and a participation factor for each source. Responses to unit sources
+    are interpolated bilinearly in tables over ω and q = g/ω; beyond a table its edge is taken.
+
+    Args:
+        u: Inputs in [−1, 1], shape (L,).
+        node: Index of the time node.
+        side: −1 or 1.
+        data: `linear` and `quadratic` coefficients of z; `midpoint` and `radius` of ω and g, shape
+            (K, 2); `participation` and `participation_radius`, shape (K, sources); `table`, shape
+            (K, sources, T, points) with ω running fastest; `grid_start`, `grid_step` along ω and q,
+            shape (K, 2), and `grid_points`, shape (2,).
+        slopes: Overwritten with the derivatives of the sum by z, shape (Z,).
     """
     u_products = np.empty(data.quadratic.shape[1])
     z = np.empty(len(data.linear))  # scaled intervening variables at u
@@ -320,10 +375,19 @@ def response_and_gradient(
 
 @loops
 def ascend(u: Array, node: int, side: float, data: DualFunctionData, steps: int) -> float:
-    """Raise side × output in the model by moving the inputs u (L,), in place; return its value.
+    """Raise side × output in the model by moving the inputs u, in place; return its value there.
 
     It is a projected gradient ascent over the box [−1, 1]^L with the step lengths of Barzilai and
-    Borwein (1988). Any inputs give a valid value, so that it need not converge.
+    Borwein (1988). Any inputs give a valid lower bound of the model's maximum, so that it need not
+    converge. The value never falls below that at the given inputs, which stay where no better ones
+    are found.
+
+    Args:
+        u: Inputs to begin at, shape (L,); overwritten with the best ones.
+        node: Index of the time node.
+        side: −1 or 1.
+        data: Models and tables of the output.
+        steps: Most evaluations after the first; 0 leaves u as it is.
     """
     # Inputs are rounded to multiples of 1/grid, so that their path does not depend on rounding.
     grid = 2.0**24

@@ -28,12 +28,25 @@ class PrunedBox(NamedTuple):
 
 
 def prune_ends(level: LevelModels, bounds: OutputBounds, above: Ints) -> PrunedBox:
-    """Prune ends of the box [−1, 1]^d over which no bound exceeds the peak by more than the gap.
+    """Prune ends of the box [−1, 1]^d that hold no peak above the incumbent by more than the gap.
+
+    Of each input the half or quarter of its range away from the best inputs found is bounded. Where
+    the bound exceeds `bounds.attained`, the incumbent, by at most `bounds.wanted_gap` at every
+    node, that end cannot hold a peak that is worth a search, and is pruned.
 
     Args:
         level: Models over the box.
-        bounds: Bounds of one side of one output over the box.
-        above: Nodes whose bounds exceed the peak, shape (J,).
+        bounds: Bounds of one side of one output over the box. Not changed.
+        above: Indices of the J ≥ 1 time nodes whose bounds exceed incumbent + gap, shape (J,).
+
+    Returns:
+        `low` and `high`, ends of what remains, shape (d,), −1 and 1 where nothing is pruned;
+        `upper`, bounds over all that is pruned at the nodes `above`, shape (J,), −inf if that is
+        nothing; and `gap_fractions`, the estimated fraction of the gap that each input accounts
+        for, shape (d,).
+
+    Raises:
+        UnprovedError: Numbers of the models over a piece exceed the range of the dual function.
     """
     highest_node = int(above[bounds.upper[above].argmax()])
     best_inputs = bounds.model_inputs[highest_node]
@@ -72,10 +85,22 @@ def prune_ends(level: LevelModels, bounds: OutputBounds, above: Ints) -> PrunedB
 def _bounds_over_piece(
     piece: LevelModels, bounds: OutputBounds, above: Ints, *, max_cells: int
 ) -> Array:
-    """Return upper bounds over a piece of the box at the nodes `above`, shape (J,).
+    """Return upper bounds of one side of one output over a piece of the box, shape (J,).
 
-    They begin at those over the whole box. Nodes are bounded in the order of these, the largest
-    first, until one stays above the peak by more than the gap: then the piece cannot be pruned.
+    They begin at the bounds over the whole box, which hold there, too. Nodes are bounded in the
+    order of these, the largest first, until one stays above `bounds.attained` +
+    `bounds.wanted_gap`: then the piece cannot be pruned, and later nodes keep the bounds of the
+    whole box.
+
+    Args:
+        piece: Models over the piece.
+        bounds: Bounds over the whole box. Not changed.
+        above: Indices of the time nodes, shape (J,).
+        max_cells: Most ranges of the modes' frequencies and decays into which the piece is divided
+            at a node.
+
+    Raises:
+        UnprovedError: Numbers of the models exceed the range of the dual function.
     """
     inside = OutputBounds.initial(piece, *bounds.index, bounds.wanted_gap, bounds.attained)
     inside.upper[:] = bounds.upper
@@ -97,10 +122,21 @@ class RemainderAddition(NamedTuple):
 def remainder_addition(bounds: OutputBounds, node: int) -> RemainderAddition:
     """Estimate what Taylor remainders add to the bound at a node, and which inputs cause it.
 
-    At the minimum of the dual function the multipliers are the slopes of the response by the
-    intervening variables z, and the bound contains Σ |slope_z| R_z with the remainders R_z.
-    Remainders are of fourth degree in the inputs. Each R_z is distributed over the inputs in
-    proportion to the squares of their coefficients of first and second degree in z.
+    At the minimum of the dual function its multipliers are the slopes of the response by the
+    variables z of the modes (frequency, decay, participation factors), and the bound contains Σ
+    |slope_z| R_z with the remainders R_z of z as polynomials of the inputs. Remainders are of
+    fourth degree in the inputs. Each R_z is distributed over the inputs in proportion to the
+    squares of their coefficients of first and second degree in z.
+
+    Args:
+        bounds: Bounds of one side of one output over a box of d inputs, and the inputs at which the
+            model is largest at each node.
+        node: Index of the time node.
+
+    Returns:
+        `least`, the estimated addition in the unit of the output, including the constants of the
+        bound; and `input_fractions`, the fraction that each input accounts for, shape (d,), which
+        add up to 1, or are 0 if nothing is added.
     """
     data = bounds.data
     d = data.linear.shape[1]

@@ -56,7 +56,15 @@ class SubBox:
     done: float = 0.0  # completed fraction of its own bounds
 
     def on_levels(self, rows: Ints, boxes: Boxes | None = None) -> SubBox:
-        """Return a copy on some levels, given by their rows, with the ends of `boxes` if given."""
+        """Return a copy on some levels, with nothing done yet.
+
+        A level is an α-cut of the inputs. Masks and bounds of these levels are copied; the expected
+        fraction of all work, `work`, stays.
+
+        Args:
+            rows: Which of the present levels are kept, as rows of the arrays, shape (kept levels,).
+            boxes: Ends on the kept levels; those of this sub-box unless given.
+        """
         return replace(
             self,
             boxes=self.boxes.on_levels(rows) if boxes is None else boxes,
@@ -74,11 +82,17 @@ class SubBox:
 
 
 def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-    """Return the guaranteed envelope of all outputs on all levels.
+    """Return the guaranteed envelope of all outputs on all α-levels, by bisection of the inputs.
+
+    Args:
+        proof: Bounds the outputs over any sub-box of the inputs.
+        flow: The response as a function of the fuzzy inputs.
+        progress: Called with the completed fraction, from 0 to 1.
 
     Raises:
         UnprovedError: The system is not linear, its integrator is not the exact one, or bounds are
             not proved.
+        FailedError: The proof contradicts a trajectory, and is wrong.
     """
     queue = Queue(proof, flow)
     queue.run(progress)
@@ -126,7 +140,14 @@ class Queue:
         self._push(whole_box)
 
     def run(self, progress: Progress | None = None) -> None:
-        """Bound and branch until all peaks are fathomed or abandoned.
+        """Bound and bisect sub-boxes until all peaks are fathomed or abandoned.
+
+        A peak is the largest value over time of one side, −q or q, of an output q on one α-level.
+        It is fathomed in a sub-box where its bound exceeds the largest attained value by no more
+        than the wanted gap. Afterwards `self.hull` holds the bounds over the whole box.
+
+        Args:
+            progress: Called with the completed fraction of the expected work, from 0 to 1.
 
         Raises:
             UnprovedError: The proof refuses too many sub-boxes, or one that bisections would not
@@ -151,7 +172,13 @@ class Queue:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def notes(self) -> Iterator[str]:
-        """Yield a sentence on the input to narrow where a gap remains."""
+        """Yield a sentence on the input to narrow, if the widest gap is above the wanted one.
+
+        The gap of a peak is the distance of its guaranteed bound from the largest attained value.
+        The peak with the largest gap in comparison with the peak itself is taken, among those that
+        sub-boxes were bounded for. Nothing is yielded where its gap is small enough or no input
+        accounts for it.
+        """
         upper_peaks = np.minimum.accumulate(self.hull.upper.max(axis=1), axis=0)
         incumbents = np.stack([self.hull.incumbent(level) for level in range(len(upper_peaks))])
         gaps = np.where(self.box_count > 0, upper_peaks - incumbents, -np.inf)
@@ -174,12 +201,15 @@ class Queue:
         heappush(self.heap, (priority, self.pushes, box))
 
     def _next_batch(self) -> list[SubBox]:
-        """Remove the sub-boxes with the largest excess from the queue, and fathom their peaks.
+        """Remove the sub-boxes whose bounds exceed the goal most from the queue.
+
+        Peaks that are closed by now, because attained values have risen or they were abandoned, are
+        closed in the hull; sub-boxes without open peaks are dropped.
 
         Returns:
-            Two sub-boxes with open peaks, on the levels that have any; fewer if the queue ends. Two
-            are bounded with the same incumbents whatever the number of threads, so that the result
-            does not depend on it.
+            Two sub-boxes with open peaks, on the levels that have any; fewer if the queue ends, and
+            none at its end. Two are bounded with the same incumbents whatever the number of
+            threads, so that the result does not depend on it.
         """
         batch = list[SubBox]()
         while self.heap and len(batch) < 2:
@@ -192,9 +222,13 @@ class Queue:
     def _report(
         self, progress: Progress | None, batch: Sequence[SubBox], box: SubBox, fraction: float
     ) -> None:
-        """Report the completed fraction of all work; `fraction` is that of the bounds of a sub-box.
+        """Report the completed fraction of all expected work while some sub-boxes are bounded.
 
-        `box.done` is raised in place.
+        Args:
+            progress: Called with the fraction, from 0 to 1; None for no report.
+            batch: The sub-boxes that are bounded now.
+            box: The one of them that has got on; its `done` is raised in place, and never falls.
+            fraction: Completed fraction of its bounds.
         """
         box.done = max(fraction, box.done)
         if progress is not None:
@@ -208,7 +242,17 @@ class Queue:
         return np.asarray(upper_peaks - self.hull.incumbent(box.levels[k]) - self.gap)
 
     def _goal(self, box: SubBox, workers: int, tick: Callable[[SubBox, float], None]) -> Goal:
-        """Return what is asked for: all bounds on wide levels, else those above an open peak."""
+        """Return which bounds the proof is asked for over a sub-box, and what is known there.
+
+        On a level on which bounds are worth little at any node (`is_wide`), all bounds of open
+        peaks are asked for; on others those at time nodes that exceed the attained value by more
+        than the gap.
+
+        Args:
+            box: The sub-box.
+            workers: Number of threads for it; at least one is given.
+            tick: Called with the sub-box and the completed fraction of its bounds.
+        """
         incumbent = np.stack([self.hull.incumbent(level) for level in box.levels])
         is_above = box.upper > (incumbent + self.gap)[:, np.newaxis]
         is_wide = box.is_wide[:, np.newaxis, np.newaxis, np.newaxis]
@@ -232,7 +276,17 @@ class Queue:
             return [refusal] * len(box.levels)
 
     def _add_answers(self, box: SubBox, goal: Goal, answers: Sequence[Answer]) -> None:
-        """Add attained values to the hull, and lower the bounds of a sub-box in place.
+        """Take over, in place, the attained values and bounds that a proof has found for a sub-box.
+
+        The counts of sub-boxes and of refusals go up.
+
+        Args:
+            box: The sub-box. Its `upper`, guaranteed bounds of shape (levels, T, m, 2), are lowered
+                where they were asked for, and its `min_peak_lower`, bounds of the smallest max |q|
+                over time, shape (levels, m), are raised.
+            goal: What the proof was asked for.
+            answers: For each level of the sub-box its bounds, or the error that says why there are
+                none; such a level keeps its bounds.
 
         Raises:
             UnprovedError: The proof refused a level for a reason that bisections do not mend, or
@@ -258,9 +312,17 @@ class Queue:
                 box.min_peak_lower[k] = np.maximum(box.min_peak_lower[k], lower)
 
     def _abandon_slow_peaks(self, box: SubBox, answers: Sequence[Answer]) -> None:
-        """Mark the peaks whose gaps bisections are not expected to close as abandoned.
+        """Mark the peaks, in place, whose gaps bisections are not expected to close as abandoned.
 
-        An abandoned peak keeps the bound it has, which is valid; only its gap is wider than asked.
+        A peak is the largest value over time of one side of an output on a level, and its gap the
+        distance of its bound from the largest attained value. An abandoned peak keeps the bound it
+        has, which is valid; only its gap is wider than asked. The counts of sub-boxes, first gaps
+        and fractions of the gap by input of the open peaks are updated as well.
+
+        Args:
+            box: The sub-box that has just been bounded.
+            answers: For each level of it the proof's bounds, or an error; levels with an error are
+                skipped.
         """
         max_boxes = self.proof.parts
         for k, (level, bounds) in enumerate(zip(box.levels, answers, strict=True)):
@@ -288,7 +350,15 @@ class Queue:
             self.is_abandoned[level] |= is_open & is_hopeless
 
     def _waiting_peaks(self, level: int) -> Array:
-        """Return the largest finite bounds of a level's open peaks over the queue, shape (m, 2)."""
+        """Return the largest finite bounds of a level's open peaks over all sub-boxes in the queue.
+
+        Args:
+            level: Row of the α-cut, 0 for the widest.
+
+        Returns:
+            Shape (m, 2): outputs q, then the sides −q, q; 0 where no sub-box has a finite positive
+            bound.
+        """
         largest: Array = np.zeros(self.first_gap[level].shape)
         for _, _, box in self.heap:
             if level in box.levels:
@@ -306,9 +376,15 @@ class Queue:
         return np.asarray(box.peaks[k] & (excess > 0) & ~is_left)
 
     def _fathom(self, box: SubBox) -> None:
-        """Close peaks that are abandoned or exceed the incumbent by no more than the gap.
+        """Close the peaks of a sub-box that need no further bisection, in place.
 
-        The peaks and the wide levels of the sub-box are changed in place.
+        These are the peaks that are abandoned or whose bound exceeds the largest attained value by
+        no more than the wanted gap. Their bounds go into the hull. A level keeps all its peaks as
+        long as one that is still open has a very wide gap. The sub-box's `peaks`, and `is_wide` of
+        the levels that have no wide gaps any more, are changed.
+
+        Args:
+            box: The sub-box.
         """
         for k, level in enumerate(box.levels):
             is_open = self._peaks_to_close(box, k)
@@ -324,8 +400,15 @@ class Queue:
     def _pruned_children(self, box: SubBox, answers: Sequence[Answer]) -> Iterator[SubBox]:
         """Yield the smaller sub-boxes to which the proof has confined single peaks.
 
-        These peaks leave `box`, in place. Where hardly anything was pruned, the halves of the
-        smaller sub-box are yielded instead.
+        These peaks leave `box`, in place, and the bounds over what was pruned go into the hull.
+        Where hardly anything was pruned, the halves of the smaller sub-box are yielded instead, and
+        where nothing was, the peak stays in `box`.
+
+        Args:
+            box: The sub-box that has just been bounded.
+            answers: For each level of it the proof's bounds, or an error. `remaining` is the part
+                of the sub-box that may contain each peak, lower and upper ends, shape (2, m, 2,
+                inputs), in SI units; None for all of it.
         """
         for k, bounds in enumerate(answers):
             if isinstance(bounds, UnprovedError) or bounds.remaining is None or box.is_wide[k]:
@@ -352,9 +435,15 @@ class Queue:
                     yield from child.bisect(_bisection_axis(child.boxes, fractions))
 
     def _halves(self, box: SubBox, answers: Sequence[Answer]) -> list[SubBox]:
-        """Return both halves of a sub-box on the levels with open peaks; none without any.
+        """Return both halves of a sub-box on the levels that have open peaks; none without any.
 
-        It is bisected along the input that refusals name, or that accounts for most of the gaps.
+        It is bisected along the input that most votes are for: of each open peak the fractions of
+        its gap by input, where some gaps are very wide those of these alone, and one vote of each
+        error for the input that it names.
+
+        Args:
+            box: The sub-box; not changed.
+            answers: For each level of it the proof's bounds, or an error.
         """
         if not box.peaks.any():
             return []
@@ -377,9 +466,15 @@ def _open_levels(box: SubBox) -> Ints:
 
 
 def _bisection_axis(boxes: Boxes, votes: Array) -> int:
-    """Return the input of nonzero width with most votes, shape (d,).
+    """Return the index of the input along which a sub-box is bisected.
 
-    Without votes it is the input whose width is largest in comparison with its midpoint.
+    It is the input of nonzero width with most votes, the first one in a tie. Without votes for any
+    of these it is the input whose width is largest in comparison with the magnitude of its
+    midpoint. If no input has a width, it is 0.
+
+    Args:
+        boxes: The sub-box on each of its levels; its widest box, on the first row, decides.
+        votes: Votes for each of d inputs, shape (d,), ≥ 0.
     """
     width = boxes.upper[0] - boxes.lower[0]
     votes = np.where(width > 0, votes, 0.0)
@@ -391,12 +486,12 @@ def _bisection_axis(boxes: Boxes, votes: Array) -> int:
 def halvings(gap_fractions: Array, max_boxes: int) -> Array:
     """Return how often an input can be halved with `max_boxes` sub-boxes, on average over a gap.
 
-    With log2(max_boxes) bisections along each path, of which each input gets its fraction of the
-    gap, the average is taken with the same fractions as weights.
+    A path through the tree of sub-boxes has log2(max_boxes) bisections, of which each input gets
+    its fraction of the gap. The average over inputs is taken with the same fractions as weights.
 
     Args:
         gap_fractions: Fraction of the gap that each input accounts for, shape (…, inputs).
-        max_boxes: Most sub-boxes.
+        max_boxes: Most sub-boxes, at least 1.
 
     Returns:
         Shape (…,); 1 where all fractions are zero.
