@@ -33,7 +33,15 @@ class LoadHistory(NamedTuple):
     phase: float = 0.0  # in rad
 
     def values(self, times: Array) -> Array:
-        """Return the load at times, shape (T,); at a jump its value after the jump."""
+        """Return the load g(t) sin(Ω (t − start) + phase), or g(t) if Ω is 0, at times, (T,).
+
+        g is linear between its samples and zero before the first and after the last one, at which
+        it stays if `is_held`. At a jump the value after it is returned: at the first sample that
+        sample, and at the last one 0 unless it is held. Without samples NumPy raises ValueError.
+
+        Args:
+            times: In s, shape (T,), in any order.
+        """
         since = times - self.start
         position = since / self.step
         # Times of samples are hit exactly, so that jumps are on the right side.
@@ -49,11 +57,13 @@ class LoadHistory(NamedTuple):
     def substep_loads(self, substeps: int, count: int) -> Array:
         """Return the load at the start of each substep as four numbers, shape (count, 4).
 
-        They are g sin θ, g cos θ, r sin θ and r cos θ: g rises by r within a substep, and θ is the
-        angle of the sine, 90° without one.
+        They are g sin θ, g cos θ, r sin θ and r cos θ: g rises by r within a substep, and θ = Ω (t
+        − start) + phase is the angle of the sine, 90° where there is no sine. Time begins at the
+        first sample. After the last sample g and r are zero, or g stays and r is zero if the last
+        sample is held.
 
         Args:
-            substeps: Number of substeps between two samples.
+            substeps: Number of equal substeps between two samples.
             count: Number of all substeps.
         """
         samples = self.samples
@@ -97,7 +107,22 @@ class LinearMotion:
     histories: tuple[LoadHistory, ...] = ()  # f of each force
 
     def outputs(self, times: Array) -> RoundedOutputs:
-        """Return outputs at times ≥ 0, rising, and bounds of their rounding, (T, m) each."""
+        """Return the outputs of M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t), exact but for rounding.
+
+        The response to the initial state and the ground comes first; then that to each force, which
+        acts from its start on, on a structure at rest, is added, together with what the force adds
+        to outputs at once.
+
+        Args:
+            times: Times ≥ 0, rising, at least one, shape (T,), in s.
+
+        Returns:
+            `values` and bounds of their rounding, `rounding`, shape (T, m) each, in the units of
+            the outputs.
+
+        Raises:
+            numpy.linalg.LinAlgError: The mass matrix is not positive definite.
+        """
         n = len(self.mass)
         lower = cholesky(self.mass, lower=True)  # M = L Lᵀ
         inverse = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹
@@ -136,7 +161,20 @@ class _ScaledSystem:
     def of_matrices(
         cls, lower: Array, damping: Array, stiffness: Array, rows: Array
     ) -> _ScaledSystem:
-        """Return the system of a structure with the Cholesky factor L = `lower` of its mass."""
+        """Return a structure as ẋ = A x in the states x = [Lᵀ q; Lᵀ q̇/ω], where L Lᵀ is its mass.
+
+        In these states A has about the norm of the highest frequency ω = √‖L⁻¹ K L⁻ᵀ‖, which is 1
+        if the stiffness is zero.
+
+        Args:
+            lower: Cholesky factor L of the mass, lower triangular, shape (n, n).
+            damping: D, shape (n, n), in N s/m.
+            stiffness: K, symmetric, shape (n, n), in N/m.
+            rows: Rows of the outputs on [q; q̇], shape (m, 2n).
+
+        Returns:
+            A, the rows on x, ω, the lowest undamped frequency in rad/s, and a bound of ‖A‖.
+        """
         n = len(lower)
 
         def reduced(matrix: Array) -> Array:
@@ -160,7 +198,7 @@ class _ScaledSystem:
     def outputs(
         self, start: Array, push: Array, history: LoadHistory, times: Array
     ) -> RoundedOutputs:
-        """Return outputs at times from x(0) = start, and their rounding.
+        """Return outputs of ẋ = A x + [0; push] f(t), x(0) = `start`, and bounds of rounding.
 
         Rounded matrices are those of a structure whose L⁻¹ K L⁻ᵀ differs by n ε of its norm ω², so
         that the phase of the slowest mode ω_1 is off by up to n ε ω² min(t², t/ω_1) / 2 rad.
@@ -168,8 +206,12 @@ class _ScaledSystem:
         Args:
             start: Initial state, shape (2n,).
             push: What a unit of the load adds to the second half of ẋ, shape (n,).
-            history: The load f.
-            times: Times, rising, shape (T,), in s.
+            history: The load f, which begins at t = 0 here whatever its `start`; without samples it
+                is zero.
+            times: Times ≥ 0, rising, shape (T,), in s.
+
+        Returns:
+            `values` and `rounding`, shape (T, m) each.
         """
         n = len(push)
         last = max(float(times.max(initial=0.0)), 1e-300)
@@ -211,10 +253,19 @@ class _ScaledSystem:
 
 
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
-    """Return the states of x_{k+1} = step x_k + forcing_k with x_0 = `start`, shape (count, 2n).
+    """Return the states of x_{k+1} = A x_k + f_k, with x_0 = `start`, for k = 0 … count − 1.
 
     By recursive doubling (Kogge, Stone 1973): with what a span of 2, 4, … substeps before each one
     adds to its state, that of twice the span follows at once.
+
+    Args:
+        step: A, shape (2n, 2n).
+        start: x_0, shape (2n,).
+        forcing: f_k, shape (count, 2n), count ≥ 1; the last row would lead beyond the end and is
+            not used. Not changed.
+
+    Returns:
+        Shape (count, 2n).
     """
     states = np.vstack([start, forcing[:-1]])
     span = 1
@@ -229,11 +280,14 @@ def _taylor(flow: Array, degree: int, rows: Array, states: Array, times: Array) 
     """Return outputs by the Taylor series of exp(F τ) within substeps, shape (T, m).
 
     Args:
-        flow: F, shape (2n + 4, 2n + 4), of the states and of four numbers of the load.
+        flow: F times a substep, shape (2n + 4, 2n + 4), of the 2n states and of four numbers of the
+            load, g sin θ, g cos θ, r sin θ and r cos θ.
         degree: Degree of the series.
         rows: Rows of the outputs on the states, shape (m, 2n).
-        states: States and numbers of the load at the beginning of each substep, (count, 2n + 4).
-        times: Times in substeps, shape (T,).
+        states: States and numbers of the load at the beginning of each substep, shape (count, 2n +
+            4).
+        times: Times in substeps, at least one, shape (T,); those after the last substep continue
+            its series.
     """
     series = [np.hstack([rows, np.zeros((len(rows), 4))])]
     for i in range(1, degree + 1):

@@ -27,13 +27,20 @@ it; tuned: a larger one would declare larger errors."""
 
 
 def step_error(flow: UnitFlow) -> Array:
-    """Return the estimated time-stepping error of each output up to each node, shape (T, m).
+    """Return the estimated time-stepping error of each output up to each time node, shape (T, m).
 
-    It is `MARGIN` times the largest error (`Flow.deviations`) at nominal values and corners.
+    It is 1.5 times the largest distance from more accurate trajectories at nominal values and
+    corners of the inputs, up to this node; 0 for a flow that is exact but for rounding. It is an
+    estimate and not a bound.
+
+    Args:
+        flow: The response of a structure as a function of its inputs, with T time nodes and m
+            outputs.
 
     Raises:
-        StepError: The error of an output exceeds ten times its peak: the scheme has left the
-            trajectory.
+        StepError: The error of an output exceeds ten times its peak, so that the scheme has left
+            the trajectory; or a step did not converge.
+        RefusedError: A trajectory does not exist, or is not finite.
     """
     if flow.flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
@@ -48,13 +55,17 @@ def step_error(flow: UnitFlow) -> Array:
 
 
 def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
-    """Return the envelope of a flow's trajectories with the time-stepping error in its errors.
+    """Return the envelope of time-stepped trajectories with the time-stepping error in its errors.
 
-    The fact `step_error` is the largest time-stepping error of a displacement.
+    The error is the larger one of `steps` and of the estimate at inputs that attain bounds. A new
+    envelope is returned; its fact "step_error" is the largest time-stepping error of the outputs in
+    the unit of the reference output, the first displacement, and "estimated_error" the largest of
+    all errors in comparison with the scale of tolerances, unless its bounds are merely attained
+    values.
 
     Args:
         bounds: Envelope of the trajectories of the scheme.
-        flow: The trajectories.
+        flow: The trajectories as functions of the inputs.
         steps: Time-stepping error from `step_error`, shape (T, m).
 
     Raises:
@@ -75,12 +86,19 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
 
 
 def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
-    """Return the time-stepping error as `step_error` does, at inputs that attain bounds, (T, m).
+    """Return the estimated time-stepping error at inputs that attain bounds of an envelope, (T, m).
 
-    Corners alone do not suffice. Between them a structure may resonate, which the scheme does at
-    other parameters than the exact trajectory, or a trajectory may pass near an unstable
-    equilibrium. Of a system that is not linear the peaks are compared with a method of another
-    kind, too.
+    It is 1.5 times the largest error up to each node. Corners alone do not suffice. Between them a
+    structure may resonate, which the scheme does at other parameters than the exact trajectory, or
+    a trajectory may pass near an unstable equilibrium. Of a system that is not linear the peaks are
+    compared with a method of another kind, too.
+
+    Args:
+        bounds: The envelope, which names inputs for each level, time node and output.
+        flow: Trajectories by the time-stepping scheme.
+
+    Raises:
+        StepError: The step is too coarse at inputs that attain a peak.
     """
     d = len(bounds.inputs)
     inputs = np.stack([bounds.lower_at, bounds.upper_at])  # (2, A, T, m, d)
@@ -99,11 +117,18 @@ def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
 
 
 def _distance_from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
-    """Return the largest distance of trajectories at points (S, d) from reference ones, (T, m).
+    """Return the largest distance of trajectories from those of a reference method, shape (T, m).
+
+    Args:
+        bounds: The envelope, for its T time nodes.
+        flow: The trajectories by the time-stepping scheme.
+        points: Inputs of S ≥ 1 trajectories, shape (S, d), in SI units, in the order of
+            `flow.names`.
 
     Raises:
         StepError: A trajectory is off by more than a fiftieth of the output's peak. Bounds are then
             attained by other trajectories than those they name.
+        FailedError: The reference method does not reach the last time.
     """
     inputs = []
     for point in points:
@@ -123,7 +148,16 @@ def _distance_from_reference(bounds: Envelope, flow: LagrangianFlow, points: Arr
 
 
 def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
-    """Return the envelope with an estimate of `between`, if it has no guaranteed one."""
+    """Return the envelope with an estimate of how far outputs leave lines between time nodes.
+
+    An envelope that has guaranteed bounds of this, `between`, is returned as it is. The estimate is
+    taken at nominal values and corners of the inputs and halfway between these; the fact
+    "between_nodes" is its largest value in comparison with the scale of tolerances.
+
+    Args:
+        bounds: The envelope.
+        flow: Its trajectories as functions of the inputs.
+    """
     if bounds.between is not None:
         return bounds
     corners = flow.boxes.probes
@@ -134,21 +168,21 @@ def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
 
 
 def node_deviation(flow: Flow, points: Array) -> Array:
-    """Estimate the distance of outputs from straight lines between nodes.
+    """Estimate the distance of outputs from straight lines between time nodes.
 
-    It is `MARGIN` times the largest distance in the step and its neighbours, and in any step a
-    tenth of the largest of all steps at least: where some trajectories are straight, others may
-    bend.
+    It is 1.5 times the largest distance in the step and its neighbours, and in any step a tenth of
+    the largest of all steps at least: where some trajectories are straight, others may bend.
 
     In a step in which a force jumps, so does an acceleration. It is far from the straight line
     then, but hardly beyond its values at both ends: there the distance beyond these is taken.
 
     Args:
-        flow: The trajectories.
-        points: Parameters of some of them, shape (S, d), in SI units.
+        flow: The trajectories, with T ≥ 2 nodes and m outputs.
+        points: Parameters of some of them, shape (S, d), S ≥ 1, in SI units.
 
     Returns:
-        Shape (T, m). Row j belongs to the step that ends at node j; the first one is 0.
+        Shape (T, m), in the units of the outputs. Row j belongs to the step that ends at node j;
+        the first one is 0.
     """
     finer, substeps = flow.finer()
     deviation: Array = np.zeros((len(flow.time) - 1, len(flow.outputs)))
@@ -176,7 +210,18 @@ class _Distances(NamedTuple):
 
 
 def _distances_within_steps(fine: Array, substeps: int) -> _Distances:
-    """Return the distances of trajectories at finer nodes, `fine` of shape (S, finer nodes, m)."""
+    """Return the largest distances of trajectories from what their values at nodes say.
+
+    Args:
+        fine: Trajectories at finer nodes, shape (S, (T − 1) substeps + 1, m); every `substeps`-th
+            is a time node.
+        substeps: Finer steps in a step between two of T nodes, at least 2.
+
+    Returns:
+        Over all S trajectories and finer nodes inside a step, shape (T − 1, m) each: `from_chord`,
+        the distance from the straight line through both ends; and `beyond_ends`, how far they lie
+        above the larger or below the smaller of the values at both ends, 0 at least.
+    """
     ends = fine[:, ::substeps]
     begin = ends[:, :-1]
     end = ends[:, 1:]
@@ -202,7 +247,18 @@ class _FedThrough(NamedTuple):
 
 
 def _fed_through(flow: Flow, points: Array) -> _FedThrough:
-    """Return what forces add to outputs at once, at any of the parameters (S, d)."""
+    """Return what forces add to accelerations at once, at any of some parameter sets.
+
+    Args:
+        flow: The trajectories, with T time nodes and m outputs.
+        points: Parameter sets, shape (S, d), in SI units.
+
+    Returns:
+        `histories` of the H distinct loads; `amplitude`, the largest magnitude over the sets that a
+        unit of each adds to each output, shape (H, 1, m); and `jumps`, whether each jumps within a
+        step or at its end, shape (H, T − 1). H is 0 where the system has no matrices or no output
+        takes a force at once.
+    """
     histories = list[History]()
     amplitude = np.zeros((0, 1, len(flow.outputs)))
     if has_matrices(flow.system):
@@ -217,13 +273,15 @@ def _fed_through(flow: Flow, points: Array) -> _FedThrough:
 
 
 def _fed_between(fed: _FedThrough, time: Array, substeps: int) -> Array:
-    """Return what forces add to outputs between finer nodes, shape (steps, m).
+    """Return what forces add to outputs between finer time nodes, shape (steps, m).
 
-    A force may be zero at all of these and not between them.
+    A force may be zero at all of these and not between them. In a step in which it jumps, what it
+    exceeds its values at both ends by is taken, else its distance from a straight line.
 
     Args:
-        fed: What the forces add.
-        time: Finer nodes, in s.
+        fed: Histories of the forces, the magnitudes that a unit of each adds to outputs, shape
+            (forces, 1, m), and in which steps each jumps, shape (forces, steps).
+        time: Finer nodes, shape (steps · substeps + 1,), in s.
         substeps: Number of finer steps in a step.
     """
     steps = (len(time) - 1) // substeps
@@ -239,22 +297,24 @@ def _fed_between(fed: _FedThrough, time: Array, substeps: int) -> Array:
 def reference_motions(
     system: LagrangianSystem, points: Sequence[Mapping[str, float]], times: Array
 ) -> Array:
-    """Return outputs of reference trajectories, to test time steps with.
+    """Return outputs of trajectories by a reference method, to test time steps with.
 
     Hamilton's equations in coordinates q and momenta π are integrated by Dormand and Prince's
     method of order 8 (Hairer, Nørsett, Wanner 1993), with SymPy's own functions: it shares neither
-    scheme nor compiled code with the midpoint rule that it judges.
+    scheme nor compiled code with the midpoint rule that it judges. Steps have a relative tolerance
+    of 1e-11.
 
     Args:
-        system: The system.
-        points: Parameters by name of S trajectories.
-        times: Times from the start, shape (T,), in s.
+        system: The system, given by its Lagrangian.
+        points: Values of all parameters by name, in SI units, for each of S trajectories.
+        times: Times from the start on, rising, shape (T,), in s.
 
     Returns:
-        Shape (S, T, m).
+        Shape (S, T, m), in the order of `system.outputs`.
 
     Raises:
         FailedError: The integration does not reach the last time.
+        KeyError: A parameter of the system is missing in `points`.
     """
     import sympy
     from scipy.integrate import solve_ivp
