@@ -58,7 +58,11 @@ class Block:
         return self._with_models(lambda model: model.embedded(used, inputs))
 
     def _with_models(self, change: Callable[[TaylorModel], TaylorModel]) -> Block:
-        """Return the block with each of its Taylor models changed in the same way."""
+        """Return the block of the same modes with each of its four Taylor models changed.
+
+        Args:
+            change: Function from the present to the new model, such as one that truncates it.
+        """
         return Block(
             modes=self.modes,
             eigenvalue_block=change(self.eigenvalue_block),
@@ -130,20 +134,22 @@ KEPT_LOCK = Lock()
 def narrowest_block(
     block: Ints, rotation: Array, centre: CentredMatrices, tolerance: float
 ) -> Block | None:
-    """Enclose a block of modes by series of the lowest degree that meets a tolerance.
+    """Enclose a block of modes over the box, by series of the lowest degree that meets a tolerance.
 
-    Enclosures are kept: those of the same matrices serve all levels and records that differ in
-    damping or loads alone.
+    A block spans an invariant subspace K X = M X L of p modes; its enclosure is a polynomial of X
+    and L with a proved remainder. Enclosures are kept for the whole process, under a lock: those of
+    the same matrices serve all levels and records that differ in damping or loads alone.
 
     Args:
-        block: Numbers of its modes, shape (p,).
-        rotation: Rotation of the shapes in the rows of the block, shape (p, p).
-        centre: M and K.
-        tolerance: Relative error bound of L and N that suffices.
+        block: Indices of its modes from the lowest on, rising, shape (p,).
+        rotation: Orthogonal matrix, shape (p, p): X at the midpoint of the box, in the rows of the
+            block.
+        centre: M and K as Taylor models, diagonal at the midpoint.
+        tolerance: Relative error bound of L and of the modal masses that suffices.
 
     Returns:
-        The enclosure, that of the last degree tried if none meets the tolerance. None if its
-        relative error exceeds .05, a tuned number.
+        The enclosure, that of the last degree tried if none meets the tolerance. None if no degree
+        gives one, or if its relative error is .05 (a tuned number) or more.
     """
     largest_error = 0.05
     # With a relative error of 3e-4 no higher degree is tried; this is tuned.
@@ -175,17 +181,23 @@ def narrowest_block(
 def subspace_series(
     block: Ints, degree: int, centre: CentredMatrices, lower: SubspaceSeries | None = None
 ) -> SubspaceSeries:
-    """Return the perturbation series of an invariant subspace K X = M X L.
+    """Return the perturbation series of an invariant subspace K X = M X L of p modes.
 
     X is the identity in the rows of the block. Let Λ and M₀ be the diagonals of K and M at the
-    midpoint. In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees; the rows
-    of the block give L, and the others x_j.
+    midpoint of the box. In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower
+    degrees; the rows of the block give L, and the others x_j. The polynomials have no bound of
+    their error.
 
     Args:
-        block: Numbers of its modes, shape (p,).
+        block: Indices of its modes from the lowest on, shape (p,). No other mode may have one of
+            their eigenvalues at the midpoint.
         degree: Degree of the series.
-        centre: M and K.
-        lower: The same series to a lower degree, which need not be made anew.
+        centre: M and K as Taylor models of shape (n, n), diagonal at the midpoint.
+        lower: The same series to a lower degree, which need not be made anew; not changed.
+
+    Returns:
+        Coefficients by degree from 0: of Lᵀ (monomials, p, p), of x_j as rows (monomials, p, n),
+        and of M x_j (monomials, p, n).
     """
     mass = centre.mass
     stiffness = centre.stiffness
@@ -231,11 +243,26 @@ class SubspaceEquations(NamedTuple):
     difference: Array  # |L̃_jj − L̃_ii|, (p, p)
 
     def right_sides(self, Y: Array, E: Array) -> RightSides:
-        """Return bounds for all Z and D with |Zᵀ| ≤ `Y` (p, n) and |Dᵀ| ≤ `E` (p, p).
+        """Return bounds of the right sides of the equations for the error of an invariant subspace.
 
-        They also bound how fast the right sides change: where Z and D change by at most θ Y and
-        θ E, the right sides change by at most θ times the bounds. This takes twice the products of
-        the unknowns, since |D Z − D′ Z′| ≤ |D − D′| |Z| + |D′| |Z − Z′|.
+        With K (X̃ + Z) = M (X̃ + Z)(L̃ + D), series X̃ and L̃ of p modes and their errors Z and D,
+        the equations are, column by column, o being the rows of all other modes,
+
+            (K − L̃_jj M)_oo Z_j = −R_j + Σ_i D_ij (M X̃_i)_o + Σ_i (D_ij + F_ij) M_oo Z_i,
+            N D = X̃ᵀR + RᵀZ + L̃ᵀW − W L̃ − W D,    N = X̃ᵀM X̃,  W = X̃ᵀM Z,
+
+        with the residual R and F = L̃ off its diagonal. The bounds also say how fast the right
+        sides change: where Z and D change by at most θ Y and θ E, these change by at most θ times
+        the bounds. This takes twice the products of the unknowns, since |D Z − D′ Z′| ≤ |D − D′|
+        |Z| + |D′| |Z − Z′|.
+
+        Args:
+            Y: Bound of |Zᵀ|, shape (p, n).
+            E: Bound of |Dᵀ|, shape (p, p).
+
+        Returns:
+            `of_shapes`, for the first equation with its modes as rows, shape (p, n), and
+            `of_eigenvalues`, for the transposed second one, shape (p, p).
         """
         R, X, MX, M, F, difference = self
         of_shapes = R + E @ MX + (F + 2 * E) @ Y @ M
@@ -343,10 +370,15 @@ def _polynomial(parts: list[Array], inputs: int) -> TaylorModel:
 def max_eigenvalue_decrease(matrix: TaylorModel, scale: Array, *, sign: float) -> float:
     """Bound over the box how far eigenvalues of sign × S (A(u) − A(0)) S fall below 0.
 
+    A result c says that sign × S (A(u) − A(0)) S ≥ −c as a quadratic form, for all u of the box.
+
     Args:
-        matrix: A, symmetric, shape (n, n).
-        scale: Diagonal of S, shape (n,).
+        matrix: A, symmetric, shape (n, n), a Taylor model over the box |u_i| ≤ 1.
+        scale: Diagonal of S, shape (n,), not negative.
         sign: 1 or −1.
+
+    Returns:
+        A bound ≥ 0, rounding included; 0 if n is 0.
     """
     if not len(scale):
         return 0.0
@@ -371,10 +403,14 @@ def _norm_of_magnitudes(terms: Array) -> float:
 
 
 def _norm_over_box(terms: Array) -> float:
-    """Bound ‖Σ_i u_i V_i‖₂ over the box |u_i| ≤ 1, for symmetric V_i = `terms` (d, n, n).
+    """Bound ‖Σ_i u_i V_i‖₂ over the box |u_i| ≤ 1.
 
     The norm is convex in u, so its maximum is at a corner. All signs of the ten largest V_i are
-    tried, 2⁹ corners; the other V_i count by their absolute values.
+    tried, 2⁹ corners; the other V_i count by their absolute values. Where the sum of all absolute
+    values is at most .1 it is returned at once.
+
+    Args:
+        terms: Symmetric V_i, shape (d, n, n).
     """
     by_sum = _norm_of_terms(terms, np.zeros(len(terms), bool))
     if by_sum <= 0.1:  # sharp enough: only its distance from 1 matters
@@ -391,11 +427,18 @@ def _norm_over_box(terms: Array) -> float:
 
 
 def _norm_of_terms(terms: Array, is_square: Mask) -> float:
-    """Return ‖Σ_α |V_α|‖₂ of symmetric V_α = `terms` (K, n, n).
+    """Return ‖Σ_α |V_α|‖₂, a bound of the change of eigenvalues by Σ_α u^α V_α for |u_i| ≤ 1.
 
-    |V| has the absolute values of the eigenvalues of V and its eigenvectors. Where `is_square` (K,)
-    is true, u^α is a square u_i² ≥ 0: only the negative part of V lowers eigenvalues then, and is
-    taken instead.
+    |V| has the absolute values of the eigenvalues of V and its eigenvectors, so that −|V| ≤ V ≤
+    |V|.
+
+    Args:
+        terms: Symmetric V_α, shape (K, n, n).
+        is_square: Whether u^α is a square u_i² ≥ 0, shape (K,). Only the negative part of V lowers
+            eigenvalues then, and is taken in the place of |V|.
+
+    Returns:
+        0 if all terms are zero.
     """
     is_nonzero = terms.any(axis=(1, 2))
     if not is_nonzero.any():
@@ -422,7 +465,19 @@ class SolutionBounds:
 
     @classmethod
     def over_box(cls, matrix: TaylorModel) -> SolutionBounds:
-        """Prepare the bounds for a matrix that is diagonal at the midpoint, without zeros there.
+        """Prepare bounds, over a box of inputs, of the solutions y of A y = r.
+
+        Two bounds are computed, each of which may fail: of |A⁻¹| entry by entry, and a number b
+        with |D^-½ r| ≥ b |D^½ y| for the magnitudes D of the diagonal of A at the midpoint.
+
+        Args:
+            matrix: Symmetric A, shape (n, n), a Taylor model over the box |u_i| ≤ 1. At the
+                midpoint it is diagonal, without zeros there; the entries may have either sign.
+
+        Returns:
+            `abs_diagonal` D (n,), `radius`, a bound of |A(u) − A(0)| (n, n), `inverse_bound` (n,
+            n), or None where Neumann's series may diverge, and `min_eigenvalue` b, which is useful
+            if positive.
 
         Raises:
             numpy.linalg.LinAlgError: The matrix is singular at the midpoint.
@@ -454,7 +509,15 @@ class SolutionBounds:
         return self.inverse_bound is not None or self.min_eigenvalue > 0
 
     def solution_bounds(self, right: Array) -> Array:
-        """Return bounds of |y|, (n,), for all solutions of A y = r with |r| ≤ `right`, (n,)."""
+        """Return bounds of |y| for all solutions of A y = r, over a box of symmetric matrices A.
+
+        Args:
+            right: Bound of |r|, shape (n,), not negative.
+
+        Returns:
+            Shape (n,); all infinite where neither prepared bound of A⁻¹ exists and a diagonal entry
+            of A may be zero.
+        """
         y: Array = np.full(len(right), np.inf)
         if self.min_eigenvalue > 0:
             scale = self.abs_diagonal**-0.5

@@ -109,10 +109,17 @@ def enclose_subspaces(
 
 
 def _decreases(centre: CentredMatrices, steepest_input: int) -> tuple[float, float]:
-    """Return μ and κ with |M − M(0)| ≤ μ M(0) and |K − K(0)| ≤ κ K(0) as quadratic forms.
+    """Return μ and κ with |M − M(0)| ≤ μ M(0) and |K − K(0)| ≤ κ K(0) over the box.
+
+    The inequalities are those of quadratic forms.
+
+    Args:
+        centre: Mass M and stiffness K as Taylor models that are diagonal at the midpoint.
+        steepest_input: Index of the input that changes eigenvalues most, for the error.
 
     Raises:
-        UnprovedError: One of both is not below 1; `steepest_input` is named as the one to bisect.
+        UnprovedError: One of both is not below 1. Its attribute `along` is `steepest_input`, as the
+            input to bisect.
     """
     mass_scale = centre.has_mass
     stiffness_scale = np.diag(centre.stiffness.value) ** -0.5
@@ -134,14 +141,16 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
     """Return M and K in coordinates that make both diagonal at the midpoint of the box.
 
     Unknowns b without mass follow the others a there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates
-    of their own, in which K is as large as the largest eigenvalue.
+    of their own, in which K is as large as the largest eigenvalue. The first coordinates are the
+    modes with mass, by rising eigenvalues.
 
     Args:
-        mass: M, shape (n, n). Its rows are zero where unknowns have no mass.
-        stiffness: K, shape (n, n).
+        mass: M, a Taylor model of shape (n, n). Its rows are zero where unknowns have no mass.
+        stiffness: K, shape (n, n), in the same inputs.
 
     Returns:
-        The matrices as functions of the inputs that M or K depends on, and the numbers of these.
+        The matrices as functions of the inputs that M or K depends on, of one input if they depend
+        on none; and the indices of these inputs, rising.
 
     Raises:
         UnprovedError: The structure can move rigidly, or is unstable, at the midpoint.
@@ -179,9 +188,13 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
 
 
 def _with_midpoint(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
-    """Return a matrix that is diagonal at the midpoint, where it was so but for rounding.
+    """Return a matrix that is exactly diagonal at the midpoint, where it was so but for rounding.
 
-    The difference, shape (n, n), is added to the remainder.
+    The difference is added to the remainder, so that the Taylor model contains the same matrices.
+
+    Args:
+        matrix: Taylor model of shape (n, n).
+        diagonal: The diagonal at the midpoint, shape (n,).
     """
     midpoint = np.diag(diagonal)
     remainder = matrix.remainder + np.abs(matrix.value - midpoint)
@@ -198,7 +211,12 @@ def _require_stiff(eigenvalues: Array, scale: Array) -> None:
 def _couplings(centre: CentredMatrices, modes: Ints) -> Array:
     """Return first-order changes over the box of K − λ M between some modes, shape (d, p, p).
 
-    λ is the mean of the eigenvalues of both modes.
+    λ is the mean of the eigenvalues of both modes. Entry (i, j, k) is the change from the midpoint
+    to the end u_i = 1 of input i, in 1/s²; for j = k it is that of the eigenvalue of mode j.
+
+    Args:
+        centre: M and K as Taylor models of d inputs, diagonal at the midpoint of the box.
+        modes: Indices of p modes, shape (p,).
     """
     rows = modes[:, np.newaxis]
     stiffness = centre.stiffness.homogeneous_part(1)[:, rows, modes]
@@ -215,6 +233,11 @@ def _nearness(centre: CentredMatrices, couplings: Array) -> Array:
     distance of both at the midpoint. From 1 on two modes may meet at complex inputs of magnitude up
     to 1, and their series diverge. It is infinite for modes of equal frequencies, which have no
     shapes of their own, whether their frequencies separate in the box or not.
+
+    Args:
+        centre: The eigenvalues λ at the midpoint, rising, shape (modes,).
+        couplings: First-order changes of K − λ M between the modes by each input, shape (d, modes,
+            modes).
     """
     slopes = np.diagonal(couplings, axis1=1, axis2=2).T
     of_slopes = np.abs(slopes[:, np.newaxis] - slopes).sum(axis=-1)
@@ -231,10 +254,12 @@ def _nearness(centre: CentredMatrices, couplings: Array) -> Array:
 def _linked(pairs: Mask, modes: Ints, free: Ints) -> Ints:
     """Return the free modes that are linked to some modes, directly or through others, rising.
 
+    The given modes are among them, whether free or not.
+
     Args:
-        pairs: Which modes are linked to which, shape (modes, modes).
-        modes: Numbers of the modes to begin with.
-        free: Numbers of the free modes.
+        pairs: Which modes are linked to which, shape (modes, modes), symmetric.
+        modes: Indices of the modes to begin with, without repetitions.
+        free: Indices of the modes that may be added.
     """
     while True:
         neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(axis=0)))
@@ -249,7 +274,15 @@ def rotation(centre: CentredMatrices, modes: Ints) -> Array:
 
     It is the joint diagonalisation of K − λ M at the midpoint and of its derivatives by all inputs,
     by Jacobi rotations (Cardoso, Souloumiac 1996). So modes that cross keep their shapes at the
-    crossing. Any rotation gives valid enclosures.
+    crossing. Any rotation gives valid enclosures: nothing rests on the convergence of at most 12
+    sweeps. For p = 1 it is [[1]].
+
+    Args:
+        centre: M and K as Taylor models, diagonal at the midpoint of the box.
+        modes: Indices of the modes, shape (p,).
+
+    Returns:
+        Orthogonal matrix; its column j is the j-th new mode in the present ones.
     """
     p = len(modes)
     at_midpoint = np.diag(centre.eigenvalues[modes])

@@ -129,14 +129,21 @@ class DampedModes:
 
     @classmethod
     def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:
-        """Return series of some modes about the midpoint of the box.
+        """Return series of some modes about the midpoint of the box, for each source.
 
         Args:
-            structure: The structure.
-            chosen: Numbers of the modes by rising |λ|, shape (n,).
+            structure: The structure as Taylor models over the box: N unknowns and S sources.
+            chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ > 0 by
+                rising |λ|.
+
+        Returns:
+            Polynomials of the eigenvalues λ (n,), of the displacements φ (S, n, N), scaled so that
+            the response to a unit of the source is 2 Re Σ φ exp(λ t), and of the velocities λ φ,
+            shape (S, n, N).
 
         Raises:
-            UnprovedError: One of them does not oscillate, or has the frequency of another one.
+            UnprovedError: One of them does not oscillate, or has the frequency of another one, from
+                which the inputs separate it.
         """
         eigenvalue, shape = _eigen_series(structure, chosen)
         force = shape @ structure.impulses
@@ -168,13 +175,15 @@ def needed_modes(
     the midpoint of the box; what is left out counts as an error of the initial state in the proof.
 
     Args:
-        structure: The structure.
-        loads: Histories of all sources but the initial state.
+        structure: The structure, whose sources are the initial state and then these loads.
+        loads: Histories of all sources but the initial state, in their order.
         time: Time nodes, shape (T,), in s.
-        tolerance: Allowed error of each output by all omitted modes together, shape (m,).
+        tolerance: Allowed error of each output by all omitted modes together, shape (m,), or one of
+            all. At 0 all modes are needed that add anything.
 
     Returns:
-        Their numbers by rising |λ|, shape (n,); one at least.
+        Their indices among the modes with Im λ ≥ 0, which are ordered by rising |λ| with those that
+        oscillate first; rising, shape (n,), one at least.
     """
     modes = _midpoint_modes(structure)
     rate = modes.eigenvalue
@@ -209,7 +218,20 @@ class _MidpointModes(NamedTuple):
 
 
 def _midpoint_modes(structure: DampedStructure) -> _MidpointModes:
-    """Return the modes at the midpoint, where M = 1 and K = diag(ω²)."""
+    """Return all 2N modes of a damped structure at the midpoint of the box: M = 1, K = diag(ω²).
+
+    Modes of equal eigenvalues that oscillate get shapes that are orthogonal in the sense φ_iᵀ (2 λ
+    + D) φ_j = 0.
+
+    Args:
+        structure: N unknowns in coordinates with this mass and stiffness at the midpoint; D is its
+            damping there.
+
+    Returns:
+        `eigenvalue` λ (2N,), those with Im λ > 0 first, then real ones, then conjugates, each by
+        rising |λ|; `shape` φ as rows of unit length (2N, N); and `norm` φᵀ (2 λ + D) φ (2N,), which
+        is about 0 where the mode is defective.
+    """
     omega = structure.omega
     n = len(omega)
     D = structure.damping.value
@@ -237,14 +259,21 @@ def norm_of(vectors: Array) -> Array:
 
 
 def _eigen_series(structure: DampedStructure, chosen: Ints) -> tuple[TaylorModel, TaylorModel]:
-    """Return series of λ (n,) and φ (n, N) with (λ² M + λ D + K) φ = 0, about the midpoint.
+    """Return series about the midpoint of λ, shape (n,), and φ, shape (n, N), of n damped modes.
 
-    In degree m, (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known from lower degrees, and
-    φ₀* φ_m = 0 is chosen.
+    They solve (λ² M + λ D + K) φ = 0 degree by degree, without a bound of their error. In degree m,
+    (λ₀² M₀ + λ₀ D₀ + K₀) φ_m + λ_m (2 λ₀ M₀ + D₀) φ₀ is known from lower degrees, and φ₀* φ_m = 0
+    is chosen.
+
+    Args:
+        structure: M, D and K as Taylor models of N unknowns.
+        chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ > 0 by
+            rising |λ|.
 
     Raises:
         UnprovedError: One of the modes does not oscillate, or modes of equal eigenvalues are
             separated by the inputs.
+        numpy.linalg.LinAlgError: A mode is defective at the midpoint.
     """
     M = structure.mass
     D = structure.damping
@@ -296,10 +325,23 @@ class _BorderedInverse(NamedTuple):
 def _bordered_inverse(
     structure: DampedStructure, modes: _MidpointModes, k: int
 ) -> _BorderedInverse:
-    """Return the bordered inverse at the eigenvalue of mode number k, at the midpoint.
+    """Return rows of the inverse of λ² M + λ D + K, bordered by its modes, at one eigenvalue.
 
-    The matrix λ² M + λ D + K is singular at an eigenvalue. Bordered by the shapes of all g modes of
-    this eigenvalue it is regular.
+    The matrix is singular at an eigenvalue. Bordered by the shapes φ of all g modes of this
+    eigenvalue, as rows φ* below and columns (2 λ M + D) φ beside, it is regular. All is taken at
+    the midpoint of the box.
+
+    Args:
+        structure: M, D and K of N unknowns.
+        modes: All modes at the midpoint.
+        k: Index of the mode.
+
+    Returns:
+        `inverse`, the rows for the shape and for the eigenvalue of the mode, shape (N + 1, N); and
+        `couplings`, those for the other modes of the same eigenvalue, shape (g − 1, N).
+
+    Raises:
+        numpy.linalg.LinAlgError: The bordered matrix is singular, since a mode is defective.
     """
     x = modes.eigenvalue[k]
     M = structure.mass.value
@@ -328,10 +370,19 @@ def _equal_modes(rates: Array, k: int) -> Ints:
 
 
 def _orthogonal_shapes(shape: Array, rate: complex, D: Array) -> Array:
-    """Return shapes φ of modes of one eigenvalue λ with φ_iᵀ (2 λ + D) φ_j = 0 for i ≠ j.
+    """Return shapes φ of g modes of one eigenvalue λ with φ_iᵀ (2 λ + D) φ_j = 0 for i ≠ j.
 
-    They span the same space as the rows of `shape` (g, N), and follow from Takagi's form V S Vᵀ of
-    the complex symmetric matrix of this bilinear form (Horn, Johnson 2013, section 4.4).
+    They span the same space as the given ones, have unit length, and follow from Takagi's form V S
+    Vᵀ of the complex symmetric matrix of this bilinear form (Horn, Johnson 2013, section 4.4). The
+    mass is 1.
+
+    Args:
+        shape: Linearly independent shapes as rows, complex, shape (g, N).
+        rate: λ, in 1/s.
+        D: Damping, symmetric, shape (N, N).
+
+    Returns:
+        Shape (g, N).
     """
     g = len(shape)
     basis = np.linalg.qr(shape.T)[0]
@@ -358,10 +409,15 @@ def _reciprocal(x: TaylorModel) -> TaylorModel:
 
 
 def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:
-    """Check that a structure is known to lose energy everywhere in the widest of some boxes.
+    """Check that a structure is known to lose energy everywhere in the widest of some nested boxes.
+
+    Args:
+        system: The structure.
+        boxes: Boxes of its inputs, the widest one first.
 
     Raises:
-        UnprovedError: A parameter leaves its range, or see `LinearSystem.require_dissipation`.
+        UnprovedError: A parameter leaves the range in which it has a meaning, unknowns have no
+            mass, or a term of the damping may feed energy into the structure.
     """
     lowest = dict(system.parameters)
     for name, low, high in zip(boxes.names, boxes.lower[0], boxes.upper[0], strict=True):

@@ -15,10 +15,10 @@ from alphacut.frame.calculus.unproved import UnprovedError
 
 
 def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> TaylorModel:
-    """Enclose X = M # K over the box, shape (n, n), by Brouwer's theorem.
+    """Enclose the geometric mean X = M # K over the box, shape (n, n), by Brouwer's theorem.
 
-    X = X̃ + E with the series X̃. With W = M⁻¹, P = X̃ W − diag(ω) and Δ = K − X̃ W X̃ the remainder
-    E obeys
+    It is the positive definite X with X M⁻¹ X = K. Let X = X̃ + E with the series X̃ of X about the
+    midpoint. With W = M⁻¹, P = X̃ W − diag(ω) and Δ = K − X̃ W X̃ the remainder E obeys
 
         (ω_i + ω_j) E_ij = (Δ − E Pᵀ − P E − E W E)_ij.
 
@@ -31,10 +31,11 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
     Args:
         mass: M, shape (n, n), at the midpoint of the box the identity but for rounding.
         stiffness: K, at the midpoint diag(ω²) but for rounding. Both are positive definite.
-        omega: ω, shape (n,).
+        omega: ω, shape (n,), positive.
 
     Raises:
-        UnprovedError: The box is so wide that no bound gives itself back.
+        UnprovedError: The box is so wide that no bound gives itself back, or that M may be
+            singular.
     """
     sums = omega[:, np.newaxis] + omega
     inverse_mass = solve(mass, mass.like(np.eye(len(omega))))
@@ -70,7 +71,7 @@ def right_side_bound(defect: Array, coupling: Array, *, inverse_mass: Array, bou
         defect: Bound of |Δ|, shape (n, n), as all others.
         coupling: Bound of |P|.
         inverse_mass: Bound of |W|.
-        bound: Symmetric.
+        bound: Bound of |E|, symmetric.
     """
     of_coupling = coupling @ bound
     of_unknowns = 2 * bound @ inverse_mass @ bound
@@ -78,9 +79,17 @@ def right_side_bound(defect: Array, coupling: Array, *, inverse_mass: Array, bou
 
 
 def _series(inverse_mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> TaylorModel:
-    """Return the series X̃ of X W X = K about the midpoint, where W = 1, without a remainder.
+    """Return the series X̃ of X W X = K about the midpoint of the box, without a bound of its error.
 
     In degree m, (ω_i + ω_j) X_ij is that of K less what lower degrees of X give.
+
+    Args:
+        inverse_mass: W, a Taylor model of shape (n, n); at the midpoint the identity.
+        stiffness: K, shape (n, n); at the midpoint diag(ω²).
+        omega: ω, shape (n,), positive.
+
+    Returns:
+        Polynomials of shape (n, n) up to the order of K, with a remainder of zero.
     """
     d = inverse_mass.inputs
     sums = omega[:, np.newaxis] + omega

@@ -60,7 +60,19 @@ class Oscillator:
         return [self.omega, self.decay, self.quotient, self.participation]
 
     def on_subbox(self, models: Sequence[TaylorModel]) -> Oscillator:
-        """Return the oscillator over a sub-box, given its `models` there."""
+        """Return the oscillator over a sub-box of the box of the inputs.
+
+        Its ranges are the intersections of those of the whole box with those of the models over the
+        sub-box.
+
+        Args:
+            models: Its models over the sub-box, four of them, in the order of the property
+                `models`: frequency ω, decay g and g/ω, scalars, and participation factors (sources,
+                m).
+
+        Raises:
+            ValueError: There are not four models.
+        """
         omega, decay, quotient, participation = models
         return Oscillator(
             omega=omega,
@@ -91,7 +103,10 @@ class BlockParticipation:
     def from_block(
         cls, block: Block, rows: TaylorModel, patterns: TaylorModel, used: Ints
     ) -> BlockParticipation:
-        """Return the participation of a block.
+        """Return how a block of p modes takes part in the response to sources.
+
+        The block has the shapes X and modal masses N = Xᵀ M X. The degree of its polynomials may be
+        lowered, so that products stay cheap; what is dropped goes into their remainders.
 
         Args:
             block: The block, as a function of the inputs of mass and stiffness alone.
@@ -99,7 +114,14 @@ class BlockParticipation:
                 constant but for rounding.
             patterns: Vectors v of the sources in the same coordinates, shape (sources, n), as
                 functions of all inputs.
-            used: Which of all inputs are those of the block.
+            used: Which of all inputs are those of the block, rising indices.
+
+        Returns:
+            r X (p, m), Xᵀ M v and N⁻¹ Xᵀ M v (p, sources) as functions of all inputs; of the inputs
+            of the block alone if no pattern depends on an input.
+
+        Raises:
+            UnprovedError: N may be singular in the box.
         """
         # The degree is the largest for which a product of two polynomials has at most 100,000 pairs
         # of coefficients, at 3 ns each. Degrees above 6 are not worth it: what is above the third
@@ -141,13 +163,24 @@ class BlockParticipation:
 def oscillators(
     structure: ClassicalStructure, participation: BlockParticipation, found: Subspaces
 ) -> list[Oscillator]:
-    """Return the oscillators of a block, one for each mode, with proved ranges.
+    """Return an oscillator for each mode of a block, with guaranteed ranges of ω and damping.
 
-    With λ = L_jj their decay is g = a/2 + b λ/2 + ζ √λ with Rayleigh's factors a and b, and their
-    frequency ω = √(λ − g²).
+    The block spans an invariant subspace K X = M X L of p modes. With λ = L_jj the decay of
+    oscillator j is g = a/2 + b λ/2 + ζ √λ with Rayleigh's factors a and b, and its frequency ω =
+    √(λ − g²). What L has off its diagonal couples the oscillators, and is bounded elsewhere.
+
+    Args:
+        structure: The structure over the box, with its damping and factors of the m outputs.
+        participation: The block and its participation in the response.
+        found: All enclosed modes, with ranges of every eigenvalue over the box.
+
+    Returns:
+        Taylor models of ω, g, g/ω and of the participation factors, shape (sources, m), in all
+        inputs, and ranges of ω and of g/ω.
 
     Raises:
-        UnprovedError: Modes of the block have different damping ratios.
+        UnprovedError: Modes of the block have different damping ratios, or a mode is not known to
+            oscillate in the whole box.
     """
     modes = participation.block.modes
     inputs = structure.initial_state.inputs
@@ -202,8 +235,20 @@ def damped_ranges(
 ) -> DampedRanges:
     """Return the ranges of ω and g/ω of some modes whose eigenvalues λ lie in [low, high].
 
+    With the decay g = a/2 + b λ/2 + ζ √λ the frequency is ω = √(λ − g²). Lower ends of a, b and ζ
+    below 0, to which remainders of Taylor models may lead, are taken as 0.
+
+    Args:
+        structure: The structure over the box, whose damping factors a, b and ζ vary in it.
+        low: In 1/s², positive.
+        high: In 1/s².
+        modes: Indices of the modes, at least one, for their damping ratios.
+
+    Returns:
+        `omega`, lower and upper end in rad/s, and `quotient`, those of g/ω.
+
     Raises:
-        UnprovedError: One of them may not oscillate.
+        UnprovedError: One of them may not oscillate, since g/√λ may reach 1.
     """
     rayleigh_low, rayleigh_high = structure.rayleigh.bounds()
     a_low, b_low = np.maximum(rayleigh_low, 0.0)
@@ -224,7 +269,19 @@ def damped_ranges(
 
 
 def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> TaylorModel:
-    """Return the vectors v of sources on the unknowns, in the order given, (sources, n)."""
+    """Return the vectors v of sources on the n unknowns, in the order given, shape (sources, n).
+
+    v is the initial displacements of "start", the initial velocities of "velocity", the
+    displacements ι under a unit displacement of the ground of "load", and the accelerations M⁻¹ b
+    of "force1", "force2", …; a mode φ of unit modal mass takes part by φ·M v.
+
+    Args:
+        structure: The structure as Taylor models over the box.
+        sources: Names of the sources, at least one.
+
+    Raises:
+        KeyError: The structure has no source of a name.
+    """
     displacements = structure.initial_state[0]
     vectors = {
         "load": displacements * 0.0 + structure.ground_pattern,
@@ -252,9 +309,13 @@ def _overlap(first: Ends, second: Ends) -> Ends:
 
 
 def _enclosing_points(points: Array, ends: Ends) -> tuple[int, int]:
-    """Return the numbers of two of some rising points that enclose a range as closely as possible.
+    """Return the indices of two of some points that enclose a range as closely as possible.
 
     A range that reaches beyond the points is enclosed up to the first or last of them.
+
+    Args:
+        points: Rising, shape (N,), N ≥ 1.
+        ends: Lower and upper end of the range.
     """
     low, high = ends
     first = int(np.searchsorted(points, low, side="right")) - 1

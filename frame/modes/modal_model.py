@@ -53,7 +53,15 @@ class ModalModel:
     def from_modes(
         cls, flow: LinearFlow, boxes: Boxes, structure: DampedStructure, modes: DampedModes
     ) -> ModalModel:
-        """Return the model with the response that modes of a structure have."""
+        """Return the model of a structure's response that some of its damped modes give.
+
+        Args:
+            flow: The structure's exact response, with T time nodes and m outputs.
+            boxes: Nested boxes of the inputs, the widest first.
+            structure: The structure as Taylor models over the widest box.
+            modes: Polynomials of n modes over this box, for each source: the initial state first,
+                then the loads in the order of `histories(flow.system)`.
+        """
         coefficients = modes.outputs(structure).polynomial  # (sources, n, m)
         loads = [
             LoadTables(history, flow.time, modes.eigenvalue, coefficients[k])
@@ -73,14 +81,19 @@ class ModalModel:
     def of_degree(
         cls, flow: LinearFlow, boxes: Boxes, degree: int, tolerance: Array | float = 0.0
     ) -> ModalModel:
-        """Return the model by polynomials of a degree over the widest of the boxes, one a level.
+        """Return the model by polynomials of one degree over the widest of some nested boxes.
 
-        Modes are left out that are worth no more than `tolerance` in each output, shape (m,).
+        Args:
+            flow: The structure's response by an exact integrator, with T time nodes and m outputs.
+            boxes: Nested boxes of the inputs, one for each α-level, the widest first.
+            degree: Total degree of the polynomials.
+            tolerance: Modes are left out that are together worth no more than this in each output,
+                shape (m,), or one number for all. At 0 no mode is left out that adds anything.
 
         Raises:
             UnprovedError: The integrator is not the exact one, the structure is not known to have a
-                mass and to lose energy, or a mode does not oscillate or has the frequency of
-                another one.
+                mass and to lose energy, a mode does not oscillate or has the frequency of another
+                one, or the mass may be singular in the box.
         """
         require_dissipation(exact_flow(flow).system, boxes)
         structure = DampedStructure.over_box(flow.system, boxes, degree)
@@ -130,9 +143,13 @@ class ModalModel:
         return models
 
     def values(self, unit: Array) -> Array:
-        """Return outputs at all nodes for unit coordinates (S, d), shape (S, T, m).
+        """Return outputs at all time nodes for S points, shape (S, T, m).
 
-        They are 2 Re Σ_k C_k w(t; λ_k) over all parts.
+        They are 2 Re Σ_k C_k w(t; λ_k) over n modes and all parts of the response, free and by
+        loads; errors of the model are not contained.
+
+        Args:
+            unit: Unit coordinates of the points, shape (S, d), in [−1, 1] over the widest box.
         """
         n = self.count
         polynomials = self.together.at(unit)
@@ -146,12 +163,16 @@ class ModalModel:
         return np.asarray(2 * (w.real @ C.real - w.imag @ C.imag))
 
     def at(self, unit: Array, node: Ints, output: Ints) -> OutputJets:
-        """Return one output at one node for each of N points.
+        """Return one output at one time node for each of N points, with derivatives by the inputs.
 
         Args:
-            unit: Unit coordinates of the points, shape (N, d).
-            node: Number of the node of each point, shape (N,).
-            output: Number of the output of each point, shape (N,).
+            unit: Unit coordinates of the points, shape (N, d), in [−1, 1] over the widest box.
+            node: Index of the time node of each point, shape (N,).
+            output: Index of the output of each point, shape (N,).
+
+        Returns:
+            `value` (N,), `gradient` (N, d) and `hessian` (N, d, d), by the unit coordinates, in the
+            units of the outputs.
         """
         n = self.count
         d = unit.shape[1]
@@ -171,14 +192,18 @@ class ModalModel:
         return OutputJets(jets[:, 0], jets[:, 1 : 1 + d], hessian)
 
     def waves(self, eigenvalues: Array, node: Ints) -> Array:
-        """Return the waves w(t; λ_k) of all parts with two derivatives by λ, at N points.
+        """Return w(t; λ), dw/dλ and d²w/dλ² of all parts of the response, for N points.
+
+        A part is the free response, w = exp(λ t), if the structure has one, or the response to a
+        load a, w = ∫ exp(λ (t − s)) a(s) ds; parts stand in this order.
 
         Args:
-            eigenvalues: λ_k, shape (N, n).
-            node: Number of the node of each point, shape (N,).
+            eigenvalues: λ of n modes, shape (N, n), in 1/s.
+            node: Index of the time node t of each point, shape (N,).
 
         Returns:
-            Shape (N, 6 parts n), in the order of `wave_factors`.
+            Real numbers, shape (N, 6 parts n). The second axis runs over parts, then w, dw/dλ,
+            d²w/dλ², then modes, then real and imaginary parts.
         """
         parts = list[Array]()
         if self.has_free_response:
@@ -191,22 +216,26 @@ class ModalModel:
 
 
 def wave_factors(eigenvalues: Array, C: Array, d: int) -> Array:
-    """Return the factors of the waves in 2 Re Σ_k C_k w(λ_k) and its first two derivatives.
+    """Return the factors of w, w′ and w″ in 2 Re Σ_k C_k w(λ_k) and its first two derivatives.
 
-    By the chain rule, with w′ = dw/dλ and derivatives by the inputs u_i as indices,
+    The eigenvalues λ_k and coefficients C_k depend on d inputs u, and w is a function of λ, such as
+    exp(λ t). By the chain rule, with w′ = dw/dλ and derivatives by the inputs u_i as indices,
 
         (C w)_i = C_i w + C λ_i w′,
         (C w)_ij = C_ij w + (C_i λ_j + C_j λ_i + C λ_ij) w′ + C λ_i λ_j w″.
 
     Args:
-        eigenvalues: λ_k with first and second derivatives by d inputs at B points, shape (q, B, n)
-            with q = 1 + d + d (d + 1)/2: value, gradient, packed Hessian.
-        C: C_k of all parts, the same, shape (q, B, parts, n, m).
+        eigenvalues: λ_k of n modes with first and second derivatives at B points, shape (q, B, n)
+            with q = 1 + d + d (d + 1)/2: value, gradient, and second derivatives by u_i and u_j for
+            i ≤ j, packed by rows.
+        C: Complex C_k of m outputs for each of several parts of the response (free, to a load, …),
+            with the same derivatives, shape (q, B, parts, n, m).
         d: Number of inputs.
 
     Returns:
-        Shape (B, m, 6 parts n, q). The third axis runs over parts, orders of the derivative of w,
-        modes, and real and imaginary parts.
+        Real numbers, shape (B, m, 6 parts n, q). The third axis runs over parts, then w, w′, w″,
+        then modes, then real and imaginary parts: its scalar product with those of w gives value
+        and derivatives of the outputs.
     """
     rate = eigenvalues[..., np.newaxis, :, np.newaxis]
     _, points, parts, n, m = C.shape

@@ -45,7 +45,15 @@ class ModalResponseModels:
     interpolation_error: Array
 
     def on_subbox(self, low: Array, high: Array) -> ModalResponseModels:
-        """Return the models over the sub-box low ≤ u ≤ high, in its own unit coordinates."""
+        """Return the models over the sub-box low ≤ u ≤ high, in its own unit coordinates.
+
+        Bounds of the coupling of oscillators and between time nodes stay those of the whole box,
+        which are valid in the sub-box, too.
+
+        Args:
+            low: Lower ends, shape (d,), not below −1.
+            high: Upper ends, shape (d,), not above 1.
+        """
         models = [x for mode in self.oscillators for x in mode.models]
         for modes in self.truncated:
             models += [modes.participation, modes.amplitude]
@@ -135,7 +143,15 @@ class ModalResponseModels:
 def inverse_with_rounding(basis: Array, *, like: TaylorModel) -> TaylorModel:
     """Return the inverse of a matrix of numbers with a bound of its rounding, shape (n, n).
 
-    It is a constant Taylor model of the inputs of the model `like`.
+    The matrix must be well conditioned: the bound takes the rounding error of the inverse to be far
+    below 1 in comparison with the inverse.
+
+    Args:
+        basis: Shape (n, n).
+        like: A Taylor model of the inputs that the result, a constant, is given as a function of.
+
+    Raises:
+        numpy.linalg.LinAlgError: The matrix is singular.
     """
     found = np.linalg.inv(basis)
     n = len(basis)
@@ -227,14 +243,15 @@ def _truncation_error(
     """Estimate the error of an output without the modes from k on, for each k, shape (n,).
 
     By Cauchy and Schwarz it is √(Σ a² Σ β²) times the radius of the range of λ^κ e over these
-    modes, where the terms of the sums are divided by λ so that together they have λ^(−2κ).
+    modes, where the terms of the sums are divided by λ so that together they have λ^(−2κ): neither
+    at κ = 0, Σ a² at ½, both at 1. It is an estimate at the midpoint of the box, and no bound.
 
     Args:
-        output_modes: Output row times mode shape a, shape (n,).
+        output_modes: Output row times mode shape a of n modes by rising frequency, shape (n,).
         participation: Participation factors β, shape (n,).
-        response: Responses e of the modes, shape (n, T).
-        eigenvalues: λ, shape (n,).
-        power: κ: 0, ½ or 1. At ½ the sum Σ a² is over λ, at 1 both sums are.
+        response: Responses e of the modes at T times, shape (n, T).
+        eigenvalues: λ, shape (n,), positive.
+        power: κ: 0, ½ or 1.
     """
     output_terms = output_modes**2 / eigenvalues ** float(power > 0)
     source_terms = participation**2 / eigenvalues ** float(power == 1)

@@ -51,11 +51,20 @@ class ClassicalStructure:
 def classical_structure(
     system: LinearSystem, parameters: Mapping[str, TaylorModel]
 ) -> ClassicalStructure:
-    """Return the structure whose parameters are scalar Taylor models, by name.
+    """Return a structure whose parameters are Taylor models, if undamped modes uncouple it.
+
+    Initial displacements contain those under static forces, and initial velocities those by
+    impulses at t = 0.
+
+    Args:
+        system: The structure.
+        parameters: Value of each of its parameters, by name, as a scalar Taylor model of the
+            inputs.
 
     Raises:
-        UnprovedError: Its modes are not known to be classical, or an output takes displacements by
-            coefficients that depend on the inputs.
+        UnprovedError: Dashpots, or damping by springs without the weights, couple the modes; an
+            output row depends on the inputs or takes displacements and velocities; or mass or
+            stiffness may be singular in the box.
     """
     assembly = system.assembly(parameters)
     if len(assembly.pattern) == 1:
@@ -95,8 +104,16 @@ def classical_structure(
 def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
     """Return the same structure of one unknown with its dashpots as damping by the mass.
 
-    With the dashpots d and the weights W, D = d + a M + b K_springs, and K = K_springs − W. Hence
-    D = (a + (d + b W)/M) M + b K.
+    With the dashpots d and the weights W, D = d + a M + b K_springs, and K = K_springs − W. Hence D
+    = (a + (d + b W)/M) M + b K. The new structure has no dashpots and no weights, K as its springs,
+    and the factor of M as Rayleigh's a.
+
+    Args:
+        assembly: Mass, springs, weights (None for none) and dashpots as Taylor models of shape (1,
+            1), and Rayleigh's factors a in 1/s and b in s. Not changed.
+
+    Raises:
+        UnprovedError: The mass may be zero in the box.
     """
     a, b = assembly.rayleigh
     dashpots = assembly.dashpots
@@ -115,7 +132,13 @@ def _with_unit_rows(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
     """Return the same structure of one unknown with output rows that depend on no input.
 
     An output that takes r(u) of the displacement, or of the velocity, is r(u) times a unit of it;
-    r(u) becomes a part of its factor.
+    r(u) becomes a part of the output's factor.
+
+    Args:
+        assembly: `rows`, coefficients of m outputs on displacement and velocity, a Taylor model of
+            shape (m, 2), one of which is zero in each row; `accelerated`, on the absolute
+            acceleration, shape (m, 1); `row_factors`, shape (m,). Returned as it is if `rows` are
+            numbers.
     """
     if isinstance(assembly.rows, np.ndarray):
         return assembly
@@ -138,7 +161,15 @@ def _accelerations(assembly: Assembly[TaylorModel], forces: TaylorModel) -> Tayl
 
 
 def _require_classical(assembly: Assembly[TaylorModel]) -> None:
-    """Raise UnprovedError where dashpots, or damping by the springs alone, couple the modes."""
+    """Check that damping does not couple the undamped modes of a structure.
+
+    Args:
+        assembly: The structure; its dashpots must be zero, and Rayleigh's factor of the springs,
+            too, where weights reduce its stiffness (P-Delta).
+
+    Raises:
+        UnprovedError: One of both may differ from zero in the box.
+    """
     if assembly.dashpots.magnitude().any():
         raise UnprovedError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
@@ -151,7 +182,11 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
 
 
 def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
-    """Return the rows of the outputs on displacements and on velocities, shape (m, n) each.
+    """Return the rows of m outputs on n displacements and on their velocities, shape (m, n) each.
+
+    Args:
+        assembly: `rows` holds the coefficients on displacements and then velocities, (m, 2n):
+            numbers, or a Taylor model where they depend on inputs.
 
     Raises:
         UnprovedError: Rows depend on inputs, or an output takes displacements and velocities.

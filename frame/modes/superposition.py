@@ -60,7 +60,18 @@ class PointModes:
         return np.asarray(1 / (2 * self.sigma.imag))
 
     def output_coefficients(self, point: Ints, output: Ints) -> RoundedValues:
-        """Return the coefficients r of all modes in outputs (N,) at points (N,), shape (N, n)."""
+        """Return the coefficients r of n modes in one output at one point for each of N rows.
+
+        r is the output's row times the mode shape. Outputs take displacements, velocities (order 1)
+        or absolute accelerations (order 2) of the unknowns.
+
+        Args:
+            point: Index of the point of each row, shape (N,).
+            output: Index of the output of each row, shape (N,).
+
+        Returns:
+            `value` and `error`, a bound of its rounding, shape (N, n) each.
+        """
         n = self.shapes.shape[-1]
         order = self.structure.derivative_orders[output][:, np.newaxis]
         on_state = self.output_rows[point, output]
@@ -146,8 +157,10 @@ def modes_at(
 def _residual(shapes: Array, matrix: Array, diagonal: Array, *, entry_roundings: int) -> Array:
     """Bound |Xᵀ A X − diag d| for the exact matrix A, entry by entry, shape (S, n, n).
 
+    The bound contains the rounding of the products and that of the entries of A.
+
     Args:
-        shapes: X, shape (S, n, n), one mode in each column.
+        shapes: X at S points, shape (S, n, n), one mode in each column.
         matrix: A with rounded entries, shape (S, n, n).
         diagonal: d, shape (S, n).
         entry_roundings: Number of roundings of an entry of A.
@@ -172,13 +185,22 @@ class LoadAtNodes:
 def load_at_nodes(
     sigma: Array, load: History, time: Array, node: Ints | None = None
 ) -> LoadAtNodes:
-    """Return responses of oscillators to a load.
+    """Return the responses ρ = ∫ exp(σ (t − s)) f(s) ds of oscillators to a load f at time nodes.
 
     Args:
-        sigma: Exponents σ, shape (N, n), each row for its node; (n,) for all nodes.
-        load: The load.
+        sigma: Exponents σ = −decay + i frequency of n oscillators, in 1/s: shape (N, n), each row
+            for its node, or (n,) for all nodes.
+        load: The load f.
         time: All nodes, shape (T,), in s.
-        node: Number of the node of each row, shape (N,); all nodes unless given.
+        node: Index of the node of each row, shape (N,); all nodes, N = T, unless given.
+
+    Returns:
+        `rho`, ρ and dρ/dσ, shape (2, N, n); `error`, bounds of the rounding of ρ, shape (N, n);
+        `impulse`, a bound of ∫ |f| up to the node, and `value`, f at the node, shape (N,) each.
+
+    Raises:
+        UnprovedError: An oscillator turns too far within a sample interval of the load, or grows
+            too much.
     """
     at = slice(None) if node is None else node
     impulse = absolute_moments(0.0, load, time)[0]
@@ -189,14 +211,22 @@ def load_at_nodes(
 def outputs_at(
     modes: PointModes, point: Ints, output: Ints, time: Array, loads: Mapping[str, LoadAtNodes]
 ) -> RoundedValues:
-    """Return exact values of outputs at points and nodes, and bounds of their rounding, (N,) each.
+    """Return one output at one point and time node for each of N rows, exact but for rounding.
+
+    An output is Σ_k r_k c_k e_k over n modes: coefficient of the mode in the output, participation
+    factor of the source, and response of the mode's oscillator; sources add up.
 
     Args:
         modes: Modes at all points.
-        point: Number of the point of each value, shape (N,).
-        output: Number of the output of each value, shape (N,).
-        time: Node of each value, shape (N,), in s.
-        loads: Responses to each load at these points and nodes, by the name of the load.
+        point: Index of the point of each row, shape (N,).
+        output: Index of the output of each row, shape (N,).
+        time: Time of the node of each row, shape (N,), in s.
+        loads: Responses of the oscillators to each load at these points and nodes, by the name of
+            the load; initial velocities and displacements need none.
+
+    Returns:
+        `value` in the units of the outputs and `error`, a bound of its rounding, shape (N,) each.
+        Where rounding may shift the phase of a mode by a radian, the bound is huge.
     """
     sigma = modes.sigma[point]
     t = time[:, np.newaxis]
@@ -236,14 +266,22 @@ class _ModeResponses(NamedTuple):
 def _mode_responses(
     sigma: Array, orders: Ints, source: str, load: LoadAtNodes, time: Array
 ) -> _ModeResponses:
-    """Return the responses of oscillators to a source.
+    """Return the responses e of oscillators to one source, with bounds of rounding and of slopes.
 
     Args:
-        sigma: Exponents σ of the oscillators, shape (N, n).
-        orders: Derivative of the displacements that the output takes, shape (N,).
-        source: Name of a load or force, "velocity" or "start".
-        load: ρ of the source.
-        time: Nodes, shape (N, 1).
+        sigma: Exponents σ = −decay + i frequency of n oscillators at N points, shape (N, n), in
+            1/s.
+        orders: Derivative by time of the displacements that the output of each row takes, shape
+            (N,): 0, 1 or 2.
+        source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
+        load: ρ = ∫ exp(σ (t − s)) f(s) ds of the source with its derivative by σ, or exp(σ t) for
+            an initial state.
+        time: Times of the nodes, shape (N, 1), in s.
+
+    Returns:
+        `value` of e, `error`, a bound of its rounding, and bounds of |de/dλ| by the eigenvalue λ =
+        |σ|²: `slope` at the mode itself and `slope_anywhere` at any eigenvalue of the same damping;
+        shape (N, n) each.
     """
     omega = sigma.imag
     magnitude = np.abs(sigma)
@@ -282,7 +320,18 @@ def _superposition_error(
     participation: RoundedValues,
     response: _ModeResponses,
 ) -> Array:
-    """Bound the rounding of Σ_k r_k c_k e_k, shape (N,); r, c and e have the shape (N, n)."""
+    """Bound the rounding of Σ_k r_k c_k e_k, shape (N,), which computed modes and products cause.
+
+    Computed modes are exact for a stiffness and a mass nearby, whose differences couple modes j and
+    k by |r_j| G_jk |e[λ_j, λ_k]| |c_k| and |r_j e_j| |F_jk| |c_k|, e[·, ·] a divided difference.
+
+    Args:
+        modes: Modes at all points, with G, F and the eigenvalues λ.
+        point: Index of the point of each row, shape (N,).
+        coefficients: r of n modes in the output of each row, with rounding, shape (N, n).
+        participation: c of the source, with rounding, shape (N, n).
+        response: e with rounding, and bounds of |de/dλ|, shape (N, n).
+    """
     r = np.abs(coefficients.value)
     c = np.abs(participation.value)
     e = np.abs(response.value)

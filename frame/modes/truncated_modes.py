@@ -98,18 +98,28 @@ def truncated_modes(
     patterns: TaylorModel,
     excitation: Excitation,
 ) -> TruncatedModes | None:
-    """Bound the response of all modes that are not enclosed.
+    """Bound the response of all modes that are not enclosed one by one or in blocks.
+
+    Sums over all modes are known without the modes; what the enclosed modes leave of them belongs
+    to the truncated ones.
 
     Args:
         structure: The structure over the box.
-        found: The enclosed modes.
-        participations: How they take part in the response.
+        found: The enclosed modes, at least one block.
+        participations: How each block takes part in the response.
         rows: Rows of the outputs in the coordinates of the modes, shape (m, n).
         patterns: Vectors of the sources in these coordinates, shape (sources, n).
-        excitation: Loads, time nodes and sources.
+        excitation: Loads by name, T time nodes and names of the sources.
 
     Returns:
-        None if all modes are enclosed.
+        None if all modes are enclosed. Else C m(t) ± R r(t) for each source and output:
+        `participation` C and `amplitude` R, Taylor models of shape (sources, m),
+        `response_midpoint` m and `response_radius` r, shape (sources, m, T), and
+        `interpolation_error`, a bound of the distance from straight lines between nodes, shape (T,
+        m).
+
+    Raises:
+        UnprovedError: One of these modes may not oscillate, or a matrix may be singular in the box.
     """
     modes = found.truncated_modes
     if not len(modes):
@@ -132,7 +142,20 @@ def response_of_truncated_modes(
     found: Subspaces,
     excitation: Excitation,
 ) -> TruncatedModes:
-    """Bound the response of modes by sums over them and by the ranges of their ω and g/ω."""
+    """Bound the response of modes by sums over them and by their ranges of ω and g/ω.
+
+    Args:
+        sums: Sums Σ a β, Σ a², Σ β² over the modes, with and without their eigenvalue λ in the
+            denominator, a being the mode at an output and β its participation factor for a source.
+        ranges: Ends of ω = √(λ − g²), in rad/s, and of the quotient of decay g and ω.
+        structure: The structure over the box, with m outputs.
+        found: The enclosed modes, for the inputs that `sums` are functions of.
+        excitation: Loads by name, T time nodes and names of the sources.
+
+    Returns:
+        C m(t) ± R r(t): Taylor models C and R, shape (sources, m), and m and r, shape (sources, m,
+        T).
+    """
     responses = response_ranges(
         ranges.omega,
         ranges.quotient,
@@ -149,11 +172,19 @@ def _sums_over_all_modes(
 ) -> ModalSums:
     """Return sums over all modes by solutions of M and K, as functions of the inputs of `patterns`.
 
+    With a = r·φ and β = φ·M v for modes φ of unit modal mass and eigenvalue λ, these are Σ a β =
+    r·v, Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with λ in the denominator r·K⁻¹ M v, r·K⁻¹ r and (M
+    v)·K⁻¹ M v.
+
     Args:
-        found: Holds M and K in coordinates that are modal at the midpoint.
-        rows: Rows r of the outputs in these coordinates, shape (m, n); constant but for rounding.
+        found: Holds M and K in coordinates that are modal at the midpoint, modes with mass first.
+        rows: Rows r of m outputs in these coordinates, shape (m, n); constant but for rounding.
         patterns: Vectors v of the sources, shape (sources, n).
         order: Order of the Taylor models if `patterns` depend on no input; else it is theirs.
+
+    Returns:
+        Sums of products (sources, m), and of squares (m,) and (sources,), each without and with λ.
+        Σ a² is known up to 1e60 only for an output that takes unknowns without mass.
     """
     centre = found.centre
     mass = centre.mass
@@ -203,16 +234,19 @@ def _sums_over_all_modes(
 def inverse_form(
     matrix: TaylorModel, left: TaylorModel, right: TaylorModel, min_eigenvalue: float
 ) -> TaylorModel:
-    """Return left A⁻¹ rightᵀ with a remainder that is quadratic in small residuals, shape (l, r).
+    """Return left A⁻¹ rightᵀ over a box, with a remainder that is quadratic in small residuals.
 
-    With series x ≈ left A⁻¹ and y ≈ right A⁻¹, and their residuals e = left − x A and f = right −
-    y A, it is x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
+    With series x ≈ left A⁻¹ and y ≈ right A⁻¹, and their residuals e = left − x A and f = right − y
+    A, it is x rightᵀ + e yᵀ + e A⁻¹ fᵀ.
 
     Args:
         matrix: A, symmetric, shape (n, n), diagonal and positive at the midpoint of the box.
         left: Shape (l, n).
         right: Shape (r, n).
-        min_eigenvalue: A number c with A(u) ≥ c A(0) over the box, as quadratic forms.
+        min_eigenvalue: A number c > 0 with A(u) ≥ c A(0) over the box, as quadratic forms.
+
+    Returns:
+        Taylor model of shape (l, r).
     """
     x = solution_series(matrix, left.T).T
     y = solution_series(matrix, right.T).T
@@ -227,7 +261,20 @@ def inverse_form(
 
 
 def modal_sums_of_block(participation: BlockParticipation) -> ModalSums:
-    """Return sums over the modes of a block, by N = Xᵀ M X and Xᵀ K X = N L."""
+    """Return sums over the modes of a block, by its modal masses N = Xᵀ M X and Xᵀ K X = N L.
+
+    Args:
+        participation: X, N and L of K X = M X L for p modes, output rows times X, shape (p, m), and
+            Xᵀ M v of the sources' vectors v, shape (p, sources).
+
+    Returns:
+        Taylor models of Σ a β (sources, m), Σ a² (m,) and Σ β² (sources,), each also with the
+        eigenvalue in the denominator; a and β are output and participation factor of a mode of unit
+        modal mass.
+
+    Raises:
+        UnprovedError: N or N L may be singular in the box.
+    """
     block = participation.block
     modal_stiffness = block.modal_mass @ block.eigenvalue_block.T
     outputs = participation.output_modes
@@ -253,7 +300,22 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 def _weighted_sums(
     sums: ModalSums, structure: ClassicalStructure, found: Subspaces
 ) -> list[WeightedSums]:
-    """Return C and R = (A t + B/t)/2 for each exponent in `POWERS`, over the box of all inputs."""
+    """Return C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ for the exponents κ = 0, ½, 1, over the box.
+
+    By Cauchy and Schwarz R = √(A B) with A = Σ a² and B = Σ β², divided by λ as κ demands: neither,
+    A alone, or both. It is replaced by (A t + B/t)/2 with a number t > 0, which is not smaller and
+    a Taylor model. C is not known for ½, where 0 stands in its place.
+
+    Args:
+        sums: The sums over modes with eigenvalues λ, as functions of the inputs of mass and
+            stiffness, or of all inputs.
+        structure: Its `output_factors`, shape (m,), multiply all sums.
+        found: Says which of all inputs are those of mass and stiffness.
+
+    Returns:
+        For each exponent `participation` C and `amplitude` R, Taylor models of all inputs, shape
+        (sources, m) each.
+    """
     inputs = structure.initial_state.inputs
     order = structure.initial_state.order
     all_sums = ModalSums(*(x.truncated(order).embedded(found.used, inputs) for x in sums))
@@ -287,13 +349,20 @@ def _with_best_weights(
     """Bound the response of truncated modes, with the best weight for each source and output.
 
     If all λ_k^κ e_k(t) lie in an interval with the midpoint m(t) and the radius r(t), the truncated
-    modes add C m(t) ± R r(t) with C and R of the weight λ^-κ.
+    modes add C m(t) ± R r(t) with C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ. The exponent κ with the
+    smallest largest R r(t) is taken.
 
     Args:
-        structure: Structure whose outputs take the derivatives `derivative_orders`.
-        sums: C and R for each exponent κ in `POWERS`; C is not known for ½.
-        ranges: Bounds of λ_k^κ e_k(t), shape (exponents, sources, T), by the order of the
-            derivative.
+        structure: Structure whose outputs take the derivatives by time `derivative_orders`, shape
+            (m,).
+        sums: C and R for κ = 0, ½, 1, shape (sources, m) each; C is not known for ½, where it is 0.
+        ranges: Lower and upper bounds of λ_k^κ e_k(t), and of its distance from straight lines
+            between time nodes, shape (exponents, sources, T) each, by the order of the derivative.
+
+    Returns:
+        C and R as Taylor models (sources, m), m and r as arrays (sources, m, T), and
+        `interpolation_error`, which bounds the distance of the sum over all sources from a straight
+        line in the step before each node, shape (T, m).
     """
     # By output; the shape is then (exponents, sources, outputs, T).
     by_output = [ranges[int(order)] for order in structure.derivative_orders]
@@ -349,7 +418,26 @@ def coupling_bounds(
     found: Subspaces,
     excitation: Excitation,
 ) -> CouplingBounds:
-    """Bound what couples a block's oscillators, by L of K X = M X L off its diagonal."""
+    """Bound what couples the oscillators of a block of several modes.
+
+    The block spans an invariant subspace K X = M X L; its oscillators are the diagonal entries of
+    L, and F, the rest of L, couples them. The smaller of two bounds is taken: |F| times the slope
+    of responses by their eigenvalue, and twice the radius of the range of responses.
+
+    Args:
+        structure: The structure over the box, with m outputs.
+        participation: The block and how it takes part in the response.
+        found: All enclosed modes, with ranges of their eigenvalues.
+        excitation: Loads by name, T time nodes and names of the sources.
+
+    Returns:
+        `at_nodes`, a bound of what the coupling adds to outputs, and `interpolation_error`, of its
+        distance from a straight line in the step before each node, shape (T, m) each; and the
+        `ranges` of frequency and damping of the block's modes.
+
+    Raises:
+        UnprovedError: One of the modes may not oscillate.
+    """
     loads, time, sources = excitation
     factors = _coupling_factors(structure, participation)
     low, high = _eigenvalue_range(participation, found, factors.off_diagonal)
@@ -406,7 +494,18 @@ class _CouplingFactors(NamedTuple):
 def _coupling_factors(
     structure: ClassicalStructure, participation: BlockParticipation
 ) -> _CouplingFactors:
-    """Return the factors of the bounds of the coupling in a block over the box."""
+    """Return the factors of the bounds of the coupling in a block of p modes over the box.
+
+    Args:
+        structure: Its `output_factors`, shape (m,).
+        participation: The block, K X = M X L with N = Xᵀ M X, the rows a = r X of the outputs and β
+            = N⁻¹ Xᵀ M v of the sources.
+
+    Returns:
+        `by_slope`, a bound of the coupling over sup |de/dλ| of responses e, shape (sources, m);
+        `by_range`, a bound of |a N^-½| |N^½ β|, shape (sources, m); and `off_diagonal`, a bound of
+        |L| off its diagonal, with zeros on it, shape (p, p), transposed as the block holds L.
+    """
     block = participation.block
     off_diagonal = block.eigenvalue_block.magnitude() * (1.0 - np.eye(len(block.modes)))
     # N is the identity at the midpoint but for this bound of ‖N − 1‖₂, so |N^½ x| ≤ √norm |x|.
@@ -427,8 +526,16 @@ def _eigenvalue_range(
 ) -> tuple[float, float]:
     """Return a range over the box of the eigenvalues of a block and of the diagonal of its L.
 
-    The eigenvalues lie in Gershgorin's discs about L_jj, whose radii are the sums of |F| =
-    `off_diagonal` over a row, and within the bounds by Rayleigh quotients in `found`.
+    The eigenvalues lie in Gershgorin's discs about L_jj, whose radii are sums of |F|, L off its
+    diagonal, and within the bounds by Rayleigh quotients in `found`.
+
+    Args:
+        participation: The block, K X = M X L of p modes.
+        found: Ranges `eigenvalue_low` and `eigenvalue_high` of every mode, shape (modes,), in 1/s².
+        off_diagonal: Bound of |Fᵀ|, shape (p, p), with zeros on the diagonal.
+
+    Returns:
+        Lower and upper end, in 1/s².
     """
     block = participation.block
     j = np.arange(len(off_diagonal))
@@ -444,19 +551,21 @@ def _eigenvalue_range(
 def _largest_within_steps(
     largest: Array, time: Array, *, max_force: float, max_sigma: float, order: int
 ) -> Array:
-    """Bound |G| and |dG/dσ| in the step to each node by their bounds at nodes, shape (2, T).
+    """Bound |G| and |dG/dσ| in the step to each time node by their bounds at nodes, shape (2, T).
 
-    Here G = σ^n ρ with the order n, |exp(σ τ)| ≤ 1 for τ ≥ 0, and
+    Here G = σ^n ρ with the order n of a derivative by time and the Duhamel integral ρ = ∫ exp(σ τ)
+    f(t − τ) dτ over the past of the load f. With |exp(σ τ)| ≤ 1 for τ ≥ 0,
 
-        G(t + τ) = exp(σ τ) G(t) + σ^n I,   I = ∫ exp(σ s) f(t + τ − s) ds over 0 ≤ s ≤ τ ≤ h.
+        G(t + τ) = exp(σ τ) G(t) + σ^n I,   I = ∫ exp(σ s) f(t + τ − s) ds over 0 ≤ s ≤ τ ≤ h,
 
-    With |f| ≤ `max_force`, |I| ≤ max_force h and |dI/dσ| ≤ max_force h²/2.
+    and with |f| ≤ `max_force`, |I| ≤ max_force h and |dI/dσ| ≤ max_force h²/2. Column 0 has no
+    step, and is not meant to be used.
 
     Args:
         largest: Bounds of |G| and |dG/dσ| at the nodes, shape (2, T).
         time: Nodes, shape (T,), in s.
-        max_force: Largest magnitude of the load f.
-        max_sigma: Largest |σ|.
+        max_force: Largest magnitude of the load f; 0 for an initial state.
+        max_sigma: Largest |σ|, in 1/s.
         order: n.
     """
     h = np.diff(time, prepend=time[0])
@@ -470,17 +579,18 @@ def _largest_within_steps(
 def response_slopes(
     source: str, G: Array, G_slope: Array, omega: Array | float, quotient: Array | float
 ) -> Array:
-    """Bound |de/dλ| of the responses e of oscillators to a source, in the shape of G.
+    """Bound |de/dλ| of the responses e of oscillators by their eigenvalue λ, in the shape of G.
 
-    With the decay g = (a + b λ)/2 + ζ √λ and ω² = λ − g², 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′ λ − g) ≤ 1,
-    since g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g.
+    With the decay g = (a + b λ)/2 + ζ √λ, ω² = λ − g² and σ = −g + iω, 4 ω² |dσ/dλ|² = 1 + 4 g′ (g′
+    λ − g) ≤ 1, since g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g.
 
     Args:
-        source: Name of a load or force, "velocity" or "start".
-        G: Bounds of |σ^ν ρ|, where ν is the order of the derivative.
-        G_slope: Bounds of its derivative by σ.
-        omega: Smallest ω.
-        quotient: Largest g/ω.
+        source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
+        G: Bounds of |G| = |σ^ν ρ|, where ν is the order of the derivative by time and ρ the Duhamel
+            integral of the source, or exp(σ t).
+        G_slope: Bounds of |dG/dσ|, same shape.
+        omega: Smallest ω, in rad/s, positive; a number, or in the shape of G.
+        quotient: Largest g/ω, likewise.
     """
     if source == "start":  # e = Re G + (g/ω) Im G
         return (1 + quotient) * G_slope / (2 * omega) + G * quotient / (2 * omega**2)
