@@ -70,7 +70,12 @@ class Response(NamedTuple):
     coefficient_error: Array
 
     def at_midpoint(self) -> Response:
-        """Return the response at the midpoint of the grid alone, without errors of κ."""
+        """Return the response of the oscillator in the middle of the grid, with exact factors κ.
+
+        A response Re κ σ^order ρ is given on a grid of Q values of q = g/ω and W values of ω; the
+        new one has the point (Q // 2, W // 2), and no error of κ. That of a load itself, without a
+        grid, keeps its factors.
+        """
         _, q_points, w_points = self.coefficient.shape
         q = q_points // 2
         w = w_points // 2
@@ -85,8 +90,18 @@ class Response(NamedTuple):
     def line_deviation(self, time: Array) -> Array:
         """Return a bound of the distance from the chord in the step to each node, shape (T, m).
 
-        With H, which is σ^order ρ less its chord, |Re κ H| ≤ |κ| |H|, and also
-        |Re κ H| ≤ |Re κ| |H| + |ω Im κ| |Im H/ω|.
+        The response is Re κ σ^order ρ with factors κ for m outputs and the Duhamel integral ρ of a
+        load, for all σ of a grid; or Re κ f of a load f itself. The chord is the straight line
+        between the values at both nodes. With H, which is σ^order ρ less its chord, |Re κ H| ≤ |κ|
+        |H|, and also |Re κ H| ≤ |Re κ| |H| + |ω Im κ| |Im H/ω|.
+
+        Args:
+            time: Time nodes, rising, shape (T,), in s. Row j of the result belongs to the step that
+                ends at node j, and row 0 is 0.
+
+        Raises:
+            UnprovedError: An oscillator is out of the range in which responses are computed to
+                rounding.
         """
         kappa = self.coefficient
         real_error, imag_error = self.coefficient_error
@@ -103,9 +118,10 @@ class Response(NamedTuple):
         return np.asarray(np.minimum(np.outer(of_modulus, modulus), by_parts))
 
     def line_deviation_before(self, first: float, last: float) -> Array:
-        """Return a bound of the distance from a line in one step, before a jump at its end, (m,).
+        """Return a bound of the distance from a straight line in one step, shape (m,).
 
-        The line ends at the value before the jump.
+        The line runs from the value at the beginning to the value before a jump at the end, as a
+        load may have there.
 
         Args:
             first: Beginning of the step, in s.
@@ -125,9 +141,13 @@ class Response(NamedTuple):
     def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
         """Return lower and upper bounds at nodes of the distance from chords, (nodes, m) each.
 
+        They hold for all oscillators between the points of the response's grid. At the ends of
+        chords they contain 0.
+
         Args:
             nodes: Rising times, shape (nodes,), in s.
-            parts: Every `parts`-th node is the end of a step, between which the chords run.
+            parts: Every `parts`-th node is the end of a step, between which the chords, straight
+                lines, run. The last node must be one of these.
         """
         chords = Chords.through(np.arange(0, len(nodes), parts), nodes)
         if self.sigma is None:
@@ -139,12 +159,14 @@ class Response(NamedTuple):
     def change(self, first: float, last: float) -> tuple[Array, Array]:
         """Return bounds of the value at `last`, before a jump there, less that at `first`.
 
+        They hold for all oscillators between the points of the response's grid.
+
         Args:
-            first: A time in s.
+            first: A time in s, ≥ 0.
             last: A later time in s.
 
         Returns:
-            Lower and upper bounds, shape (m,) each.
+            Lower and upper bounds for each output, shape (m,) each.
         """
         nodes = np.array([first, last])
         if self.sigma is None:
@@ -167,11 +189,14 @@ class Response(NamedTuple):
         return midpoint - radius, midpoint + radius
 
     def _range_off(self, chords: Chords, nodes: Array, *, fourth: Array) -> tuple[Array, Array]:
-        """Return bounds of Re κ G at N nodes, where G is σ^order ρ less its chords.
+        """Return bounds of Re κ G at N nodes, where G is σ^order ρ less its chords, over all σ.
+
+        The bounds hold not only at the points of the response's grid of σ, at which all is
+        computed, but for all oscillators between these.
 
         Args:
-            chords: The chords at the nodes.
-            nodes: Times, shape (N,), in s.
+            chords: The straight lines that are subtracted at the nodes.
+            nodes: Times, rising, shape (N,), in s.
             fourth: Bounds of the fourth derivative of G by σ, shape (N,).
 
         Returns:
@@ -208,17 +233,14 @@ class Response(NamedTuple):
         return low - margin, margin - minus_high
 
     def _fourth_off_chords(self, time: Array) -> Array:
-        """Return bounds of |∂⁴/∂σ⁴| of G less its chord in each step, G = σ^order ρ.
+        """Return bounds of |∂⁴/∂σ⁴| of G less its chord in each step, G = σ^order ρ, (steps,).
 
-        It is at most h²/8 times that of the second derivative of G by time,
-        σ² G + σ^order (σ f + f′). The terms with f are polynomials of degree below 4 in σ, and so
-        is what jumps of f add.
+        It is at most h²/8 times that of the second derivative of G by time, σ² G + σ^order (σ f +
+        f′), in a step of length h. The terms with the load f are polynomials of degree below 4 in
+        σ, and so is what jumps of f add.
 
         Args:
-            time: Ends of the steps, shape (steps + 1,), in s.
-
-        Returns:
-            Shape (steps,).
+            time: Ends of the steps, rising, shape (steps + 1,), in s.
         """
         assert self.sigma is not None
         decay = float(-self.sigma.real.max())
@@ -251,11 +273,15 @@ class Chords(NamedTuple):
 
     @classmethod
     def through(cls, node: Ints, times: Array) -> Chords:
-        """Return the chords through nodes.
+        """Return the chords, straight lines between neighbouring time nodes, at N times.
 
         Args:
-            node: Indices of the nodes among the times, rising, with the first and the last one.
+            node: Indices of the nodes among the times, rising; the first is 0 and the last N − 1.
             times: Rising, shape (N,), in s.
+
+        Returns:
+            For each time the index `before` of the node at or before it, `after` of the next one,
+            and `fraction`, its place between both, 0 at a node, shape (N,) each.
         """
         count = np.diff(node)
         before = np.repeat(node, np.append(count, 1))
@@ -279,18 +305,19 @@ def narrowed_deviation(
 ) -> Array:
     """Return a narrower bound of the distance of Σ responses + unresolved from chords, (T, m).
 
-    In each step nodes are added. A response differs from the chord of the step by at most the sum
-    of two terms: its largest distance from the chord at the added nodes, where responses are summed
-    with their signs, so that modes cancel as they do in the response; and its distance from the
-    chords between the added nodes, which adds modes by magnitude. The second term falls with the
-    square of the number of substeps.
+    The chord of a time step is the straight line between the values at its two nodes. In each step
+    nodes are added. A response differs from the chord of the step by at most the sum of two terms:
+    its largest distance from the chord at the added nodes, where responses are summed with their
+    signs, so that modes cancel as they do in the response; and its distance from the chords between
+    the added nodes, which adds modes by magnitude. The second term falls with the square of the
+    number of substeps.
 
     Args:
-        responses: The responses of all modes and loads.
-        time: Time nodes, shape (T,), in s.
-        bound: The bound that adds all responses by magnitude, shape (T, m). Where it is narrower,
-            it stays.
-        unresolved: What is not among the responses, by magnitude, shape (T, m).
+        responses: What each mode and each load adds to m outputs, at least one.
+        time: Time nodes, shape (T,), in s, T ≥ 2.
+        bound: The bound that adds all responses by magnitude, shape (T, m), row j for the step that
+            ends at node j. Where it is narrower, it stays; it is not changed.
+        unresolved: Bound of the same distance of what is not among the responses, shape (T, m).
     """
     # At the midpoint of the box four substeps show what the true distance is. If the bound is at
     # most 2.5 times as large, it stays. If four substeps leave a bound of at most 1.25 times, four
@@ -312,17 +339,20 @@ def narrowed_deviation(
 
 
 def narrowed_at_jumps(responses: Sequence[Response], time: Array, bound: Array) -> Array:
-    """Return a bound of how far Σ responses exceeds its values at both nodes of a step, (T, m).
+    """Return a bound of how far Σ responses exceeds its values at both ends of a step, (T, m).
 
-    It is the bound of the distance from the chord, except in steps at whose end a load jumps that
-    is itself among the responses. With y₁⁻ the value before the jump, the response differs within
-    the step by some r from the line between y₀ and y₁⁻. So it exceeds y₀ and y₁ by at most
-    |y₁⁻ − y₀| + r, while its distance from the chord between y₀ and y₁ is as large as the jump.
+    It is the bound of the distance from the chord, the straight line between these values, except
+    in steps at whose end a load jumps that is itself among the responses. With y₁⁻ the value before
+    the jump, the response differs within the step by some r from the line between y₀ and y₁⁻. So it
+    exceeds y₀ and y₁ by at most |y₁⁻ − y₀| + r, while its distance from the chord between y₀ and y₁
+    is as large as the jump.
 
     Args:
-        responses: The responses of all modes and loads.
+        responses: All that is added up to m outputs: of each mode and, with `sigma` None, of each
+            load itself.
         time: Time nodes, shape (T,), in s.
-        bound: Bound of the distance from the chord in the step to each node, shape (T, m).
+        bound: Bound of the distance from the chord in the step to each node, shape (T, m); not
+            changed.
     """
     has_jump = np.zeros(len(time), bool)
     for response in responses:
@@ -349,10 +379,12 @@ def _at_and_between_added(
 ) -> tuple[Array, Array]:
     """Return bounds of the distance of Σ responses from chords, at and between added nodes.
 
+    The chord of a step or substep is the straight line between the values at its two ends.
+
     Args:
-        responses: The responses.
+        responses: What each mode and each load adds to m outputs, at least one.
         time: Time nodes, shape (T,), in s.
-        substeps: Number of substeps into which added nodes divide each step.
+        substeps: Number of equal substeps into which added nodes divide each step.
 
     Returns:
         The largest distance from the chord of each step at its added nodes, and the largest
@@ -373,15 +405,19 @@ def _at_and_between_added(
 
 
 def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
-    """Return ρ with two derivatives by σ, and bounds of the rounding of ρ.
+    """Return the Duhamel integral ρ = ∫₀ᵗ exp(σ τ) f(t − τ) dτ with two derivatives by σ.
 
     Args:
-        sigma: Exponents, shape (S,).
-        load: The load; None for ρ = exp(σ t).
-        time: Time nodes, shape (T,), in s.
+        sigma: Exponents σ = −decay + i frequency, shape (S,), in 1/s.
+        load: The load f; None for a unit impulse at t = 0, ρ = exp(σ t).
+        time: Time nodes t ≥ 0, rising, shape (T,), in s.
 
     Returns:
-        Shapes (3, T, S) and (T, S).
+        ρ, dρ/dσ and d²ρ/dσ², shape (3, T, S), and bounds of the rounding of ρ, shape (T, S).
+
+    Raises:
+        UnprovedError: An exponent turns too far within a sample interval of the load, or grows too
+            much.
     """
     if load is not None:
         return responses_at_nodes(sigma, load, time, 2)
@@ -390,10 +426,15 @@ def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array
 
 
 def moments_of(decay: float, load: History | None, time: Array) -> Array:
-    """Return bounds of the derivatives of ρ by σ of orders 0 to 4, shape (5, T).
+    """Return bounds of |∂ⁿρ/∂σⁿ|, n = 0 … 4, for all oscillators of a least decay, shape (5, T).
 
-    They hold for all oscillators whose decay g is at least `decay`, in 1/s. Without a load, ρ is
-    exp(σ t).
+    ρ = ∫₀ᵗ exp(σ τ) f(t − τ) dτ is the Duhamel integral, σ = −g + i frequency. The bounds are ∫₀ᵗ
+    τⁿ exp(−decay τ) |f(t − τ)| dτ, and tⁿ exp(−decay t) without a load.
+
+    Args:
+        decay: Smallest decay g, in 1/s; may be negative.
+        load: The load f; None for a unit impulse at t = 0, ρ = exp(σ t).
+        time: Time nodes t ≥ 0, rising, shape (T,), in s.
     """
     if load is not None:
         return absolute_moments(decay, load, time)
@@ -404,9 +445,9 @@ def fourth_derivative(order: int, fast: float, moments: Array) -> Array:
     """Return bounds of the fourth derivative of σ^order ρ by σ, shape (T,), by Leibniz' rule.
 
     Args:
-        order: Power of σ.
-        fast: Bound of |σ|.
-        moments: Bounds of the derivatives of ρ of orders 0 to 4, shape (5, T).
+        order: Power of σ, 0 or more.
+        fast: Bound of |σ|, in 1/s.
+        moments: Bounds of the derivatives of ρ by σ of orders 0 to 4 at T times, shape (5, T).
     """
     total = 0.0
     for j in range(order + 1):
@@ -418,8 +459,12 @@ def fourth_derivative(order: int, fast: float, moments: Array) -> Array:
 def _between_points(sigma: Array) -> float:
     """Return b such that a function F of σ differs by at most b sup|F″| from interpolation.
 
-    The interpolation is bilinear in q = g/ω and ω between the points of a grid (Q, W):
-    b = (|dσ/dω|² h_ω² + |dσ/dq|² h_q²)/8.
+    The interpolation is bilinear in q = g/ω and ω between the points of a grid, σ = −g + iω: b =
+    (|dσ/dω|² h_ω² + |dσ/dq|² h_q²)/8 with the largest distances h of neighbouring points.
+
+    Args:
+        sigma: Points of the grid, shape (Q, W); row by row of q, with ω along each row, in any
+            order. A grid of one point gives 0.
     """
     omega = sigma[0].imag
     quotient = -sigma[:, 0].real / sigma[:, 0].imag
@@ -565,7 +610,15 @@ def line_deviations(
 
 
 def load_deviation(load: History, time: Array) -> Array:
-    """Return bounds of the distance of a load from its chord in the step to each node, (T,)."""
+    """Return bounds of the distance of a load from its chord in the step to each node, shape (T,).
+
+    The chord is the straight line between the values at both nodes of the step. The first entry is
+    0, and bounds up to 1e-12 of the largest load are rounding and become 0.
+
+    Args:
+        load: The load, linear between its samples and perhaps multiplied by a sine.
+        time: Time nodes, rising, shape (T,), in s.
+    """
     # without its sine, the load is farthest from a chord at one of its samples
     g = replace(load, frequency=0.0)
     pieces = _pieces(g, time, 0.0)
@@ -583,10 +636,14 @@ def load_deviation(load: History, time: Array) -> Array:
 
 
 def load_excess(load: History, time: Array) -> Array:
-    """Return bounds of how far a load exceeds both its values at the ends of the step to each node.
+    """Return bounds of how far a load exceeds both its values at the ends of each step, shape (T,).
 
-    A jump from one of these values to the other exceeds neither. The shape is (T,), with 0 at the
-    first node.
+    Row j belongs to the step that ends at node j, and row 0 is 0. Excess is above the larger or
+    below the smaller of both values; a jump from one of these values to the other exceeds neither.
+
+    Args:
+        load: The load, linear between its samples and perhaps multiplied by a sine.
+        time: Time nodes, rising, shape (T,), in s, T ≥ 2.
     """
     pieces = _pieces(load, time, 0.0)
     first = np.searchsorted(pieces.time, time[:-1])
@@ -602,9 +659,12 @@ def load_excess(load: History, time: Array) -> Array:
 def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
     """Return a/σ + b/σ² with its first two derivatives by σ, shape (3, P, S).
 
+    Under a load a + b τ, −(a/σ + b/σ²) is the part of an oscillator's response that follows the
+    load.
+
     Args:
-        sigma: Exponents, shape (S,).
-        first: a of P segments, shape (P,).
+        sigma: Exponents, shape (S,), none of them 0.
+        first: a of P segments of time, shape (P,).
         slope: b of P segments, shape (P,).
     """
     by_order = [
@@ -631,7 +691,13 @@ def _raise_to(largest: Array, *values: Array) -> None:
 
 
 def with_power(sigma: Array, rho: Array, order: int) -> Array:
-    """Return σ^order ρ and its first two derivatives by σ, from those of ρ, shape (3, T, S)."""
+    """Return σ^order ρ and its first two derivatives by σ, shape (3, T, S).
+
+    Args:
+        sigma: Exponents, shape (S,).
+        rho: ρ and its first two derivatives by σ, shape (3, T, S). Returned itself if `order` is 0.
+        order: 0 or more.
+    """
     if order == 0:
         return rho
     power = sigma**order
@@ -641,16 +707,22 @@ def with_power(sigma: Array, rho: Array, order: int) -> Array:
 
 
 def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
-    """Return the segments between time nodes and samples of a load.
+    """Return the segments between time nodes and samples in which a load is nearly linear.
 
     Segments of a load that is multiplied by a sine are divided so that neither the sine nor an
     oscillator turns by more than .5 rad in one, but into 16 at most: a segment adds the square of
-    this phase to the bounds.
+    this phase to the bounds. Nodes and samples that coincide but for rounding are one end.
 
     Args:
         load: The load; None gives one segment for each step, with a load of zero.
-        time: Time nodes, shape (T,), in s.
+        time: Time nodes, rising, shape (T,), in s.
         fastest: Largest |σ| of the oscillators, in 1/s.
+
+    Returns:
+        For P segments: `time`, their ends (P + 1,), all nodes among them; the load at the
+        beginning, `first`, and at the end, `last`, of each (P,); `bend`, a bound of its distance
+        from the line between these (P,); and `off`, the load at the beginning and at the end of
+        each less the chord of the load in the step between two nodes (2, P).
     """
     if load is None:
         zeros = np.zeros((2, len(time) - 1))

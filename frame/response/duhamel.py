@@ -82,11 +82,20 @@ class LinearPieces(NamedTuple):
 
 
 def linear_pieces(history: History, time: Array) -> LinearPieces:
-    """Return a load up to the last node, without the sine by which it may be multiplied.
+    """Return a load up to the last node as intervals in which it is linear, and node places.
+
+    A sine by which the load may be multiplied is left out. Intervals have the length of the load's
+    step; so many without load are set in front that its first sample begins one.
 
     Args:
         history: The load.
-        time: Rising nodes, shape (T,), in s.
+        time: Rising nodes ≥ 0, at least one, shape (T,), in s.
+
+    Returns:
+        For I intervals the load at the beginning, `first`, and at the end, `last`, of each (I,),
+        and the `step` in s; for each node the index `interval` (T,), and `offset` (T,), the index
+        among `offsets` (P,), the distinct times from the beginning of an interval to a node; and
+        `time_rounding`, a bound of what these times miss (T,), in s.
     """
     samples = history.samples
     step = history.step
@@ -118,17 +127,15 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
 
 
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
-    """Return bounds of ∫₀ᵗ τⁿ exp(−decay τ) |f(t − τ)| dτ, n = 0 … 4, at time nodes t.
+    """Return bounds of ∫₀ᵗ τⁿ exp(−decay τ) |f(t − τ)| dτ, n = 0 … 4, at nodes t, (5, T).
 
-    Since |∂ⁿρ/∂σⁿ| is at most this integral, they bound ρ and its derivatives for all frequencies.
+    Since |∂ⁿρ/∂σⁿ| of the Duhamel integral ρ = ∫₀ᵗ exp(σ τ) f(t − τ) dτ is at most this where Re σ
+    ≤ −decay, they bound ρ and its derivatives for all frequencies.
 
     Args:
-        decay: In 1/s.
+        decay: In 1/s; may be negative.
         history: The load f; a sine by which it may be multiplied counts as 1.
-        time: Rising nodes, shape (T,), in s.
-
-    Returns:
-        Shape (5, T).
+        time: Rising nodes ≥ 0, shape (T,), in s.
     """
     load = linear_pieces(history, time)
     out: Array = np.empty((5, len(time)))
@@ -143,18 +150,18 @@ def call_with_load() -> None:
 
 @compiled
 def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Array) -> None:
-    """Write the bounds of `absolute_moments` to `out`, shape (5, T).
+    """Write bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ, n = 0 … 4, at T time nodes t.
 
-    A time x later than the beginning of an interval the integral is
-    exp(−g x) Σ_j C(n, j) x^(n − j) moments_j + ∫₀ˣ τⁿ exp(−g τ) |f| dτ. The latter is at most the
-    least of: the area under |f| times xⁿ; the largest |f| times xⁿ⁺¹/(n + 1), both times
-    max(exp(−g x), 1); the largest |f| times n!/gⁿ⁺¹, which is looked at where g x > 1.
+    A time x later than the beginning of an interval the integral is exp(−g x) Σ_j C(n, j) x^(n − j)
+    moments_j + ∫₀ˣ τⁿ exp(−g τ) |f| dτ. The latter is at most the least of: the area under |f|
+    times xⁿ; the largest |f| times xⁿ⁺¹/(n + 1), both times max(exp(−g x), 1); the largest |f|
+    times n!/gⁿ⁺¹, which is looked at where g x > 1.
 
     Args:
-        load: The load.
-        offset: Time of each node since its interval began, shape (T,).
-        decay: g.
-        out: Receives the bounds.
+        load: The load f in intervals in which it is linear, with the interval of each node.
+        offset: Time of each node since its interval began, shape (T,), in s.
+        decay: g, in 1/s.
+        out: Overwritten with the bounds, shape (5, T).
     """
     moments = np.zeros(5)
     later = np.empty(5)
@@ -273,12 +280,15 @@ def responses_at_nodes(
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
-    """Raise UnprovedError for exponents whose integrals are not computed to rounding.
+    """Check that the integrals of exponents σ are computed to rounding.
 
     Args:
-        sigma: Exponents σ in 1/s, of any shape.
-        step: Length of the intervals of the load, in s: |σ| step may be at most `MAX_PHASE`.
-        duration: Time over which ρ may grow, in s: Re σ duration may be at most `MAX_GROWTH`.
+        sigma: Exponents σ in 1/s, of any shape; none of them passes.
+        step: Length of the intervals of the load, in s: |σ| step may be at most `MAX_PHASE` = 1e8.
+        duration: Time over which ρ may grow, in s: Re σ duration may be at most `MAX_GROWTH` = 700.
+
+    Raises:
+        UnprovedError: An exponent exceeds one of both limits, or is NaN.
     """
     phase = float(np.abs(sigma).max(initial=0.0)) * step
     growth = float(sigma.real.max(initial=-np.inf)) * duration
@@ -294,15 +304,16 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
 def _respond_at_nodes(
     sigma: Array, load: LinearPieces, orders: Orders, length: int, out: Array, error: Array
 ) -> None:
-    """Write ρ and derivatives for each of S exponents at all T nodes.
+    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, S exponents at all T time nodes.
 
     Args:
         sigma: Exponents, shape (S,).
-        load: The load.
-        orders: Says how many orders of derivatives are written.
-        length: Nodes in a window; integrals begin anew after each window.
-        out: Receives ρ and derivatives, shape (orders, T, S).
-        error: Receives bounds of the rounding of ρ, shape (T, S).
+        load: The load f in linear intervals, with the places of the nodes in them.
+        orders: An empty array whose number of dimensions, 1 to 3, is the number of orders of
+            derivatives that are written, order 0 included.
+        length: Nodes in a window; integrals begin anew after the last node of each window.
+        out: Overwritten with ρ and derivatives, shape (orders, T, S).
+        error: Overwritten with bounds of the rounding of ρ, shape (T, S).
     """
     for s in prange(len(sigma)):
         factors = _propagators(sigma[s], load.offsets)
@@ -323,10 +334,18 @@ def _respond_at_nodes(
 def _respond_at_given(
     sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array, error: Array
 ) -> None:
-    """Write ρ and derivatives for each row of exponents at a node of its own.
+    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, rows of exponents at one node each.
 
-    `sigma` has shape (N, S), `node` (N,), `out` (orders, N, S) and `error` (N, S). Other arguments
-    are as for `_respond_at_nodes`.
+    The integrals begin at t = 0.
+
+    Args:
+        sigma: Exponents, shape (N, S).
+        load: The load f in linear intervals, with the places of all time nodes in them.
+        orders: An empty array whose number of dimensions, 1 to 3, is the number of orders of
+            derivatives that are written, order 0 included.
+        node: Index of the time node of each row, shape (N,).
+        out: Overwritten with ρ and derivatives, shape (orders, N, S).
+        error: Overwritten with bounds of the rounding of ρ, shape (N, S).
     """
     for s in prange(len(sigma)):
         here = slice(node[s], node[s] + 1)
@@ -449,6 +468,13 @@ def _respond(
 def _propagators(sigma: complex, times: Array) -> tuple[Array, Array, Array]:
     """Return the factors of ρ(t + x) = exp(σ x) ρ(t) + a J₀ − slope J₁ for P times x.
 
+    ρ is the Duhamel integral of a load that is linear over x, with this slope and the value a at
+    its end, and J_n = ∫₀ˣ τⁿ exp(σ τ) dτ.
+
+    Args:
+        sigma: σ, in 1/s.
+        times: x, shape (P,), in s.
+
     Returns:
         The factors exp(σ x), shape (P,); the integrals J_n, n = 0 … 3, shape (P, 4); and an array
         of shape (P, 3) with the rounding relative to |exp(σ x) ρ|, the rounding in s that is to be
@@ -472,9 +498,12 @@ def _propagators(sigma: complex, times: Array) -> tuple[Array, Array, Array]:
 
 @compiled
 def step_integrals(sigma: complex, h: float, out: Array) -> None:
-    """Write J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3, to `out`, shape (4,).
+    """Write J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3, to `out`.
 
-    σ h must be in the range of `require_in_range`.
+    Args:
+        sigma: σ, in 1/s: |σ h| ≤ 1e8 and Re σ h ≤ 700, which is not checked here.
+        h: In s; at 0 all integrals are 0.
+        out: Overwritten, shape (4,).
     """
     z = sigma * h
     if abs(z) < FROM_RECURRENCE:
@@ -498,7 +527,15 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
 
 @compiled
 def error_of_integrals(sigma: complex, h: float) -> float:
-    """Return a bound of the rounding of J₀, and of that of 2 J₁ / h, in s."""
+    """Return a bound, in s, of the rounding of J₀ and of that of 2 J₁/h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ.
+
+    It belongs to the values of `step_integrals`, and is 0 for h = 0. Bounds are a few units of
+    rounding times h, times exp(Re σ h) where this grows.
+
+    Args:
+        sigma: σ, in 1/s: |σ h| ≤ 1e8 and Re σ h ≤ 700.
+        h: In s.
+    """
     size = abs(sigma) * h
     growth = sigma.real * h
     factor = 1.0

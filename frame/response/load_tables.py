@@ -75,15 +75,17 @@ class LoadTable:
         self.moment = np.fft.fft(values, axis=1) / order / radius ** np.arange(order)
 
     def response(self, rate: Array, node: Ints) -> Array:
-        """Return R, dR/dλ and d²R/dλ² for N eigenvalues, each at a node of its own.
+        """Return R = ∫ exp(λ (t − s)) a(s) ds, dR/dλ, d²R/dλ² for N eigenvalues and nodes.
 
         Args:
-            rate: Eigenvalues, shape (N,), in 1/s.
-            node: Index of the node of each one, shape (N,). Equal eigenvalues in a row whose nodes
-                rise are the fastest.
+            rate: Eigenvalues λ, shape (N,), in 1/s. They must lie within `deviation` of `midpoint`,
+                as given at the construction; this is not checked, and the table's error is not
+                known beyond.
+            node: Index of the time node t of each one, shape (N,). Equal eigenvalues in a row whose
+                nodes rise are the fastest.
 
         Returns:
-            Shape (3, N).
+            Complex, shape (3, N): R, then its derivatives.
         """
         out: Array = np.empty((3, len(rate)), complex)
         _responses(
@@ -135,14 +137,20 @@ class LoadTables:
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
     def response(self, rate: Array, node: Ints) -> Array:
-        """Return R, dR/dλ and d²R/dλ² for N sets of eigenvalues, each at a node of its own.
+        """Return R = ∫ exp(λ (t − s)) a(s) ds, dR/dλ and d²R/dλ² of n modes at N points and nodes.
 
         Args:
-            rate: Eigenvalues, shape (N, n), in 1/s.
-            node: Index of the node of each set, shape (N,).
+            rate: Eigenvalues λ of the n modes at each point, shape (N, n), in 1/s, within the
+                ranges that the tables are made for; this is not checked.
+            node: Index of the time node t of each point, shape (N,).
 
         Returns:
-            Shape (3, N, n).
+            Complex, shape (3, N, n): R, then its derivatives.
+
+        Raises:
+            UnprovedError: At the first call: the eigenvalues differ too much, as phases within a
+                step.
+            ValueError: `rate` is not of n modes.
         """
         pairs = zip(self.tables, rate.T, strict=True)
         return np.stack([table.response(x, node) for table, x in pairs], -1)

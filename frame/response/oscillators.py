@@ -80,12 +80,14 @@ class Grid:
 def grid_over(
     omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
 ) -> Grid:
-    """Return a grid of equally spaced points over ranges of ω and of q = g/ω.
+    """Return a grid of equally spaced points over ranges of frequency ω and of q = decay/ω.
+
+    A range of one value is made slightly wider: by 1e-9 of ω, or by 1e-12 in q.
 
     Args:
-        omega: Lower and upper end of ω. A range of one value is made slightly wider.
-        quotient: Lower and upper end of q, likewise.
-        points: Numbers of points along ω and along q.
+        omega: Lower and upper end of ω, in rad/s, positive.
+        quotient: Lower and upper end of q.
+        points: Numbers of points along ω and along q, 2 or more each; one point is the lower end.
     """
     lowest_omega, highest_omega = omega
     if highest_omega <= lowest_omega * (1 + 1e-12):
@@ -140,7 +142,20 @@ class Oscillators:
         self._tables = dict[str, _Table]()
 
     def _table(self, source: str) -> _Table:
-        """Return ρ of a source; velocities and starts share exp(σ t)."""
+        """Return the Duhamel integral ρ of a source for the grid's oscillators, made at first use.
+
+        Initial velocities and displacements, "velocity" and "start", are no loads and share ρ =
+        exp(σ t).
+
+        Args:
+            source: Name of a load or force, "velocity" or "start"; any other name is taken as one
+                of these two.
+
+        Returns:
+            ρ with two derivatives by σ at T nodes and S points, shape (3, T, S), bounds of the
+            rounding of ρ (T, S), and bounds of its derivatives of orders 0 to 4 over the grid (5,
+            T).
+        """
         load = self.loads.get(source)
         name = ""
         if load:
@@ -154,9 +169,21 @@ class Oscillators:
     def responses(self, source: str, order: int) -> ModalResponses:
         """Return the responses e to a unit of a source, differentiated ν = `order` times by time.
 
+        They are tabulated on a grid of Q quotients q = g/ω and W frequencies ω at T time nodes.
+
         Args:
-            source: Name of a load or force, "velocity" or "start".
+            source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
             order: ν, among the orders given at the construction.
+
+        Returns:
+            `value` of e at the points, shape (T, Q, W), with what a force adds at once; `error`, a
+            bound of the distance of e from bilinear interpolation between them, with rounding,
+            shape (T,); `line_deviation`, of its distance from a straight line in the step before
+            each node, shape (T,); and `largest`, bounds of |G| and |dG/dσ| over the grid, G = σ^ν
+            ρ, shape (2, T).
+
+        Raises:
+            KeyError: `order` is none of those given.
         """
         grid = self.grid
         is_start = source == "start"
@@ -189,14 +216,17 @@ class Oscillators:
     ) -> tuple[Array, Array]:
         """Return a bound of the interpolation error, and bounds of |G| and |G′| over the grid.
 
+        G = σ^ν ρ is the function of σ = −g + iω that a response is read from, ρ a Duhamel integral
+        and ν the order of the derivative by time. Interpolation is bilinear in ω and q = g/ω.
+
         Args:
             largest: Largest |G|, |G′| and |G″| at the points of the grid, shape (3, T).
-            bounds: Bounds of the derivatives of ρ of orders 0 to 4, shape (5, T).
+            bounds: Bounds of the derivatives of ρ of orders 0 to 4 over the grid, shape (5, T).
             order: ν.
-            start: Whether the response is that to a start, Re G + q Im G; else it is Im G / ω.
+            start: Whether the response is that to a start, Re G + q Im G; else it is Im G/ω.
 
         Returns:
-            Shapes (T,) and (2, T).
+            The bound, shape (T,), and bounds of |G| and |G′|, shape (2, T).
         """
         low = self.grid.omega[0]
         high = self.grid.omega[-1]
@@ -222,7 +252,15 @@ class Oscillators:
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
     def _line_deviation(self, source: str, order: int) -> Array:
-        """Return a bound of the distance of responses from their chord in each step, shape (T,)."""
+        """Return a bound of the distance of responses from their chord in each step, shape (T,).
+
+        The chord is the straight line between the values at both nodes. Row j belongs to the step
+        that ends at node j. The bounds of a source are computed for all orders at its first use.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start" (initial displacements).
+            order: Order of the derivative by time, among those given at the construction.
+        """
         if source not in self._deviations:
             self._deviations[source] = line_deviations(
                 self.grid.sigma,
@@ -239,9 +277,14 @@ class Oscillators:
         return np.asarray(of_response)
 
     def deviation_without_feedthrough(self, source: str, order: int) -> Array:
-        """Return the bound of `ModalResponses.line_deviation` without the feedthrough of a force.
+        """Return a bound of the distance of responses from straight lines in each step, shape (T,).
 
-        Its shape is (T,).
+        Row j belongs to the step that ends at node j. What a force adds to accelerations at once,
+        its feedthrough f(t), is left out of the responses.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start" (initial displacements).
+            order: Order of the derivative by time, among those given at the construction.
         """
         deviation = self._line_deviation(source, order)
         if not is_fed_through(source, order):
@@ -253,14 +296,18 @@ class Oscillators:
 def read_response(source: str, sigma: Array, G: Array) -> Array:
     """Return the responses e of oscillators to a source from G = σ^ν ρ, without feedthrough.
 
+    ρ is the Duhamel integral of the source, exp(σ t) for an initial state, and ν the order of the
+    derivative by time. e = −Im G/ω for "load", an acceleration a of the ground, which acts as −M ι
+    a; Im G/ω for "force1", …, and "velocity"; and Re G + (g/ω) Im G for "start", an initial
+    displacement.
+
     Args:
-        source: Name of a load or force, "velocity" or "start".
-        sigma: σ of S oscillators, shape (S,).
-        G: Shape (..., S).
+        source: One of these names.
+        sigma: σ = −g + iω of S oscillators, shape (S,), ω > 0.
+        G: Complex, shape (..., S).
 
     Returns:
-        Real numbers of the shape of G. A load is an acceleration a of the ground, which acts as
-        −M ι a and gives the opposite sign.
+        Real numbers of the shape of G.
     """
     if source == "start":
         return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
@@ -306,20 +353,27 @@ def response_ranges(
     sources: Sequence[str],
     orders: Sequence[int],
 ) -> dict[int, Ranges]:
-    """Return ranges of λ^κ e over all oscillators with ω and g/ω in given ranges.
+    """Return ranges of λ^κ e over all oscillators with ω and g/ω in given ranges, at time nodes.
 
-    λ = |σ|², and e is the response to a source.
+    e is the response of an oscillator with σ = −g + iω and λ = |σ|² to a unit of a source.
+    Frequencies are divided into pieces, and each piece into a table if that is not too large.
 
     Args:
-        omega: Least and largest frequency ω, in rad/s.
-        quotient: Least and largest g/ω.
+        omega: Smallest and largest frequency ω > 0, in rad/s.
+        quotient: Smallest and largest g/ω ≥ 0.
         loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
-        sources: Names of the sources.
-        orders: Orders of the derivatives by time.
+        sources: "load" (the ground), "force1", …, "velocity", "start" (initial displacements).
+        orders: Orders of the derivatives of e by time.
 
     Returns:
-        The ranges for each order.
+        For each order `low` and `high`, bounds of λ^κ e for κ = 0, ½, 1, and `line_deviation`,
+        bounds of its distance from a straight line in the step before each node, without what a
+        force adds at once; shape (3, sources, T) each.
+
+    Raises:
+        UnprovedError: An oscillator is out of the range in which responses are computed to
+            rounding.
     """
     # frequencies of a piece differ by this factor at most, so that λ^κ changes little in it
     largest_ratio = 1.5
@@ -345,9 +399,21 @@ def _widen_by_piece(
     time: Array,
     sources: Sequence[str],
 ) -> None:
-    """Widen ranges, in place, to those of the oscillators of a piece of frequencies.
+    """Widen ranges of λ^κ e, in place, to those of the oscillators of a piece of frequencies.
 
-    Arguments are as for `response_ranges`; `found` has the ranges for each order.
+    Args:
+        found: By the order of a derivative of the response e by time: `low`, `high` and
+            `line_deviation`, bounds of λ^κ e and of its distance from straight lines in steps,
+            shape (3 exponents κ, sources, T) each; changed in place.
+        omega: Smallest and largest frequency ω of the piece, in rad/s.
+        quotient: Smallest and largest g/ω.
+        loads: History of each load or force by the name of its source.
+        time: Time nodes, shape (T,), in s.
+        sources: Names of the sources; those that are no loads are "velocity" and "start".
+
+    Raises:
+        UnprovedError: An oscillator is out of the range in which responses are computed to
+            rounding.
     """
     slowest, fastest = omega
     decay = quotient[0] * slowest  # least g
@@ -395,9 +461,17 @@ def _tables_of_piece(
     time: Array,
     orders: Collection[int],
 ) -> Oscillators | None:
-    """Return tables of the oscillators of a piece, or None if they would be too large.
+    """Return tables of the responses of oscillators of a piece of frequencies, or None.
 
-    Arguments are as for `response_ranges`.
+    Args:
+        omega: Smallest and largest frequency ω of the piece, in rad/s.
+        quotient: Smallest and largest quotient g/ω of decay and frequency.
+        loads: History of each load or force by the name of its source.
+        time: Time nodes, shape (T,), in s.
+        orders: Orders of the derivatives by time that are asked for.
+
+    Returns:
+        None without loads, or where more than 240 points along ω would be needed.
     """
     # A response changes over a distance in σ of about the decay or the inverse duration. Points
     # are .4 of it apart; tighter ones cost memory, wider ones are no better than the integral.
@@ -416,8 +490,11 @@ def _tables_of_piece(
 def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:
     """Return bounds of factor · (value ± error) over a grid of oscillators, lower and upper, (T,).
 
+    They hold for all oscillators between the points.
+
     Args:
-        value: Values at the points of the grid, shape (T, Q, W), bilinear between them.
+        value: Values at the points of the grid, bilinear between them, shape (T, Q, W), W ≥ 2:
+            times, quotients g/ω, frequencies ω.
         error: Bound of the distance from that, shape (T,).
         factor: Positive factors, shape (Q, W), monotonic along Q and rising along W.
     """
