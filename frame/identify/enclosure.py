@@ -32,17 +32,19 @@ def enclosure(
 ) -> tuple[Array, Array] | None:
     """Return a box that contains all parameters that agree with ranges of measured modes.
 
-    Linear programs bound each side in several passes over ever smaller boxes.
+    Linear programs with proved bounds narrow each side in up to six passes over ever smaller boxes.
+    That the box contains all such parameters is proved; it may contain others, too.
 
     Args:
-        chain: The frame.
+        chain: The frame as a chain of masses on springs, and its uncertain parameters.
         lower: Lower ends of the first box, shape (parameters,): logarithms of the parameters over
             their nominal values.
         upper: Upper ends of the first box.
-        modes: Ranges of the measured modes.
+        modes: Ranges of the eigenvalue, and of the measured amplitudes, of each mode.
 
     Returns:
-        Lower and upper ends of the box, or None if no parameters agree with the modes.
+        Lower and upper ends of the box in the same logarithms, within the first box; or None if it
+        is proved that no parameters agree with the modes.
     """
     lower = lower.copy()
     upper = upper.copy()
@@ -103,7 +105,18 @@ class LinearRelaxation:
         self.rows: list[Array] = []
 
     def variable(self, low: float, high: float) -> Array:
-        """Add a variable between two ends and return it; if the ends agree, return a constant."""
+        """Add a variable of the linear program between two ends, and return it as an expression.
+
+        An expression is the array of its coefficients by all variables, of which the first one is
+        the constant 1. If the ends agree, no variable is added, and a constant is returned.
+
+        Args:
+            low: Lower end.
+            high: Upper end.
+
+        Raises:
+            IndexError: The program has as many variables as it was made for.
+        """
         if low == high:
             return low * self.one
         k = self.count
@@ -118,10 +131,16 @@ class LinearRelaxation:
         return float(ends[0]), float(ends[1])
 
     def product(self, x: Array, y: Array) -> Array:
-        """Add and return a variable for the product of two expressions.
+        """Return an expression for the product of two expressions, with bounds of it as rows.
 
-        With x in [a, b] and y in [c, d], the nonnegative products (x - a)(y - c), (b - x)(d - y),
-        (b - x)(y - c) and (x - a)(d - y) give the four bounding planes.
+        A variable z is added to the linear program for x y. With x in [a, b] and y in [c, d], the
+        nonnegative products (x - a)(y - c), (b - x)(d - y), (b - x)(y - c) and (x - a)(d - y) give
+        four rows that are linear in x, y and z (McCormick, Mathematical Programming 10, 147, 1976).
+        If an expression is constant, the product is exact and nothing is added.
+
+        Args:
+            x: Coefficients by all variables, shape (size,).
+            y: Coefficients of the other expression.
         """
         a, b = self.range(x)
         c, d = self.range(y)
@@ -137,9 +156,15 @@ class LinearRelaxation:
         return z
 
     def exponential(self, y: Array) -> Array:
-        """Add and return a variable for exp(y), above three tangents and below the secant.
+        """Return an expression for exp(y), with bounds of it as rows.
 
-        The ends and the secant are widened by a few units of rounding.
+        A variable is added to the linear program. Since the exponential is convex, it lies above
+        its tangents at both ends and at the midpoint of the range of y, and below the secant of
+        this range. The ends and the secant are widened by a few units of rounding. If y is
+        constant, nothing is added.
+
+        Args:
+            y: Expression, given by its coefficients by all variables, shape (size,).
         """
         low, high = self.range(y)
         if low == high:
@@ -163,11 +188,16 @@ class LinearRelaxation:
 def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array) -> float:
     """Return a proved lower bound of cᵀx over A x ≤ 0, l ≤ x ≤ u.
 
+    For any multipliers y ≤ 0, yᵀA x ≥ 0 and hence cᵀx ≥ (c - Aᵀy)ᵀx, whose minimum over the box
+    l ≤ x ≤ u alone is exact but for rounding. The multipliers of a solver make this bound sharp;
+    that they are inaccurate does not matter (Neumaier and Shcherbina, Mathematical Programming 99,
+    283, 2004). If the solver fails, the minimum over the box alone is returned.
+
     Args:
         objective: c, shape (variables,).
         rows: A, shape (rows, variables).
-        lower: l, shape (variables,).
-        upper: u, shape (variables,).
+        lower: l, shape (variables,), finite.
+        upper: u, shape (variables,), finite.
 
     Returns:
         The bound; +∞ if it is proved that no x exists.
@@ -177,7 +207,7 @@ def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array
     no_multipliers = np.zeros(rows.shape[0])
     ends = np.column_stack([lower, upper])
     result = linprog(objective, A_ub=rows, b_ub=no_multipliers, bounds=ends, method="highs")
-    is_infeasible = result.status == 2
+    is_infeasible = result.status == 2  # as the solver finds, within its tolerances
     if is_infeasible:
         # The set is empty if the smallest t with A x - t ≤ 0 for some x is proved positive.
         relaxed = csr_array(hstack([rows, csr_array(-np.ones((rows.shape[0], 1)))]))
@@ -270,13 +300,15 @@ class ChainRelaxation(LinearRelaxation):
     ) -> None:
         """Add the variables and the equations of motion of a mode with a measured shape.
 
-        Nothing is added if an amplitude that was not measured is not bounded.
+        The variables of amplitudes that were not measured are kept in `self.unmeasured`, by the
+        numbers of mode and floor. Nothing is added if such an amplitude is not bounded.
 
         Args:
-            cut: Ranges of the mode.
-            low: Smallest eigenvalue λ, in 1/s².
-            high: Largest eigenvalue.
-            known: Known ranges of amplitudes that were not measured, by mode and floor.
+            cut: Ranges of the amplitudes of the measured floors.
+            low: Smallest eigenvalue λ of the mode, in 1/s².
+            high: Largest eigenvalue, positive.
+            known: Ranges of amplitudes that were not measured, as far as earlier programs have
+                found them, by the numbers of mode and floor, from 1.
         """
         ends = self._amplitude_ranges(high, cut)
         if ends is None:
@@ -293,7 +325,11 @@ class ChainRelaxation(LinearRelaxation):
     def _add_balance(
         self, shape: Mapping[int, Array], relative_eigenvalue: Array, eigenvalue: float
     ) -> None:
-        """Add T_z - T_(z+1) = λ m_z r_z at each floor z.
+        """Add the equation of motion T_z - T_(z+1) = λ m_z r_z at each floor z, as two rows each.
+
+        T_z = k_z (r_z - r_(z-1)) is the shear force of the storey below the floor z with the
+        stiffness k_z, m_z the mass and r_z the amplitude of the floor. Products are enclosed by
+        linear inequalities.
 
         Args:
             shape: Amplitude of each floor as an expression, by its number from 1.
@@ -328,11 +364,16 @@ class ChainRelaxation(LinearRelaxation):
 
         The floors between two measured ones are a chain between moving supports. While λ is below
         the smallest eigenvalue of this chain, K - λ M is positive definite, and the amplitudes are
-        at most the norm of the forces of the supports over the smallest eigenvalue of K - λ M.
+        at most the norm of the forces of the supports over the smallest eigenvalue of K - λ M. If
+        this eigenvalue is not positive for all parameters of the box, there is no bound.
 
         Args:
             eigenvalue: Largest eigenvalue λ of the mode, in 1/s².
-            cut: Ranges of the mode with the amplitudes of the measured floors.
+            cut: Ranges of the mode with the amplitudes of the measured floors, at least one.
+
+        Returns:
+            Lower and upper end of the amplitude by the number of the floor, from 1: the measured
+            ranges, and ±bound for the other floors.
         """
         n = len(self.mass)
         amplitudes = dict(cut.shape)
@@ -379,12 +420,14 @@ class ChainRelaxation(LinearRelaxation):
 
         where ε² is (K x - q M x)ᵀ M⁻¹ (K x - q M x) / xᵀM x. Any number in the place of q makes it
         larger. The inequalities added are q ≥ low - e₁ and q ≤ high + e₂ for the measured range
-        [low, high] of λ_k, with bounds e₁ and e₂ of both fractions over the box.
+        [low, high] of λ_k, with bounds e₁ and e₂ of both fractions over the box. Nothing is added
+        if the neighbouring eigenvalues are not known to lie apart from q and λ_k over all the box.
 
         Args:
-            cut: Range of the mode's eigenvalue.
-            low: Smallest factors of stiffnesses and masses, shape (2, floors).
-            high: Largest factors.
+            cut: Number of the mode, from 1, and range of its eigenvalue, in 1/s².
+            low: Smallest factors of nominal stiffnesses (first row) and masses (second row) over
+                the box, shape (2, floors).
+            high: Largest factors, same shape.
         """
         chain = self.chain
         k = cut.mode - 1

@@ -24,9 +24,10 @@ from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenval
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.result import Ends
+from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
@@ -136,10 +137,22 @@ class Evidence:
         held_out: Sequence[int],
         alpha: Sequence[float],
     ) -> Self:
-        """Check the arguments of `identify` and return the evidence that it learns from.
+        """Check the arguments of `identify`, and divide the modes into learned and held out.
+
+        Args:
+            frame: The frame.
+            inputs: Parameters of stiffness and mass before the measurement, as fuzzy numbers by
+                name, in SI units; a plain number is a crisp one.
+            modes: Measured modes by rising number.
+            held_out: Numbers of modes that are predicted instead of learned from. They may be
+                modes that the frame does not have, and may have values without scatter.
+            alpha: Levels.
 
         Raises:
-            RefusedError: As `identify`.
+            RefusedError: The frame is no storey frame; levels do not rise within (0, 1]; modes do
+                not rise, or all are held out, or one that is not measured is; a mode or floor that
+                is learned from is not one of the frame or has values without scatter; or an input
+                is missing, no number, no parameter of stiffness or mass, or not positive.
         """
         is_frame = isinstance(frame, StructureModel) and frame.floors > 0
         require(is_frame, "frame", value=type(frame).__name__, allowed="a StoreyFrame")
@@ -162,12 +175,7 @@ class Evidence:
             allowed = f"modes and floors from 1 to {frame.floors}"
             require(largest <= frame.floors, "identify.modes", value=largest, allowed=allowed)
             mode.require_scatter()
-        prior: dict[str, FuzzyNumber] = {}
-        for name, number in inputs.items():
-            if isinstance(number, FuzzyNumber):
-                prior[name] = number
-            else:
-                prior[name] = Crisp(float(number))
+        prior = fuzzy_inputs(inputs)
         chain = Chain(frame, tuple(prior))
         # Parameters enter by their logarithms.
         smallest = min(widest_cut(number).lower for number in prior.values())
@@ -192,10 +200,15 @@ class Evidence:
         return JointRule(names, independent=False, means=means, named=True)
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
-        """Return the α-cut of a number.
+        """Return the cut of a parameter or measured quantity for the joint set of a level.
 
-        n claims hold together with a probability of 1 - α or more if each holds with a probability
-        of 1 - α/n (Bonferroni). A claim is therefore cut at α/n.
+        An opinion is cut at α. A claim holds with a certain probability. n claims hold together
+        with a probability of 1 - α or more if each holds with a probability of 1 - α/n, by the
+        inequality of Bonferroni, so that each claim is cut at α/n.
+
+        Args:
+            number: Opinion or claim, one of those of this evidence.
+            alpha: Level α of the set, in (0, 1].
         """
         if self.joint is not None and isinstance(number, ClaimedNumber):
             return number.cut(alpha / len(self.joint.names))
@@ -238,7 +251,11 @@ class Identified:
 
     @property
     def refutation(self) -> str:
-        """What the measurement says about a refuted frame; empty for others."""
+        """A sentence that says that the measured modes refute the frame; empty if they do not.
+
+        A frame is refuted if it is proved that no parameters within their priors agree with the
+        modes on the lowest level.
+        """
         if not self.is_refuted:
             return ""
         level = f"{self.alpha[0]:g}"
@@ -257,12 +274,14 @@ class Identified:
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
-        """Identified parameters by name, as fuzzy numbers for an envelope.
+        """Identified parameters by name, as fuzzy numbers in SI units for an envelope.
 
-        Their cuts are the sides of the boxes. The boxes also contain structures that do not agree
-        with the modes, so that results are those of the box around the learned set, and say so.
-        Below the lowest level the cuts are the supports of the priors. Where priors or measurements
-        are claims, so are the numbers, with one joint confidence.
+        Their cuts are the sides of the boxes that were proved to contain all parameters which agree
+        with the modes; between two levels the wider cut holds. The boxes also contain structures
+        that do not agree with the modes, so that the numbers say that they enclose "the learned
+        set". Below the lowest level the cut of a parameter is the support of its prior, unless the
+        prior is a claim, which says nothing there. If any prior or measured quantity is a claim,
+        all numbers are claims that hold together.
 
         Raises:
             RefutedError: The frame is refuted.
@@ -303,9 +322,11 @@ class Identified:
         return dict(zip(self.names, fractions.tolist(), strict=True))
 
     def predictions(self) -> Predictions:
-        """Return proved bounds of all natural frequencies on each level.
+        """Return proved bounds of all natural frequencies of the frame over the box of each level.
 
-        For a refuted frame there are none: lower bounds are +∞ and upper bounds are -∞.
+        They are in Hz, and stand beside the mean measured frequencies of all modes, those that are
+        held out included. For a refuted frame there are none: lower bounds are +∞ and upper bounds
+        are -∞.
         """
         chain = self.evidence.chain
         lower = np.full((len(self.alpha), len(chain.mass)), np.inf)
@@ -328,7 +349,12 @@ class Identified:
 
     @cached_property
     def answer(self) -> LearnedInputs:
-        """What was learned, as data for tables and files."""
+        """What was learned, as data for tables and files.
+
+        It has the ends of the box of each parameter on all levels, by how much they were narrowed
+        from the priors, what they claim, and the predictions of modes that were held out. For a
+        refuted frame it has the levels and the refutation alone.
+        """
         if self.is_refuted:
             return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
         inputs = {}

@@ -56,7 +56,12 @@ class Predictions:
 
     @property
     def held_out(self) -> tuple[Prediction, ...]:
-        """The measured modes that were not learned from, as far as the frame has them."""
+        """Predictions of the measured modes that were not learned from, by rising number.
+
+        Each has the measured frequency, the range that is predicted on the lowest level, and
+        whether the former lies in the latter, ends included. Modes beyond the number of floors are
+        left out. For a refuted frame no range contains the measured frequency.
+        """
         predictions = []
         for mode in sorted(self.measured.keys() - set(self.learned_from)):
             # A frame with n floors has n modes; a higher measured mode is no mode of this model.
@@ -69,7 +74,11 @@ class Predictions:
         return tuple(predictions)
 
     def __str__(self) -> str:
-        """Return a line for each mode on the lowest level."""
+        """Return a head, and a line with the predicted range of each mode on the lowest level.
+
+        The mean measured frequency stands beside it as far as there is one, and whether it lies
+        inside for a mode that was held out. A refuted frame has one line that says so.
+        """
         if not np.isfinite(self.lower).all():
             return "no frequency is predicted: the frame is refuted"
         verdicts = {mode.mode: f", {mode.verdict}: held out" for mode in self.held_out}
@@ -118,7 +127,12 @@ class LearnedInputs(Answer):
         return bool(self.refuted)
 
     def table(self) -> Table:
-        """Return a row for each parameter, before and after, and for each mode held out."""
+        """Return a table of texts with a row for each parameter and for each mode held out.
+
+        The columns are the name; the prior, or the measured frequency; the range that was learned
+        on the lowest level, or the predicted range of the frequency; and the width of the learned
+        range in per cent of the prior's, or whether the measured frequency lies inside.
+        """
         rows: list[tuple[str, ...]] = []
         for name in self.inputs:
             before = outer_text(self.prior[name], self.units[name])
@@ -135,7 +149,13 @@ class LearnedInputs(Answer):
         return float(ends.lower[0]), float(ends.upper[0])
 
     def records(self) -> list[Record]:
-        """Return the numbers of the table, in SI units."""
+        """Return a row of numbers for each parameter and for each mode held out, in SI units.
+
+        The columns are name, unit, both ends of the prior (or twice the measured frequency), both
+        ends of the range that was learned or predicted on the lowest level, the width of the
+        learned range over that of the prior (None for a mode), and "inside" or "outside" for a
+        mode (empty for a parameter).
+        """
         rows: list[Record] = []
         for name in self.inputs:
             row = _record(
@@ -162,7 +182,17 @@ class LearnedInputs(Answer):
 def _record(
     name: str, unit: str, *, before: tuple[float, float], after: tuple[float, float]
 ) -> Record:
-    """Return a row of numbers; its last columns, on narrowing and predictions, are empty."""
+    """Return a row of numbers about a parameter or a mode that was held out.
+
+    The last two columns, "narrowed by" of a parameter and "inside" of a mode, are left None and
+    empty.
+
+    Args:
+        name: Name of the parameter, or "mode 2" and so on.
+        unit: SI unit of the numbers.
+        before: Ends of the prior, or twice the measured frequency.
+        after: Ends of the learned range, or of the predicted frequency.
+    """
     return {
         "input or mode": name,
         "unit": unit,

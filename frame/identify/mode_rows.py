@@ -39,13 +39,14 @@ class ModeRows:
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     """Read the measurements of each mode, by rising number, from a CSV file.
 
-    The header is ``mode,frequency [Hz],q1,q2`` with the floors that were measured. Standard
+    The header is ``mode,frequency [Hz],q1,q2`` with the floors that were measured, in any order of
+    the columns. Each row is one measurement of a mode, and a mode may have several. Standard
     deviations may stand in the columns ``frequency_std [Hz]`` and ``shape_std``. An empty cell
     means that the amplitude was not measured.
 
     Raises:
-        RefusedError: The file is missing, its header or a row is wrong, or a mode has an amplitude
-            in some rows and not in others.
+        RefusedError: The file is missing, its header or a row is wrong, a mode has an amplitude
+            in some rows and not in others, or all amplitudes of a mode are zero.
     """
     (_, header), *rows = fields(path)
     columns: dict[str, int] = {}
@@ -87,11 +88,16 @@ def _measurements_of_mode(
 ) -> ModeRows:
     """Return the measurements of one mode from its rows of the file.
 
+    Standard deviations that the rows state become one number for the frequency, relative to its
+    mean, and one for all amplitudes, relative to the largest mean amplitude. A shape needs the
+    amplitudes of two floors; that of a single floor is left out.
+
     Args:
         path: The file, for messages.
         mode: Number of the mode.
         values: Numbers of the rows, shape (measurements, columns); NaN where a cell is empty.
-        columns: Index of each column by its title.
+        columns: Index of each column by its title without a unit: "mode", "frequency", perhaps
+            "frequency_std" and "shape_std", and "q1" and so on for the amplitude of a floor.
 
     Raises:
         RefusedError: An amplitude is missing in some rows and not in others, or all are zero.

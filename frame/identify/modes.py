@@ -70,16 +70,18 @@ class Chain:
         self.mass = np.asarray(frame.masses, float)
 
     def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return the ranges of stiffnesses and masses over a box of parameters.
+        """Return the exact ranges of stiffnesses and masses over a box of parameters.
 
-        All are given by the logarithm of the value over the nominal value.
+        Parameters, stiffnesses and masses are all given by the logarithm of the value over the
+        nominal value. In these the stiffnesses and masses are linear.
 
         Args:
             lower: Lower ends of the box, shape (parameters,).
             upper: Upper ends of the box.
 
         Returns:
-            Lower and upper ends, shape (2, floors) each, with the stiffnesses first.
+            Lower and upper ends, shape (2, floors) each: the first row has the stiffnesses of the
+            storeys, the second one the masses of the floors.
         """
         # A linear function has its extremes over a box at the ends of each coordinate.
         ends = np.sort([self.powers * lower, self.powers * upper], axis=0).sum(axis=-1)
@@ -87,27 +89,39 @@ class Chain:
 
 
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
-    """Return the eigenvalues ω² and the mode shapes of chains, as `undamped_modes` does.
+    """Return the eigenvalues ω² and the mode shapes of chains of masses on springs.
 
     Args:
-        stiffness: Stiffnesses of the springs, shape (…, floors).
-        mass: Masses, same shape.
+        stiffness: Stiffnesses of the springs, shape (…, floors): the first one joins the ground and
+            the first mass, the next one the first and the second mass, and so on.
+        mass: Masses, same shape, positive.
+
+    Returns:
+        The eigenvalues, rising, shape (…, floors), and the mode shapes φ as columns with
+        φᵀM φ = 1, shape (…, floors, modes).
+
+    Raises:
+        numpy.linalg.LinAlgError: A mass is not positive.
     """
     return undamped_modes(diagonal(mass), chain_matrix(stiffness))
 
 
 def eigenvalue_ranges(chain: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return proved bounds of all eigenvalues ω² of a chain over a box, in 1/s².
+    """Return proved bounds of all eigenvalues ω² of a chain over a box of parameters, in 1/s².
 
-    Eigenvalues rise with every stiffness and fall with every mass.
+    Eigenvalues rise with every stiffness and fall with every mass (Courant and Fischer), so that
+    they are smallest for the smallest stiffnesses and the largest masses. They are computed there
+    and at the opposite corner, and moved outwards by a bound of their rounding.
 
     Args:
         chain: The chain.
-        lower: Lower ends of the box as for `Chain.ranges`.
+        lower: Lower ends of the box, shape (parameters,): logarithms of the parameters over their
+            nominal values.
         upper: Upper ends of the box.
 
     Returns:
-        Lower and upper bounds, shape (floors,) each.
+        Lower and upper bounds of the eigenvalues in rising order, shape (floors,) each. A lower
+        bound may be slightly negative by rounding.
     """
     low, high = chain.ranges(lower, upper)
     stiffness = chain.stiffness * np.exp(np.stack([low[0], high[0]]))
@@ -140,7 +154,12 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        """Check that numbers are from 1 on, and that the reference floor is beside the shape."""
+        """Check the numbers of mode and floors, the frequency and the reference floor.
+
+        Raises:
+            RefusedError: The number of the mode or of a floor is below 1; the nominal frequency is
+                not positive; or a shape has no reference floor, or one among its own floors.
+        """
         key = f"mode {self.mode}"
         hertz = self.frequency.nominal
         numbers = [self.mode, *self.shape]
@@ -158,7 +177,12 @@ class MeasuredMode:
         return {f"f{self.mode}": self.frequency, **amplitudes}
 
     def require_scatter(self) -> None:
-        """Raise RefusedError if the frequency or an amplitude is crisp: it teaches nothing."""
+        """Check that the frequency and all amplitudes of the mode have a scatter.
+
+        Raises:
+            RefusedError: One of them is a crisp number. It would claim to be exact, so that hardly
+                any parameters would agree with it.
+        """
         for name, number in self.quantities.items():
             kind = "frequency" if number is self.frequency else "shape"
             value = f"{name} = {number.nominal:.4g} without scatter"
@@ -172,7 +196,14 @@ class MeasuredMode:
             )
 
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
-        """Return the ranges of eigenvalue and amplitudes for a function that cuts fuzzy numbers."""
+        """Return the ranges of the eigenvalue ω² and of the amplitudes of the mode on a level.
+
+        A negative end of the frequency, which a claim from few values may have, becomes 0. The
+        reference floor gets the amplitude 1 exactly; without a shape there is none.
+
+        Args:
+            cut: Function that returns both ends of a fuzzy number on the level.
+        """
         # A claim from few values may reach below zero.
         frequency = np.maximum(cut(self.frequency), 0.0)
         low, high = (2 * np.pi * frequency) ** 2
@@ -212,19 +243,24 @@ def measured_mode(
 
     Args:
         mode: Number of the mode by rising frequency, from 1.
-        frequencies: Measured frequencies, in Hz.
+        frequencies: Measured frequencies, in Hz, at least one.
         shapes: Measured amplitudes by floor, as many for each floor as there are frequencies. Each
             set is divided by the amplitude of the reference floor, the highest floor whose mean
-            amplitude is near the largest.
+            amplitude is at least 0.8 times the largest.
         frequency_deviation: Standard deviation of one measured frequency as a fraction of the mean,
             if known from elsewhere; by default the scatter of the values. Values without scatter
             give a crisp number: nothing is learned from such a mode, but it can be held out.
         shape_deviation: Standard deviation of any amplitude as a fraction of the largest amplitude
             of the mode, likewise. It is the same for all floors.
 
+    Returns:
+        The mode with its mean frequency, and with the mean ratio of each floor's amplitude to that
+        of the reference floor.
+
     Raises:
-        RefusedError: Values contradict their deviation, the counts differ, or the amplitude of the
-            reference floor is 0 or scatters too much.
+        RefusedError: Values contradict their deviation, a deviation is not positive, the counts
+            differ, all amplitudes are 0, or that of the reference floor is 0 in a measurement or
+            scatters by more than 20 %.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
@@ -265,7 +301,11 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
         deviation: Standard deviation of an amplitude over the amplitude of the reference floor; if
             None, it is estimated from the scatter of the ratios.
         what: Name of the ratio in messages.
-        reference: Number of the reference floor.
+        reference: Number of the reference floor, for messages.
+
+    Returns:
+        The mean as a number that carries a claim of coverage; a crisp number if the deviation is
+        estimated and the ratios do not scatter.
 
     Raises:
         RefusedError: The reference amplitude is 0 or scatters by more than 20 %; or the ratios
@@ -291,17 +331,22 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyNumber:
-    """Return the mean of measured values as a fuzzy number with a claim.
+    """Return the mean of measured values as a fuzzy number with a claim of coverage.
+
+    The values are taken for independent ones of a normal distribution, and the α-cut contains its
+    mean with a probability of 1 - α: by Student's distribution if the deviation is estimated from
+    the values, by the normal distribution if it is known.
 
     Args:
-        values: Measured values, shape (measurements,).
+        values: Measured values, shape (measurements,), at least one.
         deviation: Standard deviation of a value; if None, it is estimated, and values that do not
             scatter give a crisp number.
         what: Name of the values in messages.
         key: Name of the option that states the deviation.
 
     Raises:
-        RefusedError: The deviation is not positive, or the values contradict it.
+        RefusedError: The deviation is not positive, or the values scatter so much more that they
+            contradict it (with a probability of error of 1e-6).
     """
     count = len(values)
     if deviation is None:

@@ -35,11 +35,14 @@ def read_modes(
             NODE.DIRECTION, as ``{"12.x": 1}``.
 
     Returns:
-        The modes by rising number.
+        The modes by rising number, each with its mean frequency and mean amplitudes as fuzzy
+        numbers that carry claims of coverage. Deviations that the file states are preferred to the
+        arguments.
 
     Raises:
-        RefusedError: The file cannot be read, floors are given for a CSV file or missing for a
-            universal file, or the measurements contradict their deviation.
+        RefusedError: The file cannot be read, a deviation is not positive, floors are given for a
+            CSV file or missing for a universal file, or the measurements contradict their
+            deviation.
 
     Example:
         >>> modes = read_modes("cases/laboratory-frame.modes.csv", frequency_deviation=0.01)

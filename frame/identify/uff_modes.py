@@ -19,13 +19,17 @@ from alphacut.frame.records.uff import COMPLEX, DIRECTIONS, data_sets, floats
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
     """Read the modes of a universal file, by rising number, with one measurement each.
 
+    They stand in data sets 55 of normal or complex modes; other data sets are passed over. If only
+    one floor was measured, the mode has no shape.
+
     Args:
         path: The file.
         floors: Floor of each measured unknown, named NODE.DIRECTION, such as ``{"12.x": 1}``.
 
     Raises:
-        RefusedError: The file has no mode, a data set is damaged, a mode is given twice, an unknown
-            is missing, or a shape is complex in earnest.
+        RefusedError: The file has no mode, a data set is damaged, a mode is given twice, a
+            frequency is not positive and finite, an unknown is missing or not finite, or the phases
+            of a shape differ too much for a real shape.
     """
     content = read_bytes(path)
     try:
@@ -68,13 +72,18 @@ class UffShape(NamedTuple):
 def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     """Return the mode shape of a data set 55, or None for a data set of another analysis.
 
+    The frequency of a complex mode is |s| / 2π in Hz with its eigenvalue s. Amplitudes are complex
+    numbers named by node and direction, such as "12.x"; real ones have no imaginary part.
+
     Args:
         head: The eight lines of the head.
-        values: The lines below the head.
+        values: The lines below the head: for each node a line that begins with its number, and
+            lines with six numbers each. Empty lines are passed over.
 
     Raises:
-        ValueError: The data set is damaged.
-        IndexError: The data set is damaged.
+        ValueError: The data set is damaged: a word is no number, a line is missing, or a node is
+            given twice.
+        IndexError: A line of the head has too few words.
     """
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
     is_normal = analysis == 2
@@ -109,15 +118,19 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
 def _real_amplitudes(
     key: str, amplitudes: Mapping[str, complex], floors: Mapping[str, int]
 ) -> dict[int, Array]:
-    """Return the real amplitude of a mode on each measured floor, shape (1,) each.
+    """Return the real amplitude of a mode on each measured floor, an array of one number each.
+
+    The phases of all amplitudes are turned by a common angle that makes the norm of the real parts
+    largest, and the imaginary parts that remain are left out.
 
     Args:
         key: Name of the mode in messages.
-        amplitudes: Complex amplitudes by NODE.DIRECTION.
-        floors: Floor of each measured unknown, by NODE.DIRECTION.
+        amplitudes: Complex amplitudes by node and direction, such as "12.x".
+        floors: Number of the floor of each measured unknown, by node and direction in either case.
 
     Raises:
-        RefusedError: An unknown is missing or not finite, or the phases differ too much.
+        RefusedError: An unknown is missing or not finite, or the modal phase collinearity is below
+            0.9, so that there is no real shape.
     """
     missing = [name for name in floors if name.lower() not in amplitudes]
     value = f"without {', '.join(missing)}"
@@ -141,7 +154,7 @@ def phase_collinearity(shape: Array) -> float:
 
     It is (λ₁ - λ₂)² / (λ₁ + λ₂)² with the eigenvalues λ of the covariance matrix of the real and
     the imaginary parts (Pappa and Elliott, J. Guidance Control Dyn. 16, 860, 1993). It is 1 if all
-    phases are equal or opposite.
+    phases are equal or opposite, and also if all amplitudes are 0; the smallest value is 0.
 
     Args:
         shape: Complex amplitudes, shape (unknowns,).

@@ -193,6 +193,8 @@ LEVELS = r"rising in \(0, 1\]"
         (held_out_of(FIRST, held_out=[2]), r"held_out is 2; allowed: some of modes"),
         (identified_from(replace(FIRST, mode=4)), r"modes is 4; allowed: modes and floors .* to 3"),
         (identified_from(FIRST, prior={"c1": Interval(-1, 2)}), r"is -1.*: positive priors"),
+        (identified_from(FIRST, prior={}), r"inputs is {}; allowed: a mapping"),
+        (identified_from(FIRST, prior={"c1": "2"}), r"input c1 is '2'; allowed: finite numbers"),
         (lambda: Chain(FRAME, ("d1",)), r"parameters is d1; allowed: E, I, c1"),
         (lambda: Chain(FRAME, ("c4",)), r"parameters is c4; allowed: E, I, c1"),
         (identified_from(FIRST, alpha=(0.0, 0.5)), LEVELS),
