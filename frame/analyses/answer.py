@@ -79,9 +79,13 @@ class Answer(ABC):
         Path(path).write_text(csv_text(_titles(rows), cells), encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return the rows of numbers as an xarray dataset.
+        """Return the rows of numbers of the result as an xarray dataset.
 
-        Each column is a variable over the dimension `row`. Unknown numbers are NaN.
+        Each column of `records` becomes a variable with the column's title over the dimension
+        `row`: an array of texts if the column has a text, with "None" for unknown values, and else
+        an array of floats in SI units with NaN for unknown numbers. The title of the result and
+        its explaining sentences are the attributes "title" and "notes". Without rows the dataset
+        has no variables.
         """
         import xarray
 

@@ -76,7 +76,13 @@ class LimitDecision(LimitResult):
 
     @property
     def verdict_and_motion(self) -> str:
-        """The verdict; if only some responses exceed the limit, with the inputs of one of them."""
+        """The verdict in words; if only some responses exceed the limit, with one of them.
+
+        This one is said by the inputs that attain the peak, and by the record of a suite: "can be
+        exceeded, as at k1 = 38.00 MN/m, record RSN953". If all or no responses exceed the limit,
+        or no inputs are known, the verdict alone is given, with the lowest computed level if that
+        is not 0: "not exceeded from α = 0.5 up".
+        """
         # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
         if not is_by_some or self.peak is None or not self.peak.reached_at:
@@ -92,9 +98,15 @@ class LimitDecision(LimitResult):
         """Return the text of a bound of a peak or of a margin, rounded so that it stays a bound.
 
         Args:
-            value: Bound in SI units, or as a fraction of the limits for an event; may be infinite.
+            value: Bound in the SI unit of the output, or, in the decision on the event that any of
+                several limits is exceeded, as a fraction of the limits; may be infinite or NaN.
             side: "lower" or "upper", for a lower or an upper bound.
-            nature: Guarantee of the bound.
+            nature: Guarantee of the bound. Attained bounds are rounded into the range, all others
+                out of it.
+
+        Returns:
+            The bound with its unit, which is that of the limit as it was stated; a percentage for
+            an event; "not known" for a value that is not finite.
         """
         if not np.isfinite(value):
             return "not known"
@@ -130,7 +142,14 @@ class Decision(Answer):
         return table_of([self._texts(part) for part in self.limits.values()])
 
     def _texts(self, part: LimitDecision) -> dict[str, str]:
-        """Return the texts of a row of the table by the titles of the columns."""
+        """Return the texts of one row of the table by the titles of the columns.
+
+        Margin, bound, attained peak and gap are those of the lowest level. The last three are empty
+        for the event that any of several limits is exceeded, and the gap also where it is unknown.
+
+        Args:
+            part: Decision on the limit or event of the row.
+        """
         bound_text = attained_text = gap = ""
         if part.peak is not None:
             bound = part.peak_bound
@@ -157,7 +176,14 @@ class Decision(Answer):
         }
 
     def records(self) -> list[Record]:
-        """Return a row for each limit; margin and peaks are those of the lowest level."""
+        """Return a row of numbers for each limit, and last for the event that any is exceeded.
+
+        The first columns are name, SI unit and value of the limit. Then follow the verdict, the
+        lowest computed level α and the guarantee; both bounds of the degrees to which exceeding the
+        limit is possible and necessary; and on the lowest level the smallest margin, the bound of
+        the peak and its attained value, in SI units, with None for values that are not known. The
+        margin of an event is a fraction of the limits.
+        """
         return [
             {
                 **part.columns(name),
@@ -204,14 +230,24 @@ def decide(
 ) -> Decision:
     """Return the possibility and the necessity of exceeding limits, and the margins.
 
+    The possibility is the degree α of the highest α-cut that contains a response beyond the limit.
+    The necessity is 1 minus the degree to which it is possible that the limit is kept.
+
     Args:
         response: An envelope, the peaks over a suite of records, or peaks by name.
         limits: Limits of outputs, in SI units.
-        units: SI units of the outputs that `response` does not hold.
-        input_units: SI units of the inputs, for the text that names a response beyond a limit.
+        units: SI units by the name of the output, where `response` does not hold them; by default
+            those that a storey frame's outputs of these names have.
+        input_units: SI units by the name of the input, for the text that names a response beyond a
+            limit.
+
+    Returns:
+        The decision on each limit by its name. With several limits the last decision is on the
+        event that any of them is exceeded.
 
     Raises:
-        RefusedError: There is no limit, a limit is not positive, or it names no output or peak.
+        RefusedError: There is no limit; a limit is given twice or is not finite; a limit of a
+            magnitude is not positive; or `response` has no such output or peak.
 
     Example:
         >>> from alphacut.frame import Limit, StoreyFrame, decide, envelope
@@ -260,24 +296,27 @@ def _decide_limit(
     """Return the decision on one limit from the bounds of the limited peak.
 
     Args:
-        limit: The limit, in SI units.
-        peak: Bounds of the peak on all levels.
+        limit: Limit with one value, in SI units.
+        peak: Bounds of the limited peak on all levels.
         unit: SI unit of the output.
         record: Record under which the peak is attained; empty if there is none.
-        input_units: SI units of the inputs.
+        input_units: SI units by the name of the input, as far as known.
     """
-    alpha = peak.alpha
+    alpha = peak.alpha  # rising
+    # A limit of the smallest value of q is an upper limit of -q, and the bounds are those of -q.
     largest_allowed = limit.outwards
+    # Lower and upper bounds of the largest and of the smallest peak in each cut, (levels,) each.
     max_peak = peak.max_peak_bounds
     min_peak = peak.min_peak_bounds
 
-    # A response of a cut exceeds the limit if the largest peak does.
+    # Some response of a cut exceeds the limit if and only if the largest peak of the cut does. The
+    # possibility is the highest level of such a cut, which both bounds of this peak enclose.
     is_exceeded = max_peak.lower > largest_allowed
     possibility = (
         float(alpha[is_exceeded].max(initial=0.0)),
         _lowest_excluding_level(alpha, max_peak.upper <= largest_allowed),
     )
-    # A response of a cut keeps the limit if the smallest peak does.
+    # Some response of a cut keeps the limit if and only if the smallest peak of the cut does.
     is_kept = min_peak.upper <= largest_allowed
     possibility_of_keeping = (
         float(alpha[is_kept].max(initial=0.0)),
@@ -302,12 +341,17 @@ def _decide_limit(
 def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
     """Return the decision on the event that any of several limits is exceeded.
 
+    Its margins are the smallest ones of the single limits as fractions of these limits; a limit of
+    0 counts as -1, 0 or 1 by the sign of its margin. It has no peak and no record, and its
+    guarantee is the weakest one of the single decisions.
+
     Args:
-        single: Decisions on the limits one by one, on the same levels.
+        single: Decisions on the limits one by one, at least one, on the same levels.
     """
-    # The event is as possible as the most possible of its parts. It is at least as necessary as
-    # each part. Its necessity is 0 if it is not fully possible: then some response of the highest
-    # cut keeps all limits.
+    # Let Π be the possibility and N = 1 - Π(all limits are kept) the necessity of the event. With
+    # the events A_i that single limits are exceeded, Π is max Π(A_i), and N is at least max N(A_i).
+    # As max(Π, 1 - N) = 1 (some response of the highest cut either exceeds or keeps the limits), N
+    # is 0 unless Π is 1; no other upper bound follows from the single limits.
     possibility = (
         max(part.possibility[0] for part in single),
         max(part.possibility[1] for part in single),
@@ -319,8 +363,11 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
     margins = []
     for part in single:
         margin = np.stack(part.margin)
-        # Margins as fractions of the limits; for a limit of 0 only their signs have a meaning.
-        margins.append(margin / abs(part.limit) if part.limit else np.sign(margin))
+        # Limits of different units compare as fractions only; of a limit of 0 the sign is left.
+        if part.limit:
+            margins.append(margin / abs(part.limit))
+        else:
+            margins.append(np.sign(margin))
     # The event leaves the smallest of the margins.
     lower, upper = np.min(margins, axis=0)
     lowest_level = single[0].from_level
@@ -344,11 +391,14 @@ def _verdict(
     *,
     is_exceeded: bool,
 ) -> str:
-    """Return the verdict on the cuts from the lowest computed level on.
+    """Return the verdict on the cuts from the lowest computed level on, as one of four texts.
+
+    "not exceeded" if no response of these cuts exceeds the limit, "exceeded" if all do, "can be
+    exceeded" if one is known that does, and else "undecided".
 
     Args:
-        possibility: Bounds of the degree to which exceeding the limit is possible.
-        necessity: Bounds of the degree to which it is necessary.
+        possibility: Lower and upper bound of the degree to which exceeding the limit is possible.
+        necessity: Lower and upper bound of the degree to which it is necessary.
         lowest_level: Lowest level α that was computed.
         is_exceeded: Whether some response of a cut is known to exceed the limit.
     """
@@ -358,7 +408,9 @@ def _verdict(
         return "not exceeded"
     if necessity[0] >= 1 - lowest_level:
         return "exceeded"
-    return "can be exceeded" if is_exceeded else "undecided"
+    if is_exceeded:
+        return "can be exceeded"
+    return "undecided"
 
 
 def _lowest_excluding_level(alpha: Array, is_excluded: Mask) -> float:

@@ -78,7 +78,14 @@ class CriticalMeasures:
     high: Array
 
     def __post_init__(self) -> None:
-        """Make unknown measures infinite, and check the order of all measures."""
+        """Make unknown measures infinite, and check that `low` ≤ reached ≤ `high` and `low` > 0.
+
+        NaN stands for an unknown measure.
+
+        Raises:
+            RefusedError: A measure is not positive, or an attained one lies outside its bounds by
+                more than a relative rounding of 1e-9.
+        """
         for end in fields(self):
             values = getattr(self, end.name)
             object.__setattr__(self, end.name, np.where(np.isnan(values), np.inf, values))
@@ -96,21 +103,32 @@ class CriticalMeasures:
     ) -> CriticalMeasures:
         """Return the critical measures c = m L / peak of a linear structure.
 
+        The response to a record of the measure m is proportional to the record, so that its peak
+        reaches the limit L if the record is scaled to the measure c. Over an α-cut c lies between
+        its values for the largest and for the smallest peak. A peak that may be 0, or a largest
+        value that may be negative, never reaches the limit: its critical measure is infinite.
+
         Args:
-            peaks: Bounds of the limited peak under each record.
-            measures: Intensity measure m of each record, unscaled.
-            limit: Limit L in SI units, of the peaks of `Peak.outwards`.
+            peaks: Bounds of the limited peak under each record, at least one.
+            measures: Intensity measure m of each record, positive and unscaled.
+            limit: Limit L > 0 in SI units. If the peak is the smallest value of an output, it is
+                the limit of the largest value of the output with its sign changed.
+
+        Raises:
+            RefusedError: The bounds of a peak contradict each other.
         """
         max_peaks = [peak.max_peak_bounds for peak in peaks]
         min_peaks = [peak.min_peak_bounds for peak in peaks]
 
         def critical(peak_bounds: list[Array]) -> Array:
+            # Bounds on each level, one array for each record, give (levels, records).
             # A bound of a largest value may be negative: such a peak reaches no positive limit,
             # whatever the scale, and its critical measure is infinite.
             positive_peaks = np.maximum(np.stack(peak_bounds, axis=-1), 0.0)  # (levels, records)
             with np.errstate(divide="ignore"):
                 return np.asarray(np.asarray(measures) * limit / positive_peaks)
 
+        # A lower bound of a peak is an upper bound of its critical measure.
         high = critical([bounds.lower for bounds in min_peaks])
         # The largest peak of a cut is no smaller than its smallest peak.
         low_reached = np.minimum(critical([bounds.lower for bounds in max_peaks]), high)
@@ -127,12 +145,15 @@ class CriticalMeasures:
     def from_demands(cls, records: Sequence[Increments], name: str) -> CriticalMeasures:
         """Return the critical measures of a frame that yields, from the measures that were tried.
 
-        The first crossing lies between `low` and `low_reached`, the last non-exceedance between
-        `high_reached` and `high`. Those beyond the largest measure are infinite.
+        The first crossing, from which on some structure of the cut exceeds the limit, lies between
+        `low` and `low_reached`: the last measure without and the first one with an exceedance. The
+        last non-exceedance, from which on all structures that were tried exceed it, lies between
+        `high_reached` and `high`. What lies beyond the largest measure is infinite.
 
         Args:
-            records: Demands under each record. No structure exceeds the limit at the first measure.
-            name: Name of the limit or event.
+            records: Demands (peak over limit) under each record at rising measures, at least one.
+                No structure exceeds the limit at the first measure.
+            name: Name of the limit, or of the event that any of several limits is exceeded.
         """
         of_records = []
         for record in records:
@@ -156,7 +177,14 @@ class CriticalMeasures:
 
     @classmethod
     def of_any(cls, limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
-        """Return the critical measures of the event that any of several limits is exceeded."""
+        """Return the critical measures of the event that any of several limits is exceeded.
+
+        The event is reached with the first limit, so that bounds are the smallest ones of all
+        limits.
+
+        Args:
+            limits: Critical measures of each limit, for the same levels and records.
+        """
         low = np.min([limit.low for limit in limits], axis=0)
         reached = np.min([limit.low_reached for limit in limits], axis=0)
         high = np.min([limit.high for limit in limits], axis=0)
@@ -168,11 +196,12 @@ class CriticalMeasures:
         """Return the number of records under which all, and under which some structures exceed.
 
         Args:
-            measure: Intensity measures, shape (measures,).
+            measure: Intensity measures to which all records are scaled, shape (measures,).
 
         Returns:
-            Lower and upper bound of the number of records under which a structure of the cut
-            exceeds the limit, shape (levels, measures) each.
+            `lower`: number of records under which every structure of the cut exceeds the limit for
+            certain; `upper`: number under which some structure may exceed it; shape (levels,
+            measures) each.
         """
         # Comparisons of all records with all measures, shape (levels, records, measures).
         for_all = self.high[:, :, np.newaxis] < measure
@@ -196,7 +225,10 @@ class CriticalMeasures:
 
     @property
     def dispersion(self) -> Ends:
-        """Bounds of the standard deviation of the logarithms of the measures, (levels,) each.
+        """Bounds of the standard deviation of the logarithms of critical measures over the records.
+
+        They hold for each structure of the α-cut, shape (levels,) each. On a level with an
+        infinite critical measure they are 0 and +∞.
 
         Raises:
             RefusedError: There is only one record.
@@ -220,17 +252,20 @@ class CriticalMeasures:
 def counts_between(records: Sequence[Increments], name: str, measure: Array) -> Ends:
     """Return the number of records under which all, and under which some structures exceed.
 
-    Between two measures that were tried, all structures are counted as exceeding the limit if they
-    do so at both, and some structure if one does so at either.
+    Structures were moved at some measures of each record. Between two of them, all structures are
+    counted as exceeding the limit if they do so at both, and some structure if one does so at
+    either. Outside them the nearest measure counts.
 
     Args:
-        records: Demands at the measures of each record that were tried.
-        name: Name of the limit or event.
+        records: Demands (peak over limit) at the measures of each record, at least one record.
+        name: Name of the limit, or of the event that any of several limits is exceeded.
         measure: Measures at which the records are counted, shape (measures,).
 
     Returns:
-        Both numbers, shape (levels, measures) each.
+        `lower`: number of records under which all structures of the cut exceed the limit; `upper`:
+        number under which some do; floats of shape (levels, measures) each.
     """
+    # Demands have the shape (largest and smallest, levels, measures).
     n_levels = records[0].demands[name].shape[1]
     shape = (n_levels, len(measure))
     count_all = np.zeros(shape)
@@ -278,12 +313,16 @@ class LimitFragility(LimitResult):
     def lognormal_fit(self, level: int) -> list[Array]:
         """Return the lognormal distribution functions fitted to both ends of the critical measures.
 
+        A function has the mean and the standard deviation of the logarithms of the critical
+        measures of all records.
+
         Args:
             level: Index of the level.
 
         Returns:
-            Values at `measure`, shape (measures,), for the lower ends and for the upper ends; once
-            if the ends agree. Ends that are infinite or all equal have no fit.
+            Values at the intensity measures `self.measure`, shape (measures,), for the lower ends
+            and then for the upper ends; once if the ends agree. Ends of which one is infinite, or
+            that are all equal, have no fit and are left out, so that the list may be empty.
         """
         from scipy.special import ndtr
 
@@ -328,7 +367,12 @@ class Fragility(Answer):
     increments: dict[str, Increments] = field(default_factory=dict)
 
     def table(self) -> Table:
-        """Return a row with medians, lognormal fit and guarantee for each limit and event."""
+        """Return a table of texts with a row for each limit and for each event of several limits.
+
+        The columns are the limit; the median of the critical measures at the lowest level, for a
+        frame that yields with the ranges over the records; the guarantee; median and dispersion of
+        the lognormal fit at the lowest level; and the median at the highest level.
+        """
         rows = []
         for part in self.limits.values():
             fit = f"median {_level_text(part.lognormal_median, 0, self.unit)}"
@@ -347,7 +391,14 @@ class Fragility(Answer):
         return table_of(rows)
 
     def _median_text(self, part: LimitFragility, level: int) -> str:
-        """Return the text of a median with its measure; accelerations are given in g, too."""
+        """Return the bounds of the median measure as text; accelerations are given in g, too.
+
+        An example is "median Sa(T1) 2.31 … 2.75 m/s^2 (0.235 … 0.281 g)".
+
+        Args:
+            part: Fragility of a limit or event.
+            level: Index of the level; -1 for the highest.
+        """
         text = f"median {self.measure} {_level_text(part.median, level, self.unit)}"
         if self.unit != "m/s^2":
             return text
@@ -356,7 +407,14 @@ class Fragility(Answer):
         return f"{text} ({in_g})"
 
     def _crossings_text(self, part: LimitFragility) -> str:
-        """Return the ranges over the records of first crossing and last non-exceedance as text."""
+        """Return the ranges over the records of first crossing and last non-exceedance as text.
+
+        The former is the smallest measure tried at which some structure exceeds the limit, the
+        latter the largest one at which some structure keeps it, both on the lowest level.
+
+        Args:
+            part: Fragility of a limit or event of a frame that yields.
+        """
         first = part.critical.low_reached[0]
         last = part.critical.high_reached[0]
         return (
@@ -365,7 +423,13 @@ class Fragility(Answer):
         )
 
     def records(self) -> list[Record]:
-        """Return a row for each limit and level."""
+        """Return a row of numbers for each limit or event and each level.
+
+        The columns are name, unit and value of the limit, α, the lower ("least") and the upper
+        ("greatest") bound of the median, of the dispersion and of the median of the lognormal fit
+        over all structures of the cut, and the guarantee. The dispersion of a single record is
+        None; unknown bounds are infinite.
+        """
         rows = []
         for name, part in self.limits.items():
             numbers = {
@@ -394,10 +458,13 @@ class Fragility(Answer):
         return f" [{self.unit}]" if self.unit else ""
 
     def crossings(self) -> list[Record]:
-        """Return a row for each limit, record and level of a frame that yields.
+        """Return a row for each limit or event, record and level of a frame that yields.
 
-        It has the measures of the first crossing and the last non-exceedance, and the sets of
-        measures at which the limit is exceeded as texts.
+        "first crossing" is the smallest measure tried at which some structure exceeds the limit,
+        and "last non-exceedance" the largest one at which some structure keeps it; None if there
+        is none up to the largest measure tried. The measures at which some structure and at which
+        all structures that were moved exceed the limit follow as texts of intervals. A linear
+        structure has no rows.
         """
         unit = self._unit_title
         rows: list[Record] = []
@@ -432,16 +499,26 @@ class Fragility(Answer):
         """Return the largest and the smallest peak found under a record, over its `measure`.
 
         Args:
-            name: Name of a limit of the peak.
+            name: Name of a limit of the peak; of no event.
             record: Name of the record.
 
         Returns:
-            Peaks in the SI unit of the limit, shape (2, levels, measures); NaN for collapses.
+            Peaks in the SI unit of the limit, shape (2, levels, measures), first the largest and
+            then the smallest of the structures of each cut; infinite or NaN for collapses.
+
+        Raises:
+            KeyError: There is no such limit or record, as for all records of a linear structure.
         """
         return self.limits[name].limit * self.increments[record].demands[name]
 
     def curves(self) -> list[Record]:
-        """Return a row for each peak, record, level and measure of a frame that yields."""
+        """Return a row for each limited peak, record, level and measure of a frame that yields.
+
+        The columns are the name and the SI unit of the peak, the record, α, the intensity measure,
+        and the smallest ("least") and the largest ("greatest") peak of the structures that were
+        moved, None for a collapse. Several limits of one peak give its rows once. A linear
+        structure has no rows.
+        """
         rows: list[Record] = []
         for peak, names in self.limits_by_demand.items():
             for record, increments in self.increments.items():
@@ -453,7 +530,12 @@ class Fragility(Answer):
         return rows
 
     def words(self) -> str:
-        """Return sentences on the measure, and on how to read the bands."""
+        """Return sentences that explain the result to its reader.
+
+        They say what the intensity measure is, what the median and the dotted fit are, for a frame
+        that yields how the measures were searched and which records made it collapse, for a linear
+        structure what the band means, and what the dashed limits are if there are any.
+        """
         measure = self.measure
         if measure == "Sa(T1)":
             measure += ", a pseudo-acceleration with the structure's own damping"
@@ -508,11 +590,14 @@ def _range_text(low: float, high: float, unit: str) -> str:
 
 
 def _set_text(measures: Array, demands: Array) -> str:
-    """Return the intervals of measures at which the demand exceeds 1, as text.
+    """Return the intervals of measures at which the demand exceeds 1, such as "1.2 … 1.5, 2 … 3".
+
+    The ends of an interval are its first and its last measure, which may be the same; without any
+    the text is empty.
 
     Args:
         measures: Rising measures, shape (measures,).
-        demands: Peak over limit at these measures, same shape; NaN for a collapse.
+        demands: Peak over limit at these measures, same shape; infinite or NaN for a collapse.
     """
     # The mask is padded, so that each interval has a change at its start and one behind its end. A
     # comparison with NaN is false, which makes a collapse exceed the limit.
@@ -596,10 +681,16 @@ def fragility(
 
 
 def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
-    """Raise RefusedError unless a structure and its limits permit a fragility analysis.
+    """Check that a structure and its limits permit a fragility analysis.
 
-    The structure must be at rest and without forces. It must keep each limit at rest, and if it
-    yields, all limits must be of magnitudes.
+    Args:
+        model: The structure.
+        limits: Limits with one value each.
+
+    Raises:
+        RefusedError: The structure has no matrices of mass, damping and stiffness, does not start
+            at rest or has forces; a limit is one of the mean over records; a linear structure at
+            rest exceeds a limit; or columns yield, and a limit is not one of a magnitude.
     """
     is_moved_by_record = has_matrices(model) and not model.loads and model.is_at_rest
     # A start or a force would add a part to the response that does not scale with the record.
@@ -636,10 +727,25 @@ def incremental_analyses(
     step: float,
     alpha: Sequence[float],
 ) -> dict[str, IncrementalAnalysis]:
-    """Return the incremental dynamic analyses of a frame that yields, by the record's name.
+    """Prepare an incremental dynamic analysis of a yielding frame for each record, by its name.
 
-    The arguments are those of `fragility`, with the records in the place of the suite. Each record
-    is divided by its intensity, so that the scale of an analysis is the intensity measure.
+    Nothing is moved along the scales yet. Each record is divided by its intensity, so that the
+    scale of an analysis is the intensity measure.
+
+    Args:
+        model: The frame.
+        inputs: Fuzzy parameters by name, in SI units.
+        records: Records with their intensity measures and the duration of their responses.
+        limits: Limits of magnitudes by name.
+        intensity: Name of the intensity measure: "Sa(T1)", "PGA" or "scale".
+        most: Largest measure that is tried, the same for all records, as a multiple of the measure
+            at which the nominal structure, if it were elastic, would reach all limits under all
+            records.
+        step: Step at which outputs are read, in s.
+        alpha: Levels, rising within [0, 1].
+
+    Raises:
+        RefusedError: Levels or inputs are not allowed, or a response does not exist.
     """
     names = list(limits)
     pairs = [(limit.output, limit.number) for limit in limits.values()]
@@ -665,7 +771,10 @@ def incremental_analyses(
 def increments_of(
     analysis: IncrementalAnalysis, limits: Mapping[str, Limit], progress: Progress | None = None
 ) -> Increments:
-    """Return the demands of limits and events by their names, over the measure of a record."""
+    """Run the incremental dynamic analysis of a record, and return the demands by name.
+
+    Names are those of the limits and then those of their events.
+    """
     measure, demands = analysis.run(progress)  # (2, levels, limits and events, measures)
     names = [*limits, *events_of(limits)]
     return Increments(measure, {name: demands[:, :, k] for k, name in enumerate(names)})
@@ -753,15 +862,17 @@ def _limit_fragility(
     *,
     independent: bool,
 ) -> LimitFragility:
-    """Return the fragility of one limit or event.
+    """Return the fragility of one limit or event: bands, medians, dispersion and confidence limits.
 
     Args:
-        about: The limit or event.
+        about: Side, output, unit and value of the limit, or the name of the event.
         nature: Guarantee of the critical measures.
-        critical: Critical measures of all records.
+        critical: Measures at which the limit is reached, for each level and record.
         measure: Measures at which the fraction of the records is given, shape (measures,).
-        counts: Bounds of the number of records at these measures, shape (levels, measures) each.
-        independent: Whether the records are independent draws.
+        counts: Bounds of the number of records under which a structure exceeds the limit at these
+            measures, shape (levels, measures) each.
+        independent: Whether the records are independent draws. Only then are there confidence
+            limits of the fraction. A dispersion takes two records or more.
     """
     n_records = critical.low.shape[1]
     confidence = dispersion = None
@@ -790,16 +901,22 @@ def event_words(event: str) -> str:
 
 
 def _grid(critical: CriticalMeasures, demands: Sequence[Increments]) -> Array:
-    """Return measures that cover all finite critical ones, for bands and tables, shape (60,).
+    """Return 60 equidistant measures that cover all finite critical ones, for bands and tables.
 
-    If measures were tried, the grid ends with the largest one at the latest, and with this one if
-    a critical measure lies beyond it.
+    Args:
+        critical: Measures at which the limit is reached, for each level and record. Those below
+            which no structure exceeds it must be finite.
+        demands: Demands at the measures that were tried with a yielding frame, by record; empty for
+            a linear structure. The largest measure that was tried must be the same for all records.
+            The grid does not exceed it, and ends with it if a critical measure lies beyond it.
     """
     # The grid is a tenth wider than the critical measures, so that bands begin at 0 and end at 1.
     is_finite = np.isfinite(critical.high)
     largest = 1.1 * float(critical.high.max(initial=0.0, where=is_finite))
     if not is_finite.any():
-        largest = 1.1 * float(critical.low_reached.max())
+        # Attained measures are not known either if the inputs only enclose a set.
+        reached = np.where(np.isfinite(critical.low_reached), critical.low_reached, critical.low)
+        largest = 1.1 * float(reached.max())
     if demands:
         largest_tried = float(demands[0].measure[-1])  # the same for all records
         if not is_finite.all() or largest > largest_tried:

@@ -71,13 +71,28 @@ class IncrementalAnalysis:
     moved: dict[float, tuple[Array, Array]] = field(init=False, default_factory=dict)
 
     def run(self, progress: Progress | None = None) -> tuple[Array, Array]:
-        """Move structures until no search refutes what is known, and return their demands.
+        """Compute responses until searches change no more at which scales limits are exceeded.
+
+        A demand is the peak of an output over its limit; the demand of an event is the largest of
+        its limits. Structures spread over the cuts are moved at a geometric grid of scales of the
+        record. Then three steps are repeated: structures that are extreme at one scale are moved
+        at the neighbouring scales; intervals of scales between which exceedance begins or ends are
+        bisected; and where no exceedance (or no structure that keeps the limit) has been found, it
+        is searched for at the scales that come nearest to it. All responses are kept in
+        `self.moved`.
+
+        Args:
+            progress: Called with the completed fraction; up to one half, since the effort of the
+                searches is not known beforehand.
 
         Returns:
             The scales, rising, shape (scales,), and the largest and the smallest demand of the
             structures of each cut that were moved, shape (2, levels, limits and events, scales).
             They are infinite for collapses. At the first scale all structures that were moved are
             elastic and keep every limit.
+
+        Raises:
+            RefusedError: A response does not exist.
         """
         structures = self._spread_structures()
         grid = self._grid(structures)
@@ -133,10 +148,11 @@ class IncrementalAnalysis:
         return len(self.limits) + len(self.events)
 
     def foresee(self) -> tuple[float, float]:
-        """Return roughly how many responses a run computes, and how many seconds it takes.
+        """Return roughly how many responses `run` will compute, and how many seconds it will take.
 
-        Responses are timed in the middle and at the end of the scales, because they take longer the
-        more often columns yield. They are not kept.
+        The structures spread over the cuts are moved, and timed, at a scale in the middle and at
+        the end of the grid of scales, because responses take longer the more often columns yield.
+        These responses are not kept.
         """
         structures = self._spread_structures()
         grid = self._grid(structures)
@@ -154,11 +170,19 @@ class IncrementalAnalysis:
     def peaks_at(self, scales: Array) -> Array:
         """Return the largest and smallest demand of structures spread over the cuts.
 
+        A demand is the peak of an output over its limit. The structures are the nominal one and
+        some inside, on faces and at corners of each cut; no others are searched for, so that the
+        demands of all structures may range farther.
+
         Args:
             scales: Scales of the record, shape (scales,).
 
         Returns:
-            Demands, shape (limits, 2, levels, scales).
+            Demands, infinite for collapses, shape (limits and events, 2, levels, scales): on the
+            second axis first the largest, then the smallest.
+
+        Raises:
+            RefusedError: A response does not exist.
         """
         structures = self._spread_structures()
         for scale in map(float, scales):
@@ -167,16 +191,18 @@ class IncrementalAnalysis:
         return np.moveaxis(found, 2, 0)
 
     def elastic_scales(self, points: Array) -> Array:
-        """Return the scales at which structures would reach the limits if they were elastic.
+        """Return the scales of the record at which structures would reach limits if elastic.
 
         Args:
-            points: Inputs of the structures, shape (structures, inputs).
+            points: Inputs of the structures in SI units, shape (structures, inputs).
 
         Returns:
-            Scales, shape (structures, 1 + limits). The first column is the scale at which a storey
-            yields.
+            Scales, shape (structures, 1 + limits). The first column is the scale at which the first
+            storey yields; the others belong to the limits in their order. For an output that is
+            zero in elastic structures, such as a residual drift, it is the scale at which some
+            storey would have five times its yield drift.
         """
-        # Nothing yields at this scale, so that peaks are proportional to the scale.
+        # At a millionth of the record nothing yields, so that peaks are proportional to the scale.
         small_scale = 1e-6
         n_storeys = self.model.floors
         storeys = [(f"ductility{z}", 1.0) for z in range(1, n_storeys + 1)]
@@ -190,7 +216,14 @@ class IncrementalAnalysis:
         return np.asarray(small_scale / np.hstack([ductility, demands]))
 
     def _grid(self, structures: Array) -> list[float]:
-        """Return the scales of the grid; at the first one all structures are elastic."""
+        """Return rising scales in geometric progression, with at most 1.1 between neighbours.
+
+        They end with the largest scale of the analysis. At the first one the given structures are
+        elastic and keep every limit.
+
+        Args:
+            structures: Inputs of the structures in SI units, shape (structures, inputs).
+        """
         # The first scale is a grid step below the one at which the first structure yields or
         # exceeds a limit.
         first = self.elastic_scales(structures).min() / GRID_RATIO
@@ -202,15 +235,18 @@ class IncrementalAnalysis:
     def _peaks_over_limits(
         self, scale: float, points: Array, limits: Sequence[tuple[str, float]]
     ) -> Array:
-        """Return the peaks of structures over limits, infinite for collapses.
+        """Return the largest magnitudes of outputs over their limits, infinite for collapses.
 
         Args:
             scale: Scale of the record.
-            points: Inputs of the structures, shape (structures, inputs).
-            limits: Names of outputs and their limits.
+            points: Inputs of the structures in SI units, shape (structures, inputs).
+            limits: Names of outputs and their limits, which may repeat an output.
 
         Returns:
             Demands, shape (structures, limits).
+
+        Raises:
+            RefusedError: An output is unknown, or a response does not exist.
         """
         record = self.model.ground
         assert record is not None
@@ -224,9 +260,10 @@ class IncrementalAnalysis:
         return np.column_stack(columns)
 
     def _spread_structures(self) -> Array:
-        """Return inputs of the nominal structure and of others on each level, without repetitions.
+        """Return inputs, in SI units, of the nominal structure and of others spread over each cut.
 
-        The shape is (structures, inputs).
+        These are up to 48 for each level: inside the cut, on its faces and at its corners. The
+        shape is (structures, inputs), without repetitions and sorted.
         """
         cuts = self.cuts
         structures = [self.cuts.nominal[np.newaxis]]
@@ -239,11 +276,12 @@ class IncrementalAnalysis:
         return np.asarray(np.unique(np.concatenate(structures), axis=0))
 
     def _move(self, scale: float, points: Array) -> None:
-        """Compute the demands of structures at a scale and add them to `moved`.
+        """Compute the demands of structures at a scale and add them to `self.moved[scale]`.
 
         Args:
             scale: Scale of the record.
-            points: Inputs, shape (…, inputs). Those that were moved at this scale are left out.
+            points: Inputs in SI units, shape (…, inputs). Structures whose demands are known at
+                this scale, and repetitions, are left out.
         """
         n_inputs = len(self.cuts.names)
         nothing = np.empty((0, n_inputs)), np.empty((0, self.n_demands))
@@ -255,6 +293,7 @@ class IncrementalAnalysis:
         points = points[[row.tobytes() not in known_rows for row in points]]
         if len(points):
             new = self._peaks_over_limits(scale, points, self.limits)
+            # An event of several limits occurs as soon as the largest of their demands exceeds 1.
             for event in self.events:
                 new = np.column_stack([new, new[:, list(event)].max(axis=1)])
             self.moved[scale] = np.vstack([moved, points]), np.vstack([demands, new])
@@ -262,7 +301,13 @@ class IncrementalAnalysis:
     def _extremes(self, scale: float) -> tuple[Array, Array]:
         """Return the largest and the smallest demand in each cut at a scale, and their inputs.
 
-        The shapes are (2, levels, limits and events), and the same with a last axis of inputs.
+        Args:
+            scale: Scale of the record, at which structures of each cut have been moved.
+
+        Returns:
+            Demands, first the largest and then the smallest, infinite for collapses, shape (2,
+            levels, limits and events); and the inputs that have them, shape (2, levels, limits and
+            events, inputs).
         """
         points, demands = self.moved[scale]
         lower = self.cuts.lower[:, np.newaxis]
@@ -277,7 +322,11 @@ class IncrementalAnalysis:
         return demands[rows, np.arange(demands.shape[1])], points[rows]
 
     def _search(self, scale: float, side: int, level: int, event: int) -> None:
-        """Search the largest or smallest demand in a cut at a scale by a compass search.
+        """Search for a larger or smaller demand in a cut at a scale by a compass search.
+
+        From the structure with the most extreme demand known, steps are made along each input in
+        both directions; they are halved when they gain next to nothing, and the search ends below
+        1/32 of the width of the cut. All responses are added to `self.moved`.
 
         Args:
             scale: Scale of the record.
@@ -308,19 +357,27 @@ class Increments:
         measure: Measures at which structures were moved, rising, shape (measures,). At the first
             one all structures that were moved are elastic and keep every limit.
         demands: Largest and smallest peak over limit of the structures that were moved, by the name
-            of the limit or event, shape (2, levels, measures); NaN for collapses.
+            of the limit or event, shape (2, levels, measures); infinite for collapses, or NaN in
+            results that were read from files.
     """
 
     measure: Array
     demands: dict[str, Array]
 
     def is_exceeded(self, name: str) -> Mask:
-        """Return whether some structure, and whether all structures exceed a limit or event.
+        """Return whether some structure, and whether all structures exceed a limit.
 
-        A collapse exceeds every limit.
+        It is known of the structures that were moved only. A collapse exceeds every limit.
+
+        Args:
+            name: Name of the limit, or of the event that any of several limits is exceeded.
 
         Returns:
-            Mask, shape (2, levels, measures).
+            Mask, shape (2, levels, measures), first for some and then for all structures of the
+            α-cut.
+
+        Raises:
+            KeyError: There is no such limit or event.
         """
         return ~(self.demands[name] <= 1)
 
@@ -345,7 +402,11 @@ class ScaledPeaks(Answer):
     units: dict[str, str]
 
     def table(self) -> Table:
-        """Return the peaks at the largest scale on the lowest level, a row for each record."""
+        """Return a table of texts with a row for each record.
+
+        The columns are the name of the record; for each output the range from the smallest to the
+        largest peak that was found at the largest scale on the lowest level; and the guarantee.
+        """
         rows = []
         for record, by_output in self.peaks.items():
             texts = []
@@ -360,7 +421,11 @@ class ScaledPeaks(Answer):
         return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return a row for each record, output, level and scale."""
+        """Return a row of numbers for each record, output, level and scale, in this order.
+
+        The columns are record, output, its SI unit, α, scale, and the smallest ("least") and
+        largest ("greatest") peak that was found, None for a collapse.
+        """
         rows: list[Record] = []
         for record, by_output in self.peaks.items():
             for output, peaks in by_output.items():
@@ -379,13 +444,19 @@ class ScaledPeaks(Answer):
 def curve_rows(
     head: Record, alpha: Array, *, measure: Mapping[str, Array], demands: Array
 ) -> list[Record]:
-    """Return rows of the largest and smallest peak over a measure, for each level.
+    """Return rows of the largest and smallest peak over the measure of a record.
+
+    There is a row for each level and measure, in this order. After the given columns it has α, the
+    measure, and the smallest ("least") and the largest peak ("greatest"), None where not finite.
 
     Args:
         head: First columns of each row.
         alpha: Levels, shape (levels,).
-        measure: One column of measures by its title, shape (measures,).
+        measure: Measures of shape (measures,) by the title of their column; exactly one item.
         demands: Largest and smallest peak, shape (2, levels, measures).
+
+    Raises:
+        ValueError: `measure` has not one item.
     """
     largest, smallest = demands
     ((title, measures),) = measure.items()
@@ -412,14 +483,19 @@ def incremental(
     Args:
         model: A frame whose columns yield. The peaks of others are proportional to the scale.
         inputs: Fuzzy parameters by name, in SI units.
-        suite: Records, see `read_suite`; each replaces the record of the frame.
-        scales: Positive factors of the records.
+        suite: Ground accelerations; each replaces the record of the frame.
+        scales: Positive factors of the records, in any order; repetitions count once.
         duration: Longest response, in s; a response ends five natural periods after its record.
         step: Step at which outputs are read, in s.
-        alpha: Levels.
+        alpha: Levels, rising within [0, 1].
+
+    Returns:
+        The largest and smallest peak, by record and output, that the nominal structure and others
+        spread over each cut have. They are attained; other structures may go farther.
 
     Raises:
-        RefusedError: The columns do not yield, or a scale is not positive.
+        RefusedError: The columns do not yield, a scale is not positive, a record is zero
+            throughout, or inputs or levels are not allowed.
     """
     value = "of another structure"
     allowed = "columns that yield"

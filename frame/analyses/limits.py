@@ -48,7 +48,12 @@ class Limit:
 
     @property
     def one_sided(self) -> tuple[Limit, ...]:
-        """The limit itself, or the limits of both ends of a range."""
+        """The limit itself, or the limits of both ends of a range.
+
+        A limit with one value gives itself alone. A pair of values (lower, upper) gives two
+        limits: first of the smallest value by the lower end, then of the largest by the upper end.
+        Output, event and stated text are those of this limit.
+        """
         if not isinstance(self.value, Sequence):
             return (self,)
         lower, upper = self.value
@@ -77,9 +82,11 @@ class Limit:
 
     @property
     def outwards(self) -> float:
-        """The number that a peak must not exceed: the limit, or its negative for smallest values.
+        """The number that a peak must not exceed, in the SI unit of the output.
 
-        A smallest value of q that falls below the limit L is a largest value of -q above -L.
+        Of a limit of the largest value or magnitude it is the limit itself, and of a limit L of the
+        smallest value of an output q it is -L: the smallest value of q falls below L if the largest
+        value of -q exceeds -L. The limit must have one value, not a range.
         """
         # Smallest values are compared by their negatives, so that all limits are upper limits.
         sign = -1.0 if self.side == "min" else 1.0
@@ -100,10 +107,12 @@ class Limit:
 def limits_by_name(
     limits: Limit | Sequence[Limit], outputs: Sequence[str], *, magnitudes: bool = False
 ) -> dict[str, Limit]:
-    """Return one-sided limits by name.
+    """Check limits and return them by name, in their order.
 
-    The name is that of the peak, such as "max q3", or the text of the limit where one peak has
-    several limits.
+    A range of two values becomes two limits, of the smallest and of the largest value. The name of
+    a limit is that of the limited peak: "q3" for the magnitude of the output q3, "max q3" and
+    "min q3" for its largest and smallest value, "mean q3" for the mean of magnitudes over records.
+    If one peak has several limits, the name is the text of the limit, such as "max q3 <= 0.06".
 
     Args:
         limits: One limit or several.
@@ -111,8 +120,9 @@ def limits_by_name(
         magnitudes: Whether each output may have only one limit, which must be of its magnitude.
 
     Raises:
-        RefusedError: There is no limit; a limit is given twice, names no output or is not finite; a
-            limit of a magnitude is not positive; or `magnitudes` is violated.
+        RefusedError: There is no limit; a limit is given twice, names no output or is not a finite
+            number; a limit of a magnitude or of a mean is not positive; or an output has several
+            limits, or one that is not of its magnitude, though `magnitudes` is set.
     """
     if isinstance(limits, Limit):
         limits = [limits]
@@ -168,7 +178,12 @@ class LimitResult:
 
     @property
     def words(self) -> str:
-        """The limit as text, such as "|drift1| ≤ 1 % (30.00 mm)", or the text of the event."""
+        """The limit in words, or the text of the event that any of several limits is exceeded.
+
+        A limit of a magnitude reads "|drift1| ≤ 1 % (30.00 mm)", of a mean over records
+        "mean |q3| ≤ 40.00 mm", of a largest value "max q3 ≤ 80.00 mm", and of a smallest value
+        "min q3 ≥ −60.00 mm".
+        """
         if self.is_event:
             return self.output
         if self.side == "min":
@@ -179,7 +194,13 @@ class LimitResult:
 
     @property
     def value_words(self) -> str:
-        """The value of the limit as it was stated; a fraction is followed by its value in SI."""
+        """The value of the limit in words, such as "30.00 mm" or "1 % (30.00 mm)".
+
+        It is the text that the author of the limit stated, if there is one, with typographic minus
+        signs. Percentages and ratios such as "1/200" are followed by the value in the SI unit of
+        the output, if the output has one. Without a stated text it is the value with four digits
+        and a suitable prefix of the unit.
+        """
         in_si = engineering(self.limit, self.unit)
         if not self.stated:
             return in_si
@@ -193,7 +214,11 @@ class LimitResult:
 
     @property
     def stated_unit(self) -> ShownUnit | None:
-        """The unit in which the limit was stated; None for a fraction or a plain number."""
+        """The unit in which the limit was stated, such as "mm" with the factor 1000 from m.
+
+        None if the limit was stated as a percentage, as a ratio or as a plain number, was not
+        stated in words at all, or is zero, since the factor is the stated over the SI value.
+        """
         # A number followed by a unit; fractions ("1/200") and percentages have no unit.
         number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)"
         match = re.fullmatch(number_and_unit, self.stated.replace(MINUS, "-"))
@@ -220,9 +245,13 @@ class LimitResult:
 
 
 def about_limit(limit: Limit, unit: str) -> LimitResult:
-    """Return the fields of a result about a one-sided limit of an output with an SI unit.
+    """Return what every result says about its limit: side, output, SI unit, value, stated text.
 
-    Subclasses of `LimitResult` add their own fields to `vars` of it.
+    Results of single analyses take these fields by `vars` and add their own.
+
+    Args:
+        limit: The limit, with one value.
+        unit: SI unit of the output; empty if it has none.
     """
     return LimitResult(
         side=limit.side, output=limit.output, unit=unit, limit=limit.number, stated=limit.stated

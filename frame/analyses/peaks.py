@@ -80,7 +80,14 @@ class Peak:
     proved: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        """Make unknown values infinite and compute `proved`."""
+        """Replace NaN, which stands for an unknown value, and compute `proved`.
+
+        An unknown bound becomes infinite with the sign with which it says nothing: `lower` -∞ and
+        `upper` +∞. The attained peak and both bounds of the peaks that are least far out are
+        counted outwards, for a smallest value of an output downwards: an attained peak and a lower
+        bound that are not known become infinite inwards, an upper bound outwards. `proved` is the
+        guaranteed bound of the farthest peaks with the sign of the output.
+        """
         far_out = self.outward_sign * np.inf
         values_that_say_nothing = {
             "lower": -np.inf,
@@ -122,9 +129,10 @@ class Peak:
 
     @property
     def _excluding_error(self) -> Array:
-        """Distance outside `lower` and `upper` beyond which peaks are excluded, (levels,).
+        """Distance outside `lower` and `upper` beyond which no peak lies, shape (levels,).
 
-        It is infinite for attained bounds, which exclude nothing.
+        For guaranteed and estimated bounds it is their error. It is infinite for attained bounds,
+        which exclude nothing.
         """
         if self.nature is Nature.ATTAINED:
             return np.full_like(self.error, np.inf)
@@ -132,17 +140,26 @@ class Peak:
 
     @property
     def max_peak_bounds(self) -> Ends:
-        """Lower and upper bound of the largest peak of each cut, of `outwards`."""
+        """Lower and upper bound of the largest peak of each cut, shape (levels,) each.
+
+        For the smallest value of an output q they are bounds of the largest value of -q.
+        """
         if self.is_least:
             return self.outwards.max_peak_bounds
         return Ends(self.reached, self.upper + self._excluding_error)
 
     @property
     def min_peak_bounds(self) -> Ends:
-        """Lower and upper bound of the smallest peak of each cut, of `outwards`."""
+        """Lower and upper bound of the smallest peak in each cut, shape (levels,) each.
+
+        They are the bounds of the response that goes least far. For the smallest value of an output
+        q the peaks are the largest values of -q. Bounds that are not known are 0 for magnitudes and
+        infinite otherwise. The lower bound has the guarantee of the peak.
+        """
         if self.is_least:
             return self.outwards.min_peak_bounds
-        # A magnitude is not negative.
+        # Three lower bounds hold: that of all peaks with its error, 0 for a magnitude, and a bound
+        # that was computed for the smallest peak alone.
         below = self.lower - self._excluding_error
         lower_bound = np.maximum(np.maximum(below, _smallest_peak(self.side)), self.least_lower)
         # Each cut contains the narrowest one. The smallest peak of a cut is therefore at most the
@@ -152,10 +169,11 @@ class Peak:
 
     @property
     def is_widened_by_step(self) -> bool:
-        """Whether a smaller time step would narrow the bound considerably.
+        """Whether a smaller time step would narrow the bound on the lowest level considerably.
 
-        This is so if more than half of the gap or error, and more than `WIDENING` of the peak, is
-        what responses may add between the time nodes.
+        This is so if what responses may add between the time nodes is more than 1 % of the bound,
+        and more than half of its uncertainty: of the distance from the attained peak if the bound
+        is guaranteed and such a peak is known, and else of the error.
         """
         bound = float(self.far_end[0])
         attained = float(self.reached[0])
@@ -179,7 +197,11 @@ class Peak:
 
 
 def mirrored(peak: Peak) -> Peak:
-    """Return the peak of -q from a peak of q: all values change their signs."""
+    """Return the peak of -q from a signed peak of an output q.
+
+    The largest value ("max") becomes the smallest value ("min") of -q and vice versa. Lower and
+    upper bound change their places, and all values their signs; errors and guarantee stay.
+    """
     return replace(
         peak,
         side="max" if peak.is_least else "min",
@@ -203,10 +225,18 @@ Peaks = Mapping[str, Peak]
 def peaks(band: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
     """Return the fuzzy peaks of outputs of an envelope by name.
 
+    A fuzzy peak is a range on each level: of the largest magnitude, the largest or the smallest
+    value over time that the responses of the α-cut have. It includes what outputs may add between
+    the time nodes, as far as that is known.
+
     Args:
         band: The envelope.
         names: Names of outputs for the peaks of their magnitudes, or names such as "max q3" and
-            "min q3"; if empty, all outputs are taken.
+            "min q3" for the largest and the smallest value; if empty, the magnitudes of all
+            outputs are taken.
+
+    Raises:
+        RefusedError: The envelope has no such output.
     """
     return {name: _peak_of(band, name) for name in names or map(str, band.outputs)}
 
@@ -286,9 +316,16 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
     """Return the fuzzy peak of the magnitude of an output that was found by a search of peaks.
 
     Args:
-        found: Bounds of the peaks at the time nodes on all levels.
+        found: Bounds of the peaks at the time nodes, with arrays of shape (levels, outputs). The
+            search knows responses that attain both ends; nothing else is said by it, so that the
+            guarantee is at most an estimate.
         column: Index of the output.
-        between: What responses may add within the time steps, shape (levels,).
+        between: What responses may add to a peak within the time steps, shape (levels,).
+
+    Returns:
+        The peak with the upper ends as attained values, and the lower ends plus `between` as peaks
+        that some response does not exceed. If the box of the inputs encloses a set, nothing counts
+        as attained: then these are -∞ and +∞.
     """
     lower = found.lower[:, column]
     upper = found.upper[:, column]
@@ -317,10 +354,13 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
 def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
     """Return the inputs of the response with the farthest attained peak on the lowest level.
 
+    For the name of an output the peak is that of its magnitude, with "max " before it the largest
+    value over the time nodes, with "min " the smallest value.
+
     Args:
         band: The envelope.
         column: Index of the output.
-        name: Name of the peak, such as "q3" or "max q3".
+        name: Name of the peak, such as "q3", "max q3" or "min q3".
 
     Returns:
         Inputs by name, in SI units; empty if none are known.
@@ -341,7 +381,15 @@ def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
 
 
 def _oriented(low: Array, high: Array, name: str) -> Ends:
-    """Return bounds of |q|, of q ("max q") or of -q ("min q") from bounds of the output q."""
+    """Return bounds of the function whose largest value is a peak, from bounds of an output q.
+
+    The function is -q if the name begins with "min ", q if it begins with "max ", and else |q|.
+
+    Args:
+        low: Lower bounds of q, of any shape.
+        high: Upper bounds of q, same shape.
+        name: Name of the peak, such as "min q3".
+    """
     if name.startswith("min "):
         return Ends(-high, -low)
     if name.startswith("max "):
@@ -351,10 +399,16 @@ def _oriented(low: Array, high: Array, name: str) -> Ends:
 
 
 def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
-    """Return the tightest bounds of peaks from two analyses of the same response, by name.
+    """Return the tightest bounds of peaks from two analyses of the same responses, by name.
 
-    Guaranteed bounds are intersected, and attained bounds are united. Otherwise the bounds with the
-    stronger guarantee or with the smaller error are taken. Attained values of both are kept.
+    Peaks that only one analysis has are taken from it. If both bounds are guaranteed they are
+    intersected, and if both are attained they are united. Otherwise the bounds with the stronger
+    guarantee are taken, and of two estimates those with the smaller error. In any case the farther
+    one of both attained values is kept.
+
+    Args:
+        first: Peaks by name, such as "q3" or "min q3".
+        second: Peaks of the other analysis, on the same levels.
     """
     found = {**first, **second}
     for name in first.keys() & second.keys():
@@ -364,7 +418,16 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
 
 
 def _tighter(first: Peak, second: Peak) -> Peak:
-    """Return the combined bounds of two analyses of a peak that is no smallest value."""
+    """Return the combined bounds of two analyses of one peak.
+
+    Two guaranteed ranges are intersected, two attained ones united. Otherwise the bounds with the
+    stronger guarantee, or of two estimates those with the smaller largest error, are kept.
+
+    Args:
+        first: Bounds of a largest magnitude or of a largest value; not of a smallest value, whose
+            peaks lie the farther out the lower they are.
+        second: Bounds of the same peak on the same levels.
+    """
     both = [first, second]
     # The guarantees are listed from the weakest to the strongest one.
     strength = list(Nature)
@@ -394,10 +457,10 @@ def with_combined(
     """Return a peak with arrays that are combined from those of several peaks.
 
     Args:
-        peak: Peak whose other fields are kept.
-        peaks: The peaks that are combined.
-        rule: Function of the stacked arrays and of `axis`, such as `np.max`.
-        names: Names of the arrays.
+        peak: Peak whose other fields are kept; it is not changed.
+        peaks: The peaks that are combined, one or more.
+        rule: NumPy function that combines a list of arrays along `axis=0`, such as `np.max`.
+        names: Names of the fields that are combined, arrays of shape (levels,).
     """
     changes: dict[str, Any] = {}
     for name in names:
@@ -415,10 +478,26 @@ def close_peaks(
     alpha: Sequence[float] = ALPHA,
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
-    """Return peaks by the method that bounds them most closely, within `PEAK_ERROR` if possible.
+    """Return fuzzy peaks of a structure, by the method that bounds them most closely.
 
-    The arguments are those of `envelope`, and `names` are the names of the peaks, such as "q3" and
-    "max q3".
+    The method is chosen by the structure and the number of inputs, and guaranteed bounds are
+    preferred. An error of 0.5 % of each peak is aimed at, which need not be reached.
+
+    Args:
+        model: The structure; its own outputs are not used.
+        inputs: Fuzzy parameters by name, in SI units.
+        names: Names of the peaks: "q3" for the largest magnitude of the output q3, "max q3" and
+            "min q3" for its largest and smallest value.
+        duration: Length of the simulation, in s.
+        step: Distance of the time nodes, in s.
+        alpha: Levels, rising within [0, 1].
+        progress: Called with the completed fraction; None shows a bar on a terminal, False shows
+            nothing.
+
+    Raises:
+        RefusedError: The structure has no such output, a value is out of range, a support contains
+            inadmissible values, or a response does not exist.
+        FailedError: A step is too long, or no bounds are found.
     """
     # Each output once: "q3" and "max q3" belong to the same one.
     outputs = tuple(dict.fromkeys(map(output_of, names)))
@@ -436,14 +515,15 @@ def close_peaks(
 
 
 def loose_peaks(peaks: Peaks, names: Sequence[str], gap: float) -> tuple[str, ...]:
-    """Return the names of those peaks that are missing or not guaranteed within a gap.
+    """Return the names of those peaks that are missing or not guaranteed within a gap, in order.
 
     Args:
         peaks: Known peaks by name.
         names: Names of the peaks of interest.
-        gap: Largest distance allowed between the farthest bound and the attained value, as a
-            fraction of the bound. It does not matter for inputs that enclose a set, since no
-            attained value is known then.
+        gap: Largest distance allowed on any level between the guaranteed bound of the farthest
+            peaks and the attained value, as a fraction of the bound. It does not matter for inputs
+            whose box only encloses a set of admissible inputs, since no value counts as attained
+            then.
     """
 
     def is_close(peak: Peak) -> bool:

@@ -106,7 +106,12 @@ class Probability(Answer):
     step: float
 
     def table(self) -> Table:
-        """Return a row for each limit, with bounds on the lowest and on the highest level."""
+        """Return a table of texts with a row for each limit, and last for any of them.
+
+        The columns are the event that the limit is exceeded; bounds of its probability at the
+        lowest level; the guarantee; the bounds at the highest level; the confidence interval at
+        the lowest level; and what peaks between the time nodes may add, the largest over levels.
+        """
         rows = []
         for part in self.events.values():
             low = float(part.interval.lower[0])
@@ -125,7 +130,12 @@ class Probability(Answer):
         return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return a row for each limit and level."""
+        """Return a row of numbers for each limit and level, and last for the event of any limit.
+
+        The columns are name, unit and value of the limit, α, the smallest and the largest
+        probability of the points tried, the guarantee, both ends of the confidence interval, and
+        what peaks between the time nodes may add to a probability.
+        """
         rows = []
         for name, part in self.events.items():
             for level, alpha in enumerate(self.alpha):
@@ -252,8 +262,15 @@ def _random_draws(random: Mapping[str, FuzzyNumber | Sampler], samples: int, see
 
     Without random parameters there is one draw of no parameters, shape (1, 0).
 
+    Args:
+        random: Distribution of each parameter by its name: a function that is called with a
+            generator and a number and returns so many values in SI units, or a fuzzy number, whose
+            membership function is taken as the shape of the probability density.
+        samples: Number of draws.
+        seed: Seed of the generator; equal seeds give equal draws.
+
     Raises:
-        RefusedError: A parameter does not give `samples` finite values.
+        RefusedError: A function does not return `samples` finite values.
     """
     # One generator for all parameters: their draws are independent.
     rng = np.random.default_rng(seed)
@@ -273,7 +290,13 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     """Return a sampler whose probability density is proportional to a membership function.
 
     The cumulative integral of the membership function is inverted by linear interpolation on a fine
-    grid.
+    grid. A crisp number, or a cut without width, gives its only value.
+
+    Args:
+        number: The fuzzy number.
+
+    Returns:
+        Function of a random generator and a count n that returns n independent values, shape (n,).
     """
     support = number.support
     uniform = np.linspace(support.lower, support.upper, 4001)
@@ -292,7 +315,15 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
 
 
 def _points_of_cut(cuts: Boxes, level: int) -> Array:
-    """Return corners of an α-cut and points inside, shape (points, inputs), in SI units."""
+    """Return points of an α-cut, in SI units, shape (points, inputs).
+
+    They are 64 quasi-random points, denser towards the faces of the cut, and, for up to 8 inputs,
+    first all corners. If no input has a width on the level, it is the nominal point alone.
+
+    Args:
+        cuts: The α-cuts as boxes.
+        level: Index of the level.
+    """
     lower, upper = cuts.unit_ends(level)
     if not (upper > lower).any():
         return cuts.nominal[np.newaxis]
@@ -312,7 +343,10 @@ def _joined(point: Array, draws: Array) -> Array:
 
 
 def _step_error(flow: Flow, points: Array) -> Array:
-    """Return the estimated error of the time steps up to each time node, shape (times, outputs).
+    """Return the estimated error that time stepping has caused by each time node.
+
+    It is 1.5 times the largest error, up to the node, of some responses; 0 for exact responses. The
+    shape is (times, outputs), in the units of the outputs.
 
     Args:
         flow: Response as a function of all inputs.
@@ -352,14 +386,23 @@ def _peak_ratios(
     """Return the ratios of peaks to limits at all fuzzy points with all draws.
 
     Args:
-        flow: Response as a function of the fuzzy and then the random inputs.
-        points: Fuzzy points, shape (points, fuzzy inputs).
-        draws: Draws, shape (draws, random inputs).
-        between: What outputs may add within the step to each node, shape (limits, times).
-        step_error: Error of outputs at the nodes, shape (limits, times).
-        columns: Indices of the limited outputs.
-        limits: Limits, shape (limits,).
+        flow: Response as a function of the fuzzy and then the random inputs, in SI units.
+        points: Values of the fuzzy inputs, shape (points, fuzzy inputs).
+        draws: Values of the random inputs, shape (draws, random inputs).
+        between: What the limited outputs may add to the larger end of the step before each node
+            within the step, shape (limits, times).
+        step_error: Error of the limited outputs at the nodes, shape (limits, times).
+        columns: Index of the output that each limit belongs to.
+        limits: Limits of magnitudes, positive, shape (limits,).
         progress: Called with the completed fraction.
+
+    Returns:
+        Lower and upper bounds of peak over limit at the time nodes, and upper bounds at all times,
+        shape (points, draws, limits) each.
+
+    Raises:
+        RefusedError: A response does not exist or is not finite.
+        StepError: A time step of a response did not converge.
     """
     of_points = []
     for k in range(len(points)):
@@ -378,24 +421,35 @@ def _peak_ratios(
 def _limit_probability(
     about: LimitResult, ratios: PeakRatios, level: Ints, *, is_random: bool
 ) -> LimitProbability:
-    """Return the bounds of the probability that a ratio of peak to limit exceeds 1.
+    """Return bounds, over fuzzy points, of the probability that peak over limit exceeds 1.
+
+    The probability at a point is the fraction of the draws that exceed the limit. On each level
+    its smallest and its largest value over the points of the cut are given, with lower and upper
+    bounds of the peaks at the time nodes; how far peaks between the nodes would change either; and
+    the interval that contains the probabilities of all points at once with the probability 0.95.
 
     Args:
-        about: The limit or event.
-        ratios: Ratios of peaks to the limit, shape (points, draws) each.
+        about: Side, output, unit and value of the limit, or the name of the event.
+        ratios: Bounds of peak over limit at the nodes and at all times, shape (points, draws) each.
         level: Index of the level to which each fuzzy point belongs, shape (points,).
-        is_random: Whether there are random inputs.
+        is_random: Whether there are random inputs. If not, there is one draw, and the interval is
+            the range of the points.
+
+    Returns:
+        Bounds, interval and error on each level, and the bounds as functions of the limit.
     """
     # The bounds are computed for 201 further limits, and for the limit itself, a ratio of 1.
     # Beyond these limits the probability is 0 or 1.
     smallest = ratios.lower.min()
     largest = ratios.upper.max()
     limits = np.append(np.linspace(0.95 * smallest, 1.05 * largest, 201), 1.0)
-    # Lower bounds of peaks give lower bounds of probabilities, and upper ones upper bounds.
+    # Lower bounds of peaks give lower bounds of probabilities, and upper ones upper bounds. All
+    # have the shape (levels, limits); the last limit is the one that is asked for.
     low = _bounds_over_points(_fractions_above(ratios.lower, limits), level).lower
     at_nodes = _bounds_over_points(_fractions_above(ratios.upper, limits), level)
     lower_at_nodes = at_nodes.lower[:, -1]
     high = at_nodes.upper
+    # The same with what outputs may add within the time steps; it is declared as an error.
     fractions = _fractions_above(ratios.within_steps, np.ones(1))
     within_steps = _bounds_over_points(fractions, level)
     added_to_lower = within_steps.lower[:, 0] - lower_at_nodes
@@ -425,13 +479,19 @@ def _limit_probability(
 def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
     """Return exact confidence limits of a probability from counts in independent draws.
 
-    See Clopper and Pearson, Biometrika 26, 404 (1934).
+    The lower limit is the probability with which at least `least` of the draws would have the event
+    with the probability `tail`, and the upper limit that with which at most `most` would (Clopper
+    and Pearson, Biometrika 26, 404, 1934).
 
     Args:
-        least: Number of draws in which the event occurs for sure.
-        most: Number of draws in which it may occur, same shape.
-        total: Number of draws.
-        tail: Probability with which each limit may be missed.
+        least: Number of draws in which the event occurs for sure, of any shape.
+        most: Number of draws in which it may occur, `least` or more, same shape.
+        total: Number of draws, 1 or more.
+        tail: Probability with which either limit may be missed, between 0 and 1.
+
+    Returns:
+        Lower limits, 0 where `least` is 0, and upper limits, 1 where `most` is `total`, in the
+        shape of the counts.
     """
     from scipy.special import betaincinv  # takes time to import
 
@@ -459,10 +519,11 @@ def _bounds_over_points(values: Array, level: Ints) -> Ends:
 
     Args:
         values: Values, shape (points, …).
-        level: Index of the level of each point, shape (points,).
+        level: Index of the level of each point, shape (points,); each level up to the largest index
+            that occurs has a point itself or on a higher level.
 
     Returns:
-        Both bounds, shape (levels, …).
+        Both bounds, shape (levels, …), with as many levels as the largest index says.
     """
     # The cut of a level contains those of all higher levels and their points.
     by_level = [values[level >= k] for k in range(level.max() + 1)]

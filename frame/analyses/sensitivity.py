@@ -39,7 +39,11 @@ class Sensitivity(Answer):
     shares: dict[str, dict[str, float]]
 
     def table(self) -> Table:
-        """Return a row for each result and input, with the largest fraction of a result first."""
+        """Return a table of texts with a row for each result and input.
+
+        A row says by which percentage fixing the input narrows the result. The inputs of a result
+        stand in falling order of this effect.
+        """
         rows = [
             {
                 "fixing": str(row["input"]),
@@ -102,9 +106,16 @@ def sensitivity(
     found: list[Array] = []
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        """Return the smallest and the largest peak of each output, shape (outputs,) each.
+        """Return the smallest and the largest peak magnitude of each output that ascents find.
 
-        `width_fractions` calls this first with all inputs fuzzy, and then with one group fixed.
+        The first call must be with all inputs fuzzy; its optima are kept in `found`, and later
+        calls, with the inputs of a group fixed, begin their searches there.
+
+        Args:
+            numbers: Inputs by name, in the order of `inputs`; those of a fixed group are crisp.
+
+        Returns:
+            The smallest and the largest peak over the cuts at `level`, shape (outputs,) each.
         """
         ends = np.array([number.cut(level) for number in numbers.values()], float)
         nominal = [number.nominal for number in numbers.values()]
@@ -147,16 +158,24 @@ def _steepest_ascent(
 ) -> AttainedPeak:
     """Return the largest or smallest peak of an output that steepest ascent finds.
 
-    Each step changes one input to that of its values which raises or lowers the peak most.
+    The peak is the largest magnitude of the output at the time nodes. Each step changes one input
+    to that of its values which raises or lowers the peak most; the search ends when no such change
+    does. The result is attained, but another point may have a more extreme peak.
 
     Args:
-        flow: Response as a function of the inputs.
-        values: Values that an input may take: ends and nominal value, shape (inputs, 3).
-        point: Inputs at which the search begins, shape (inputs,).
+        flow: Response as a function of the inputs in SI units.
+        values: Values that each input may take: lower end, upper end and nominal value, shape
+            (inputs, 3).
+        point: Inputs at which the search begins, shape (inputs,); it is not changed.
         output: Index of the output.
         sign: 1 for the largest peak, -1 for the smallest peak.
+
+    Raises:
+        RefusedError: A response does not exist or is not finite.
+        StepError: A time step of a response did not converge.
     """
     best = -np.inf
+    # There are finitely many points, and each step improves the peak, so that the loop ends.
     while True:
         tried = np.tile(point, (1 + values.size, 1))
         # Besides the point itself: three points for each input, one for each of its values.

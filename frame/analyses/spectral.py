@@ -13,14 +13,20 @@ from alphacut.frame.structures.storey import StoreyFrame
 
 
 def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
-    """Return the pseudo-acceleration ω² max |u| of an oscillator that starts at rest, in m/s².
+    """Return the spectral pseudo-acceleration Sa = ω² max |u| of a record, in m/s².
 
-    The free vibration after the record is included for one period.
+    The displacement u of a linear oscillator relative to the ground follows from
+    u'' + 2 ζ ω u' + ω² u = -a(t), from rest. It is computed exactly for the piecewise linear record
+    a(t), and one period of free vibration after the record is included. The peak is read at 40 or
+    more times a period, which misses at most 0.3 % of it.
 
     Args:
-        ground: The record.
-        period: Undamped natural period, in s.
-        ratio: Damping ratio, below 1.
+        ground: Ground acceleration a(t).
+        period: Undamped natural period 2π/ω, in s, positive.
+        ratio: Damping ratio ζ, at least 0 and below 1.
+
+    Raises:
+        RefusedError: The damping ratio is negative, or 1 or more.
     """
     omega = 2 * pi / period
     # The peak of a sine that is read at n points per period is too low by at most 1 - cos(π / n),

@@ -42,10 +42,13 @@ class NominalMode(NamedTuple):
 
 
 def nominal_mode(model: StructureModel) -> NominalMode:
-    """Return the first mode of a structure at its nominal parameters.
+    """Return period and damping ratio of the first mode of a structure at its own parameters.
+
+    Of a frame whose columns yield it is the mode before they do.
 
     Raises:
-        RefusedError: The structure is not linear.
+        RefusedError: The structure has no matrices of mass, damping and stiffness, as a general
+            Lagrangian system.
     """
     if not has_matrices(model):
         what = "with a system that is not linear"
@@ -110,18 +113,29 @@ def scaled_records(
     scale: float = 1.0,
     measure: str = "",
 ) -> tuple[ScaledRecord, ...]:
-    """Return the records of a suite as they move a structure.
+    """Scale the records of a suite, and determine lengths of responses, measures and warnings.
+
+    The measures of a record are its largest ground acceleration "PGA" and "Sa(T1)", the largest
+    pseudo-acceleration of an oscillator with period and damping of the structure's first mode.
 
     Args:
-        model: The structure. Its first mode at the nominal parameters determines "Sa(T1)".
-        suite: Records after baseline correction.
-        duration: Longest response, in s; a response ends five natural periods after its record.
+        model: The structure; its first mode is that at its own parameters.
+        suite: Records after baseline correction. Those without a name are called "record 1" and so
+            on by their place.
+        duration: Longest response, in s; a response ends five natural periods after its record, at
+            a whole number of steps.
         step: Distance of the time nodes, in s.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
         measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
 
+    Returns:
+        The scaled records in the order of the suite, with the measures after scaling, but without
+        peaks. A warning is given for a mean of more than 1 % of the peak, and for a response that
+        ends before its record.
+
     Raises:
-        RefusedError: A record is zero throughout, or the structure is not linear.
+        RefusedError: `measure` is unknown, a record is zero throughout, the structure has no
+            matrices of mass, damping and stiffness, or its first period is above 1000 s.
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
     mode = nominal_mode(model)
@@ -132,7 +146,7 @@ def scaled_records(
     scaled = []
     for number, record in enumerate(suite, start=1):
         name = record.name or f"record {number}"
-        # An oscillator with more damping than the critical one does not oscillate.
+        # A spectrum is defined for less than critical damping, for which an oscillator oscillates.
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
         measures = {"PGA": record.extremes[0], "Sa(T1)": response}
         is_moving = min(measures.values()) > 0
@@ -150,7 +164,7 @@ def scaled_records(
             intensity = arias_fractions(record.samples, record.step)
             truncated_fraction = 1 - float(intensity[int(length / record.step + 1e-9)])
 
-        # Both measures are proportional to the record.
+        # Both measures are proportional to the record. Without a measure `scale` is the factor.
         factor = scale / measures.get(measure, 1.0)
         scaled_measures = {title: factor * value for title, value in measures.items()}
         facts = RecordPeaks(
@@ -165,7 +179,16 @@ def scaled_records(
 
 
 def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str, ...]:
-    """Return sentences on what is unusual in a record, as it was before scaling."""
+    """Return sentences on what is unusual in a record; none for an ordinary one.
+
+    They are the remarks made when the record was read, the size of its mean if this is more than
+    1 % of the peak, and how much of the shaking lies after the end of the response.
+
+    Args:
+        name: Name of the record.
+        record: The record before scaling; it is not zero throughout.
+        facts: Length of the response, and the fraction of the Arias intensity after its end.
+    """
     warnings = [f"of record {name} {remark}" for remark in record.remarks]
     mean_fraction = float(record.samples.mean()) / record.extremes[0]
     # A larger mean hints at an offset of the instrument, whose displacement grows quadratically.
@@ -188,7 +211,25 @@ def record_peaks(
     alpha: Sequence[float],
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
-    """Return the peaks with given names of a structure under a record, see `close_peaks`."""
+    """Return fuzzy peaks of a structure under a record, by name.
+
+    They are bounded at two time nodes in each step, within 0.5 % of each peak if possible.
+
+    Args:
+        model: The structure; the record replaces its own one.
+        inputs: Fuzzy parameters by name, in SI units.
+        record: The scaled record and the length of its response.
+        names: Names of the peaks: "q3" for the largest magnitude of the output q3, "max q3" and
+            "min q3" for its largest and smallest value.
+        step: Step, in s.
+        alpha: Levels, rising within [0, 1].
+        progress: Called with the completed fraction; None shows a bar on a terminal, False shows
+            nothing.
+
+    Raises:
+        RefusedError: There is no such output, or inputs, levels or the step are not allowed.
+        FailedError: No bounds are found.
+    """
     return close_peaks(
         model.moved_by(record.ground),
         inputs,
@@ -229,7 +270,11 @@ class SuitePeaks(Answer):
     farthest_record: dict[str, str]
 
     def table(self) -> Table:
-        """Return a row for each of the largest peaks over the records, and for each mean."""
+        """Return a table of texts with a row for each of the largest peaks, and for each mean.
+
+        The columns are the name of the peak, its range at the lowest level, the guarantee, the
+        attained value, and the record under which it is attained, empty for a mean.
+        """
         rows = []
         for name, peak in self.peak.items():
             unit = self.units[output_of(name)]
@@ -249,9 +294,12 @@ class SuitePeaks(Answer):
         return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return a row for each record and peak, and for each peak and statistic.
+        """Return a row for each record and peak, and then one for each peak and statistic.
 
-        The peaks are the bounds that are farthest out on the lowest level.
+        The columns are the record, its intensity measures in m/s², name and SI unit of the peak,
+        the bound of the farthest peak and the attained value on the lowest level, None if not
+        known, and the guarantee. In the rows of "mean", "median" and "84 %" quantile of the bounds
+        over all records, measures, attained values and guarantee are None.
         """
         rows: list[Record] = []
         for name, record in self.by_record.items():
@@ -311,14 +359,20 @@ def over_records(
         duration: Longest response, in s; a response ends five natural periods after its record.
         step: Distance of the time nodes, in s; peaks are bounded at `NODES` nodes in each step.
         alpha: Levels.
-        names: Names of peaks, such as "drift1" or "max q3"; by default the magnitudes of all
-            outputs.
+        names: Names of peaks, such as "drift1" for the magnitude, "max q3" or "min q3"; by default
+            the magnitudes of all outputs.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
         measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
         progress: Called with the completed fraction.
 
+    Returns:
+        Bounds of each peak under each record, of the largest over the records, and, for
+        magnitudes, of the mean over the records; and quantiles of the guaranteed bounds.
+
     Raises:
-        RefusedError: A record is zero throughout, or the structure is not linear.
+        RefusedError: A record is zero throughout, there is no such output, an argument is out of
+            range, or the structure has no matrices of mass, damping and stiffness.
+        FailedError: No bounds are found for a record.
     """
     records = scaled_records(
         model, suite, duration=duration, step=step, scale=scale, measure=measure
@@ -342,10 +396,19 @@ def summarised(
     step: float,
     alpha: Sequence[float],
 ) -> SuitePeaks:
-    """Return the largest peaks, means and statistics over records.
+    """Return the largest peaks, means and statistics over records, from the peaks under each.
 
-    The peaks under each record are given by the record's name and by the peak's name. The other
-    arguments are those of `over_records`.
+    The statistics of each peak are mean, median and 84 % quantile, over the records, of the
+    guaranteed bounds.
+
+    Args:
+        model: The structure.
+        inputs: Fuzzy parameters by name, in SI units.
+        records: The scaled records, at least one.
+        peaks: Peaks by the record's name and by the peak's name, in the order of `records`; each
+            record has the same peaks.
+        step: Step, in s; means are those of peaks at two time nodes in each step.
+        alpha: Levels of the peaks.
     """
     largest = largest_peaks(peaks)
     encloses = next(iter(largest.values())).encloses
@@ -384,10 +447,12 @@ def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
     """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
 
     The largest peak does not fall if the peak under some record rises. Its bounds are therefore the
-    largest of the bounds under the records.
+    largest of the bounds under the records, with the weakest of their guarantees. Of the smallest
+    value of an output ("min q3") the smallest one over the records is bounded.
 
     Args:
-        peaks: Peaks by the record's name and by the peak's name.
+        peaks: Peaks by the record's name and by the peak's name; at least one record, and the same
+            peaks and levels for each.
     """
     largest: dict[str, Peak] = {}
     for name, first in next(iter(peaks.values())).items():

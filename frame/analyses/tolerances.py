@@ -75,9 +75,12 @@ class Tolerances(Answer):
     supports: dict[str, Support]
 
     def table(self) -> Table:
-        """Return a row with the scale of all supports, then a row with the support of each input.
+        """Return a table of texts: a row on the scale, then a row on the support of each input.
 
-        Numbers are rounded inwards.
+        The columns are the quantity; the scale, or the support, up to which exceeding a limit is
+        excluded, rounded inwards ("none" or "–" if there is none); the guarantee; and beside the
+        scale at which scale a limit is exceeded, beside a support its deviations from the nominal
+        value in per cent.
         """
         scale = "none"
         if self.kept is not None:
@@ -98,7 +101,13 @@ class Tolerances(Answer):
         return table_of(rows)
 
     def _row(self, quantity: str, *, kept: str, beside: str) -> dict[str, str]:
-        """Return a row of the table by the titles of the columns."""
+        """Return a row of the table by the titles of its four columns.
+
+        Args:
+            quantity: What the row is about.
+            kept: Scale or support up to which exceeding a limit is excluded, as text.
+            beside: Scale at which a limit is exceeded, or the relative support, as text.
+        """
         return {
             "quantity": quantity,
             "no limit exceeded": kept,
@@ -107,7 +116,11 @@ class Tolerances(Answer):
         }
 
     def _exceeded_text(self) -> str:
-        """Return at which scale a limit is exceeded, as text."""
+        """Return in words at which scale a response is known to exceed a limit.
+
+        If there is a larger scale at which none of the responses that were computed does, it is
+        said, too. For inputs whose box encloses a set, no response is known.
+        """
         if self.encloses:
             return "not known"
         if self.passed is None:
@@ -118,7 +131,13 @@ class Tolerances(Answer):
         return f"no exceedance found up to {self.clear:.4g}, {exceeded}"
 
     def records(self) -> list[Record]:
-        """Return a row with the scale, then a row with the support of each input."""
+        """Return a row of numbers on the scale, then a row on the support of each input.
+
+        The columns are the quantity and its SI unit; the ends of the support, scaled so far that
+        exceeding a limit is still excluded (for the row of the scale the scale alone), None if
+        there is no such scale; the ends of the support as it was given (for the scale 1); the
+        nominal value; and the guarantee.
+        """
         nature = self.nature_text(self.nature)
         scale: Record = {
             "quantity": "scale of all ranges",
@@ -157,7 +176,12 @@ class Tolerances(Answer):
 def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
     """Return the supports of inputs as intervals, scaled about the nominal values.
 
-    A support without width, and each support at the scale 0, becomes a crisp number.
+    Both distances of the nominal value from the ends of the support are multiplied by the scale. A
+    support without width, and each support at the scale 0, becomes a crisp number, the nominal one.
+
+    Args:
+        inputs: Fuzzy numbers by name.
+        scale: The scale, 0 or more; 1 gives the supports themselves.
     """
     scaled: dict[str, FuzzyNumber] = {}
     for name, number in inputs.items():
@@ -175,7 +199,17 @@ def require_admissible_scale(
     inputs: Mapping[str, FuzzyNumber],
     most: float,
 ) -> None:
-    """Raise RefusedError if supports scaled by `most` contain inadmissible values of an input."""
+    """Check that a structure has a response for all values in scaled supports of its inputs.
+
+    Args:
+        model: The structure.
+        inputs: Fuzzy parameters by name, in SI units.
+        most: Factor by which the supports are scaled about the nominal values.
+
+    Raises:
+        RefusedError: A scaled support contains values that the input may not have, such as a
+            negative stiffness. The message names the scale as the value at fault.
+    """
     try:
         require_admissible(model, boxes(scale_supports(inputs, most), [0.0]))
     except RefusedError as error:
@@ -230,6 +264,7 @@ def tolerances(
         tried[1.0] = at_one
 
     def peaks_at(scale: float) -> Peaks:
+        """Return the peaks on the supports at a scale by output, and keep them in `tried`."""
         if scale not in tried:
             band = envelope(
                 model,
@@ -306,11 +341,17 @@ def tolerances(
 def _bisected(holds: Callable[[float], bool], lower: float, upper: float, width: float) -> float:
     """Return the largest scale at which a condition holds, to within a width.
 
+    The condition must hold up to some scale and not hold beyond it. It is known at both ends of
+    the interval and is called at midpoints only.
+
     Args:
-        holds: The condition, which holds at `lower` and does not hold at `upper`.
-        lower: Lower end of the interval of scales.
-        upper: Upper end of the interval.
-        width: Width of the interval at which the bisection ends.
+        holds: The condition, a function of the scale.
+        lower: A scale at which it holds.
+        upper: A larger scale at which it does not hold.
+        width: Width of the interval at which the bisection ends, positive.
+
+    Returns:
+        The last scale at which the condition held: `lower` itself if it held at no midpoint.
     """
     # The condition holds at `lower` and does not hold at `upper` throughout.
     while upper - lower > width:

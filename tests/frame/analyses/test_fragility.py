@@ -10,6 +10,7 @@ from alphacut.frame.analyses.fragility import CriticalMeasures
 from alphacut.frame.analyses.probability import clopper_pearson
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy.sets.numbers import Stepwise
 from tests.frame.analyses.test_analyses import one_level
 
 LIMIT = 0.02
@@ -125,3 +126,25 @@ def test_the_median_is_that_of_the_sample_and_the_fit_has_the_geometric_mean(two
         ends = [part.lognormal_median.lower[-1], part.lognormal_median.upper[-1]]
         assert [half[0], half[-1]] == pytest.approx(ends, rel=0.02)
     assert "lognormal" in str(two_storeys)
+
+
+def test_measures_of_a_band_are_finite_where_no_peak_is_known_to_be_reached():
+    """A limit on "max q1" under wide inputs of which only an enclosing box is known."""
+    frame = StoreyFrame([2e4], stiffness=[4e6], damping_ratio=0.05, outputs=("q1",))
+    # A push to one side: when q1 comes back, and how far, depends on the stiffness.
+    record = Accelerogram(0.05, np.append(np.ones(8), np.zeros(12)), name="push")
+    enclosing = Stepwise((0.0,), (1e6,), (9e6,), encloses="the learned set")
+    found = fragility(
+        frame,
+        {"k1": enclosing},
+        [record],
+        Limit("q1", 0.02, largest=True),
+        duration=2.0,
+        step=0.05,
+        alpha=[0],
+    )
+    critical = found.limits["max q1"].critical
+    assert np.isinf([critical.low_reached, critical.high]).all()
+    measure = found.limits["max q1"].measure
+    assert np.isfinite(measure).all()
+    assert measure[0] < critical.low[0, 0] < measure[-1]
