@@ -55,17 +55,11 @@ LEAST_PEAK_NODES, LEAST_PEAK_STEPS, LEAST_PEAK_PATIENCE = 4, 40, 5
 """Nodes that are tried in a cell, evaluations of the dual function for each of them, and their
 `PATIENCE`. The evaluations begin at the multipliers of an earlier cell, so that twice as many steps
 raise the bounds by less than 0.1 %."""
-LEAST_PEAK_DESCENTS = 3
-"""Steps of the descent over corners to a response with a small peak. More hardly lower it."""
+
 PEAK_CELLS, PEAK_STEPS = 240, 40
 """Largest numbers of cells of a bound above a peak over a sub-box, and of evaluations for each
 cell. Larger numbers close gaps by cells that bisections of the inputs close faster."""
-CELLS_ABOVE_PEAK = 3
-"""Number of cells of nodes whose bounds lie above the peak, as a multiple of that of other nodes.
-Twice as many lower the peaks of 13 inputs by 0.05 %."""
-FIRST_CELLS = 6
-"""Largest number of cells of a node in the first pass, if only the highest bounds count, which get
-more afterwards. Four times as many lower the peaks of 13 inputs by less than 0.02 %."""
+
 REMAINDER_MULTIPLE, REMAINDER_MULTIPLE_AT_PEAKS = 1.0, 0.25
 """Gaps that are not worth any effort, as multiples of what the remainders add to a bound, below and
 at peaks. Larger numbers save time and leave wider gaps."""
@@ -81,21 +75,11 @@ needs a lower degree and leaves less of the gap to the search."""
 LEFT_OUT_MODES = 1 / 120
 """Fraction of the gap that modes may contribute that are left out. Their energy counts as error; a
 larger number leaves out more modes and increases the error."""
-BOXES_OF_INPUT = 4.0
-"""Factor by which one more input multiplies the boxes of a branch and bound, roughly (measured). A
-larger number prefers the dual bound."""
+
 FIRST_DEGREE, MAX_DEGREE = 3, 20
 """Smallest and largest degree of the modal model. A larger first degree is wasted on narrow boxes;
 beyond the largest one rounding dominates."""
-MAX_TERMS = 3100
-"""Largest number of monomials of a polynomial: the degrees 13, 10 and 8 for 4, 5 and 6 inputs. More
-take more time than bisections do."""
-FIRST_DECAY = 0.1
-"""Factor by which one more degree is taken to multiply the error before any is known. A larger
-number goes up in larger steps."""
-DEGREE_CAUTION = 0.8
-"""Fraction of the degrees which the errors ask for that is taken at once. A larger number more
-often takes a degree that is higher than necessary."""
+
 DEVIATION_POINTS = 24
 """Points along ω of each mode at which its distance from straight lines between the nodes is
 computed. More narrow the bound between the nodes slightly."""

@@ -79,7 +79,23 @@ class Auto:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels, by a proof if possible.
 
-        The first note of the envelope says which method was chosen, and why.
+        Columns that yield take a search of peaks, and systems that are not linear take the improved
+        follower. For linear structures the proofs are tried in turn, until one has a gap that
+        suffices. If none has, the narrowest guarantee is kept, completed by attained values of the
+        follower if it is wider than a tenth of a peak. If a tolerance was stated for all time
+        nodes, or if there is no proof, the estimated envelope of the follower is returned, with
+        the guaranteed bounds as its `outer`.
+
+        Args:
+            flow: The response over the boxes of the inputs.
+            progress: Called with the completed fraction.
+
+        Returns:
+            The envelope; its first note says which method was chosen, and why.
+
+        Raises:
+            FailedError: A time step did not converge, or a proof contradicts attained values.
+            RefusedError: A response does not exist.
         """
         tolerance = flow.tolerance(self.tolerance)
         if isinstance(flow.flow, YieldingFlow):
@@ -112,7 +128,8 @@ class Auto:
         if best is not None and not self.is_for_all_nodes:
             if _gap(best, flow) <= WIDE:
                 return _noted(best, "; ".join([f"{best.method} succeeded", *reasons]))
-            # Responses are worth computing where bounds lie above the attained peak.
+            # Responses are worth computing where bounds lie above the attained peak; elsewhere
+            # they cannot raise it.
             outer, inner = _sides(best)
             asked = outer > inner.max(axis=1, keepdims=True)
             followed = follower.run_pass(flow, next(attempts), asked)
@@ -123,11 +140,15 @@ class Auto:
         return _noted(found, f"{follower.name}; unproved: {'; '.join(reasons)}")
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> list[Proof | DualProof]:
-        """Return the proofs to try, in their order.
+        """Return the proofs to try on a linear structure, in their order; the list may be empty.
+
+        There are two: branch and bound over the inputs, on the whole box or on sub-boxes, for up to
+        six inputs; and the dual bound. The one with less forecast work comes first; branch and
+        bound also if a tolerance is stated for all time nodes.
 
         Args:
             flow: The problem.
-            reasons: Reasons why a proof is not possible are appended to this list.
+            reasons: Reasons why a proof is not possible are appended to this list, in place.
         """
         # A proof looks at 1000 boxes for each bound on average (tuned: more hardly close gaps).
         proof = Proof(None, self.tolerance, boxes=1000, workers=self.workers)
@@ -153,7 +174,13 @@ class Auto:
         return [dual, undivided]
 
     def _dual(self, flow: UnitFlow) -> DualProof:
-        """Return the dual bound with gaps that fit the tolerance."""
+        """Return the dual bound with gaps that fit the tolerance.
+
+        Its gaps are left at their defaults if a tolerance is stated for all time nodes. Otherwise
+        they follow the tolerance if it is a fraction of the peaks and there are few inputs: four,
+        or six for a stated tolerance. With more inputs a stated tolerance asks for a gap of a
+        tenth of the peaks only. If magnitudes alone count, bounds below peaks get no effort.
+        """
         dual = DualProof(workers=self.workers)
         if self.magnitudes:
             dual = replace(dual, below=1.0)
@@ -171,7 +198,16 @@ class Auto:
         return dual
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
-        """Return whether the gap of a guaranteed envelope suffices."""
+        """Return whether the gap of a guaranteed envelope suffices, so that no proof follows.
+
+        If a tolerance is stated for all time nodes, each gap must be within it. Otherwise gaps of
+        peaks count: up to twice a tolerance that is stated as a fraction of the peaks, if there are
+        at most four inputs, and else up to a tenth of each peak.
+
+        Args:
+            proved: The envelope.
+            flow: The problem.
+        """
         if self.is_for_all_nodes:
             allowed = flow.tolerance(self.tolerance) * flow.scale * (1 + 1e-9)  # rounding
             return bool((proved.error <= allowed).all())
@@ -182,10 +218,13 @@ class Auto:
 
 
 def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None]:
-    """Yield the progress of one method after another that is tried.
+    """Yield, without end, a function for the progress of each method that is tried in turn.
 
     It is not known beforehand whether more methods are needed; one is usually enough. Each one is
-    shown as 80 % of what is left.
+    shown as 80 % of what is left of the whole, so that the end is never passed.
+
+    Args:
+        progress: Called with the completed fraction of the whole; with None, None is yielded.
     """
     left = 1.0
     while True:
@@ -194,15 +233,20 @@ def _progress_of_attempts(progress: Progress | None) -> Iterator[Progress | None
 
 
 def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Envelope:
-    """Return a guaranteed envelope with the larger values that a follower attains.
+    """Return a copy of a guaranteed envelope with the larger values that a follower attains.
+
+    The guaranteed bounds stay. Where a follower's trajectory goes farther than the attained value
+    that is known, it replaces this value and its inputs; the gap, which is the envelope's error,
+    and the number "gap_of_peaks" of its facts become smaller.
 
     Args:
-        proved: The guaranteed envelope.
+        proved: The guaranteed envelope, with attained bounds.
         flow: The problem.
-        followed: Attained bounds of the same problem. Their values may be wrong by a 1e-9th of the
-            peak through rounding, which is subtracted.
+        followed: Attained bounds of the same problem: upper bounds of (-output, output), shape
+            (levels, times, outputs, 2), and the unit coordinates that attain them.
     """
-    # The attained values of a proof contain a bound of their rounding; those of a follower do not.
+    # The attained values of a proof are reduced by a bound of their rounding, those of a follower
+    # are not. Rounding of its trajectories stays below a 1e-9th of the peak.
     rounding = 1e-9 * np.abs(followed.bounds).max(axis=(0, 1, 3))[:, np.newaxis]
     values = followed.bounds - rounding
     outer, inner = _sides(proved)
@@ -221,10 +265,14 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
 
 
 def _sides(proved: Envelope) -> tuple[Array, Array]:
-    """Return guaranteed and attained upper bounds of (-output, output) of a guaranteed envelope.
+    """Return guaranteed and attained upper bounds of both sides of the outputs of an envelope.
+
+    Args:
+        proved: A guaranteed envelope with attained bounds.
 
     Returns:
-        Both bounds, shape (levels, times, outputs, 2) each.
+        Guaranteed bounds and attained values, shape (levels, times, outputs, 2) each: on the last
+        axis first of the output with its sign changed, then of the output.
     """
     assert proved.inner is not None
     outer = np.stack([-proved.lower, proved.upper], axis=-1)
@@ -233,7 +281,16 @@ def _sides(proved: Envelope) -> tuple[Array, Array]:
 
 
 def _gap(proved: Envelope, flow: UnitFlow) -> float:
-    """Return the largest gap between guaranteed and attained peak, as a fraction of the peak."""
+    """Return the largest gap between guaranteed and attained peak, as a fraction of the peak.
+
+    A peak is the largest value over time of an output or of the output with its sign changed. The
+    larger gap of both is divided by the larger guaranteed peak; for an output that rounding alone
+    moves, by the amplitude that the energy of the response permits.
+
+    Args:
+        proved: A guaranteed envelope with attained bounds.
+        flow: The problem, which tells the outputs at rest.
+    """
     outer, inner = _sides(proved)
     outer_peaks = outer.max(axis=1)  # (levels, outputs, 2)
     inner_peaks = inner.max(axis=1)

@@ -84,13 +84,23 @@ class Storage:
         return bool((np.abs(self.points - point).max(axis=1, initial=0.0) < near).any())
 
     def add(self, points: Array) -> Places:
-        """Compute and store graphs.
+        """Compute graphs (trajectories of all outputs) with derivatives, and store them.
+
+        A place is an upper bound that is followed: one side (0 for the output with its sign
+        changed, 1 for the output) of an output at a time node. `points`, `top`, `best`, `first`,
+        `second` and `steepest` are updated; where a new graph equals the best value so far, the
+        older graph stays the best.
 
         Args:
-            points: Unit coordinates of the graphs, shape (graphs, inputs).
+            points: Unit coordinates of the graphs, shape (graphs, inputs); at least one.
 
         Returns:
-            The places where one of these graphs is now the best.
+            The places where one of these graphs is now the best: indices of the time node, of the
+            output and of the side, arrays of shape (places,).
+
+        Raises:
+            RefusedError: A trajectory does not exist or is not finite.
+            StepError: A time step did not converge.
         """
         jet = self.flow.taylor(points)
         top = self.top.reshape(-1)
@@ -127,13 +137,23 @@ class Storage:
     ) -> ModelMaxima:
         """Return the maxima over a box of the Taylor models of the best graphs (eq. 22).
 
+        A place is a side of an output at a time node. Its model is the polynomial of second degree
+        in the unit coordinates about the graph that is the best there.
+
         Args:
-            places: Places at which the models are maximised.
-            box: Lower and upper ends of the box in unit coordinates, shape (inputs,) each.
-            maximise: Function that returns the maximiser x of g·x + x·H·x / 2 from g, H and the
-                ends of x.
+            places: Places at which the models are maximised: indices of the time node, of the
+                output, and of the side (0 for the output with its sign changed, 1 for the output),
+                arrays of shape (places,).
+            box: Lower and upper ends of the box in unit coordinates, shape (inputs,) each. The
+                graphs must lie inside.
+            maximise: Function that returns the maximisers x, shape (places, inputs), of
+                g·x + x·H·x / 2 from g of this shape, H of shape (places, inputs, inputs), and the
+                lower and upper ends of x of the shape of g.
             bend: Factor of the second derivatives; 0 for linear models.
-            reach: Largest distance from each graph along each coordinate.
+            reach: Largest distance from each graph along each coordinate; infinite for no limit.
+
+        Returns:
+            The maxima and the unit coordinates at which the models have them, inside the box.
         """
         sides = places[2]
         signs = 2.0 * sides - 1  # -1 for the side 0, 1 for the side 1
@@ -286,20 +306,27 @@ def estimated_envelope(
 ) -> Envelope:
     """Return an estimated envelope, or an attained one if neighbouring trajectories diverge.
 
-    If they diverge, Taylor models predict nothing, and the estimate of the error is left out. This
-    is assumed if some first derivative exceeds 8 times the half range of the output (tuned: a
-    chaotic pendulum exceeds it many times, and other structures stay well below).
+    If they diverge, Taylor models predict nothing, and the estimate of the error is left out, so
+    that the error is 0. This is assumed if some first derivative exceeds 8 times the half range of
+    the output over time and over the widest box (tuned: a chaotic pendulum exceeds it many times,
+    and other structures stay well below).
 
     Args:
         flow: The problem.
-        bounds: Upper bounds of (-output, output), shape (levels, times, outputs, 2).
+        bounds: Attained upper bounds, shape (levels, times, outputs, 2): on the last axis first of
+            the output with its sign changed, then of the output.
         points: Unit coordinates that attain them, shape (levels, times, outputs, 2, inputs).
         error: Estimated error of the bounds, shape (levels, times, outputs).
         steepest: Largest first derivative of each output by a unit coordinate, shape (outputs,).
         method: Name of the method.
         evaluations: Number of trajectories.
-        facts: Further numbers by name, see `Envelope`.
+        facts: Further numbers by name, such as "order", the degree of the models, and "gain", the
+            predicted gain that is worth a trajectory.
         notes: Remarks, one sentence each.
+
+    Raises:
+        RefusedError: A bound is not finite.
+        FailedError: The bounds of a level exceed those of a lower level.
     """
     at = flow.boxes.to_physical(points)
     widest = bounds[0]

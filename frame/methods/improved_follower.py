@@ -68,13 +68,24 @@ class ImprovedFollower:
         The error is twice the sum of what the Taylor models still predict, what an independent
         sample finds beyond the bounds, and the difference of the two passes. If neighbouring
         trajectories diverge there is no estimate, and the bounds are attained only.
+
+        Args:
+            flow: The response over the boxes of the inputs.
+            progress: Called with the completed fraction.
+
+        Raises:
+            RefusedError: A trajectory does not exist or is not finite, or columns yield, so that
+                there are no derivatives.
+            StepError: A time step did not converge.
         """
         from scipy.ndimage import maximum_filter1d
 
+        # Gain of each output that is not worth a trajectory, shape (outputs, 1).
         limit = self._limit(flow)
         first = self.run_pass(flow, subprogress(progress, 0.0, 0.4))
         other_points = replace(self, seed=self.seed + 1)
         second = other_points.run_pass(flow, subprogress(progress, 0.4, 0.8))
+        # Upper bounds of both sides of the outputs, (levels, times, outputs, 2), and their points.
         # Both passes attain their bounds, so that the larger one of each is attained, too.
         is_better = second.bounds > first.bounds
         bounds = np.maximum(first.bounds, second.bounds)
@@ -198,10 +209,14 @@ class ImprovedFollower:
 
 
 def _chunk_size(flow: UnitFlow) -> int:
-    """Return how many graphs are computed at a time.
+    """Return how many graphs (trajectories with two derivatives) are computed at a time, 1 to 32.
 
     Their arrays have at most 64 million numbers (512 MB): for each graph the outputs at all nodes,
-    or the powers of the step map within a block of nodes, each with its derivatives.
+    or the powers of the step map within a block of nodes, each with its derivatives. A single graph
+    may need more, and is computed nevertheless.
+
+    Args:
+        flow: The problem, which tells the numbers of nodes, outputs, inputs and unknowns.
     """
     d = len(flow.boxes.names)
     n_times = flow.time.size
@@ -210,6 +225,7 @@ def _chunk_size(flow: UnitFlow) -> int:
     if isinstance(flow.flow, LinearFlow):
         states = 2 * len(frequencies(flow.flow.system))
         count = max(count, (isqrt(n_times) + 1) * states**2)
+    # Each number comes with d first and d² second derivatives.
     return int(np.clip(64e6 / (count * (1 + d + d * d)), 1, BATCH))
 
 
@@ -271,10 +287,17 @@ class _LevelModels:
         return (upper - lower) / 2
 
     def explore(self, points: Array) -> None:
-        """Compute the values of trajectories, which update `sampled` where they are larger.
+        """Compute trajectories without derivatives, and keep their values where they are larger.
+
+        `self.sampled` gets the largest values of all trajectories explored so far, for each time
+        node, output and side, and `self.sampled_at` their unit coordinates, both in place.
 
         Args:
             points: Unit coordinates, shape (trajectories, inputs).
+
+        Raises:
+            RefusedError: A trajectory does not exist or is not finite.
+            StepError: A time step did not converge.
         """
         values, index = largest_values(self.storage.flow, points)
         # The first of equal trajectories is kept, so that the result does not depend on later ones.
@@ -283,18 +306,23 @@ class _LevelModels:
         self.sampled_at[better] = points[index][better]
 
     def crossed_optima(self, rng: np.random.Generator) -> Array:
-        """Return optima of random places in which some inputs are replaced.
+        """Return points between known optima, which may lie in a basin that no model shows.
 
-        Each input is replaced with the probability 2 / (number of inputs): by the input of the
-        optimum of another place, or in half of the points by a random number. There are 8 points
-        for each graph (tuned).
+        An optimum is the graph that is the best at a place: a time node, an output and one of its
+        signs. The optima of random places are drawn, and each of their inputs is replaced with the
+        probability 2 / (number of inputs): in half of the points by the same input of the optimum
+        of another place, in the other half by a random number within the box.
+
+        Args:
+            rng: Generator of all random numbers.
 
         Returns:
-            Unit coordinates, shape (points, inputs).
+            Unit coordinates, 8 points for each stored graph, shape (points, inputs). They are
+            neither sorted nor distinct.
         """
         storage = self.storage
         d = len(self.radius)
-        count = 8 * len(storage)
+        count = 8 * len(storage)  # tuned
         # Places are drawn with their frequency: a graph that is the best at many nodes is drawn
         # often.
         optima, partners = storage.points[rng.choice(storage.best.ravel(), (2, count))]
@@ -305,7 +333,16 @@ class _LevelModels:
         return np.where(rng.random(optima.shape) < 2.0 / d, replacements, optima)
 
     def predict(self, places: Places) -> None:
-        """Update predictions at places from the Taylor models of the best graphs there."""
+        """Update predictions at places from the Taylor models of the best graphs there.
+
+        `self.predicted` gets the largest value of each model within the box and not too far from
+        its graph, and `self.target` the unit coordinates of this value, in place. In a box without
+        width, and without places, nothing changes.
+
+        Args:
+            places: Indices of time nodes, outputs and sides (0 for the output with its sign
+                changed, 1 for the output), arrays of shape (places,).
+        """
         if len(places[0]) and (self.radius > 0).any():
             maximise: Callable[..., Array] = local_maximum
             if len(self.radius) <= MAX_GLOBAL_INPUTS:
@@ -319,7 +356,12 @@ class _LevelModels:
 
     @property
     def least_gains(self) -> Array:
-        """Gain of each bound that is worth a graph, shape (times, outputs, 2)."""
+        """Predicted gain from which on each bound is worth a new graph, shape (times, outputs, 2).
+
+        The last axis has first the output with its sign changed, then the output. The gain is the
+        tolerance, a fiftieth of it near the peak of a side, at least 1e-10 of the peak of the
+        output, and infinite for bounds that are not asked for.
+        """
         top = self.storage.top
         peak = self.storage.flow.peak[:, np.newaxis]
         # Within 2 % of a peak, 2 % of the tolerance is worth a graph (tuned: this costs a Newton
@@ -329,16 +371,19 @@ class _LevelModels:
         return np.where(self.asked, least, np.inf)
 
     def proposals(self, count: int) -> Array:
-        """Return distinct points that are worth a graph, at most one for each window of time.
+        """Return points at which models or explored trajectories promise enough gain for a graph.
 
-        Predictions at points whose graphs are stored already were wrong; they are set to the values
-        of these graphs.
+        The time nodes are divided into up to 32 windows, and each gives at most one point: the one
+        with the largest gain over the gain that is worth a graph, if it lies at least 0.02 in some
+        unit coordinate from those of earlier windows. Predictions at points whose graphs are stored
+        already were wrong: such entries of `self.predicted` are set to the best value that is
+        stored, in place.
 
         Args:
-            count: Largest number of points.
+            count: Largest number of points, 0 or more.
 
         Returns:
-            Unit coordinates, shape (points, inputs).
+            Unit coordinates, shape (points, inputs); without points where no gain is worth a graph.
         """
         # Gains are compared over the least gain of each bound, since outputs have different units
         # and peaks are worth more.

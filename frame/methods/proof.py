@@ -89,8 +89,15 @@ class Proof:
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the guaranteed envelope of all outputs on all levels.
 
+        Args:
+            flow: The response over the boxes of the inputs.
+            progress: Called with the completed fraction.
+
         Raises:
-            UnprovedError: The error of the modal model cannot be bounded within the tolerance.
+            UnprovedError: The structure is not linear, the integrator is not the exact one, there
+                are more than six inputs, or the error of the modal model cannot be bounded within
+                the tolerance.
+            FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
         # A gap alone is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
@@ -111,9 +118,13 @@ class Proof:
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
         """Return the expected work on a box, in evaluations of the response of a mode at a node.
 
+        Args:
+            flow: The exact response.
+            boxes: The boxes of the inputs; the widest one counts.
+
         Raises:
-            UnprovedError: There are too many inputs, damping is given by a ratio of each mode, or
-                the structure is not known to lose energy.
+            UnprovedError: More than six inputs have a width, damping is given by a ratio of each
+                mode, or the structure is not known to lose energy at all points of the box.
         """
         n_inputs = int((boxes.upper[0] > boxes.lower[0]).sum())
         if n_inputs > MAX_PARAMETERS:
@@ -126,7 +137,9 @@ class Proof:
         # The bound of the model error integrates the residual over time, which needs that the
         # energy of the error does not grow.
         require_dissipation(flow.system, boxes)
-        return float(numbers.BOXES_OF_INPUT**n_inputs)
+        # One more input multiplies the boxes of a branch and bound by about 4 (measured). A larger
+        # factor would prefer the dual bound, whose work is compared with this.
+        return float(4.0**n_inputs)
 
     def call_kernels(self) -> None:
         """Call the compiled kernels of `bounds` that take tuples once; see `KernelThreads`."""
@@ -136,12 +149,23 @@ class Proof:
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[BoxBounds]:
         """Return guaranteed bounds and attained values on each level of a sub-box.
 
+        The smallest of the gaps that are allowed is tried first. If the model is not accurate
+        enough for a gap, the next larger one is tried.
+
+        Args:
+            flow: The exact response.
+            boxes: The sub-box on each level.
+            goal: Unit of the gap for each output, number of threads, and progress.
+
         Raises:
-            UnprovedError: The error of the modal model cannot be bounded within the tolerance, or
-                the structure has no smooth oscillating modes over the sub-box.
+            UnprovedError: The modal model is not accurate enough even for the largest gap, with the
+                input to bisect as a `GapError` if bisections would help and as a `BisectionError`
+                if they would not; or the structure has no smooth oscillating modes over the
+                sub-box.
         """
 
         def bounds_within(gap: float) -> list[BoxBounds]:
+            """Return the bounds for one gap; raise UnprovedError if the model is inaccurate."""
             model, error = self._accurate_model(flow, boxes, goal.scale, gap)
             return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
 
@@ -168,6 +192,7 @@ class Proof:
         Raises:
             GapError: No degree is accurate enough, and bisections would help.
             BisectionError: Too many bisections would be needed.
+            UnprovedError: The structure has no smooth oscillating modes over the box.
         """
         max_degree = _max_degree(len(boxes.names))
         # Most structures need few degrees, and the cost of a degree grows as the number of
@@ -184,8 +209,9 @@ class Proof:
             if excess <= 1:
                 return model, error
             # The factor of the error for each further degree, and the number of degrees that are
-            # needed at this rate.
-            decay = numbers.FIRST_DECAY
+            # needed at this rate. Before a factor is known, 0.1 is taken: a larger one would go up
+            # in larger steps (tuned).
+            decay = 0.1
             if last_step:
                 decay = (excess / last_excess) ** (1 / last_step)
             further = np.inf
@@ -194,20 +220,22 @@ class Proof:
             is_hopeless = last_step > 0 and not degree + further < max_degree + 1
             if degree == max_degree or is_hopeless:
                 raise self._gap_error(model, excess, decay)
-            last_step = min(max(1, int(numbers.DEGREE_CAUTION * further)), max_degree - degree)
+            # Four fifths of the degrees that the errors ask for are taken at once (tuned: more
+            # often end at a degree that is higher than necessary).
+            last_step = min(max(1, int(0.8 * further)), max_degree - degree)
             last_excess = excess
             degree += last_step
 
     def _gap_error(self, model: ModalModel, excess: float, decay: float) -> UnprovedError:
-        """Return the error for a model that is too inaccurate.
+        """Return, without raising it, the error for a model that is too inaccurate.
 
-        It is a `GapError` that names the input to bisect, or a `BisectionError` if too many
-        bisections are needed.
+        It is a `GapError` with the index of the input to bisect, the one that contributes most, or
+        a `BisectionError` if more bisections are needed than the number of sub-boxes allows.
 
         Args:
             model: The model of the last degree that was tried.
-            excess: Its error over the allowed one.
-            decay: Factor of the error for each further degree.
+            excess: Its error over the allowed one, above 1.
+            decay: Factor of the error for each further degree, positive.
         """
         what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * excess:.3g} of it,"
         what += " takes too much of the gap"
@@ -323,15 +351,20 @@ def bound_levels(
 
 
 def _line_deviation(model: ModalModel) -> Array:
-    """Return a bound of how far the model lies beyond both ends of a step within the step.
+    """Return a bound of how far outputs of a modal model leave their values at both ends of a step.
 
-    If no force jumps in the step, it is a bound of the distance from a straight line.
+    It holds for all inputs of the widest box. If no force jumps in the step, it bounds the distance
+    from the straight line between both values; else how far the output lies beyond both values.
+
+    Args:
+        model: Sum over modes of a coefficient times an exponential, or a Duhamel integral of a
+            load, with polynomials in the inputs as eigenvalues and coefficients.
 
     Returns:
         Bound for the step before each node, shape (times, outputs), in the units of the model.
 
     Raises:
-        UnprovedError: A mode may not oscillate.
+        UnprovedError: A mode may not oscillate somewhere in the box.
     """
     # With the eigenvalue λ = -g ± iω of a mode, the ranges of g and ω over the box, shape (2,
     # modes), and those of q = g/ω.
@@ -346,7 +379,9 @@ def _line_deviation(model: ModalModel) -> Array:
         raise UnprovedError("a mode may not oscillate", "take less damping")
     q_lower = (decay[0] / omega).min(axis=0)
     q_upper = (decay[1] / omega).max(axis=0)
-    grids = []  # of σ = (-q + i) ω for each mode
+    # The response of a mode depends on σ = (-q + i) ω alone, which these grids sample; what lies
+    # between their points is bounded by the responses themselves.
+    grids = []  # for each mode, shape (3, points along ω)
     for k in range(model.count):
         along_omega = np.linspace(omega[0, k], omega[1, k], numbers.DEVIATION_POINTS)
         along_q = np.linspace(q_lower[k], q_upper[k], 3)
@@ -376,16 +411,17 @@ def _line_deviation(model: ModalModel) -> Array:
 
 
 def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:
-    """Return by how much the error of the model may exceed its smaller end within a step.
+    """Return by how much the error of a modal model may exceed its smaller end within a step.
 
     Args:
-        model: The model.
-        error: Bound of its error at the nodes, shape (times, outputs).
-        direct: Bound of the error within the step before each node of what forces add to outputs at
-            once, same shape; it may be zero at the nodes.
+        model: The model, which tells the growth rates of its modes and the step.
+        error: Bound of its error at the nodes, 0 or more, shape (times, outputs).
+        direct: Bound of that part of the error, within the step before each node, by which forces
+            act on accelerations at once, same shape; it may be zero at the nodes.
 
     Returns:
-        Bound for the step before each node, same shape.
+        Bound of the error in the step before each node minus the smaller one of the bounds at both
+        its ends, same shape; 0 for the first node.
     """
     # All of the error but `direct` decays no faster than exp(g t), where g < 0 is the smallest
     # growth rate. Within a step of the length h it is at most exp(-g h) times its value at the end.
@@ -398,9 +434,16 @@ def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> A
 
 
 def _error_fractions(model: ModalModel) -> Array:
-    """Return an estimate of the fraction of each input in the error of a model, shape (inputs,).
+    """Return an estimate of the fraction of each input in the error of a modal model.
 
-    It is the fraction of the input in the terms of the highest degree.
+    The error comes from the terms that the polynomials leave out. Its fractions are taken to be
+    those of the inputs in the terms of the highest degree, where an input counts by its exponent.
+
+    Args:
+        model: The model, with polynomials in the inputs as eigenvalues and coefficients.
+
+    Returns:
+        Fractions, shape (inputs,), which add up to 1, or are 0 if there are no such terms.
     """
     exponents = model.eigenvalue.exponents  # (terms, inputs)
     weight = np.zeros(len(exponents))
@@ -415,8 +458,12 @@ def _error_fractions(model: ModalModel) -> Array:
 
 
 def _max_degree(n_inputs: int) -> int:
-    """Return the largest degree of polynomials of so many inputs with at most `MAX_TERMS` terms."""
+    """Return the largest degree of a modal model whose polynomials have so many inputs."""
+    # Tuned: with more than 3100 monomials, the degrees 13, 10 and 8 for 4, 5 and 6 inputs, a model
+    # takes more time than bisections of the box do. A polynomial of degree N in n inputs has
+    # (n + N)! / (n! N!) monomials.
+    max_terms = 3100
     degree = numbers.MAX_DEGREE
-    while comb(n_inputs + degree, n_inputs) > numbers.MAX_TERMS:
+    while comb(n_inputs + degree, n_inputs) > max_terms:
         degree -= 1
     return degree

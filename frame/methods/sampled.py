@@ -50,7 +50,15 @@ class Sampled:
         checked_number("samples", self.samples, whole=True, least=1)
 
     def points(self, lower: Array, upper: Array) -> Array:
-        """Return Sobol points of a box, denser towards its faces, shape (samples, inputs)."""
+        """Return the points of a Sobol sequence in a box, denser towards its faces.
+
+        The sequence is scrambled by the seed of the method; equal seeds give equal points. The
+        shape is (samples, inputs), with the number of samples that the method has.
+
+        Args:
+            lower: Lower ends of the box, shape (inputs,).
+            upper: Upper ends of the box.
+        """
         from scipy.stats import qmc
 
         # The cosine of a uniform variable has the Chebyshev density, which is largest at the ends:
@@ -59,7 +67,19 @@ class Sampled:
         return np.asarray((lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit))
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the attained envelope of all outputs on all levels."""
+        """Return the attained envelope of all outputs on all levels, from random trajectories.
+
+        Each level has trajectories of its own, and keeps those of the higher levels, whose boxes
+        lie in its own.
+
+        Args:
+            flow: The response over the boxes of the inputs.
+            progress: Called with the completed fraction.
+
+        Raises:
+            RefusedError: A trajectory does not exist or is not finite.
+            StepError: A time step did not converge.
+        """
         n_levels = len(flow.boxes.alpha)
         shape = (n_levels, len(flow.time), len(flow.outputs), 2)
         bounds = np.full(shape, -np.inf)
@@ -103,7 +123,23 @@ class PeakSearch:
     budget: int = 12_000
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Return the attained envelope of all outputs on all levels, with searched peaks."""
+        """Return the envelope that all trajectories attain, with estimated or attained peaks.
+
+        The peaks of magnitudes are searched by descents from many points, while each trajectory
+        widens the envelope of the levels to whose cuts it belongs. A peak is an estimate where the
+        stopping rule of the search is met, and attained only where the budget ended it.
+
+        Args:
+            flow: The problem, of a frame whose columns yield.
+            progress: Called with the completed fraction.
+
+        Returns:
+            The attained envelope, with the bounds of the peaks as `searched_peaks`. A note says
+            what the search found, or that the budget is spent.
+
+        Raises:
+            RefusedError: A trajectory does not exist, as one that collapses.
+        """
         cuts = flow.boxes
         outputs = tuple(map(str, flow.outputs))
         yielding_flow = flow.flow
@@ -182,11 +218,18 @@ class _Band:
     def peaks(self, **inputs: Array) -> dict[str, Array]:
         """Return the peaks of trajectories by output, and widen the band by the trajectories.
 
+        On each level to whose cut the inputs of a trajectory belong, `self.bounds` is raised to its
+        values, and `self.at` gets its inputs there, both in place.
+
         Args:
-            inputs: Inputs by name, in SI units, shape (trajectories,) each.
+            inputs: Inputs by name, in SI units, shape (trajectories,) each; all inputs of the
+                problem.
 
         Returns:
-            Peaks by output, shape (trajectories,) each.
+            Largest magnitude over time by output, shape (trajectories,) each.
+
+        Raises:
+            RefusedError: A trajectory does not exist, as one that collapses.
         """
         points = np.column_stack([inputs[name] for name in self.names])
         values, peaks = self.yielding_flow.values_and_peaks(points)
@@ -205,14 +248,21 @@ def independent_excess(
 ) -> tuple[Array, int]:
     """Return how far independent trajectories exceed bounds, and the number of trajectories.
 
+    On each level up to 192 trajectories are computed at points that no search uses.
+
     Args:
         flow: The problem.
-        bounds: Upper bounds of (-output, output), shape (levels, times, outputs, 2).
+        bounds: Upper bounds on each level of its boxes, shape (levels, times, outputs, 2): on the
+            last axis first of the output with its sign changed, then of the output.
         progress: Called with the completed fraction.
 
     Returns:
         The largest excess over time and over both sides, 0 or more, shape (levels, outputs), and
-        the number.
+        the number of trajectories on all levels.
+
+    Raises:
+        RefusedError: A trajectory does not exist or is not finite.
+        StepError: A time step did not converge.
     """
     excess = np.zeros((len(bounds), len(flow.outputs)))
     count = 0
@@ -234,22 +284,26 @@ def independent_points(boxes: Boxes, level: int) -> Array:
 
 
 def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
-    """Return points spread over a box: inside, on faces and edges, and corners.
+    """Return points spread over a box: first inside, then on faces and edges, then corners.
+
+    All are taken from one quasi-random sequence, so that equal arguments give equal points. A box
+    with at most `count` corners gets all of them.
 
     Args:
         lower: Lower ends of the box, shape (inputs,).
-        upper: Upper ends of the box.
+        upper: Upper ends of the box; an input without width stays at its value.
         count: Number of points of each of the three kinds; there may be fewer corners.
-        skip: Number of points of the quasi-random sequence that are left out.
+        skip: Number of points at the beginning of the sequence that are left out.
 
     Returns:
-        Points, shape (points, inputs).
+        Points, shape (points, inputs), which may repeat.
     """
     d = len(lower)
     inside = chebyshev_points(d, count, skip=skip)
     # A coordinate beyond half of its range is moved to the nearer end.
     on_faces = np.clip(2 * chebyshev_points(d, count, skip=skip + count), -1, 1)
     if 2**d > count:
+        # The signs of quasi-random points give corners that are spread evenly, too.
         ends = np.sign(chebyshev_points(d, count, skip=skip + 2 * count))
     else:
         ends = corners(-np.ones(d), np.ones(d))
@@ -260,7 +314,7 @@ def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
 def largest_values(
     flow: UnitFlow, points: Array, progress: Progress | None = None
 ) -> tuple[Array, Ints]:
-    """Return the largest values of (-output, output) of trajectories, and which ones have them.
+    """Return the largest values of outputs over some trajectories, and which ones have them.
 
     Args:
         flow: The problem.
@@ -268,7 +322,13 @@ def largest_values(
         progress: Called with the completed fraction.
 
     Returns:
-        The values and the indices of the trajectories, shape (times, outputs, 2) each.
+        The values and the indices of the trajectories in `points`, shape (times, outputs, 2) each:
+        on the last axis first of the output with its sign changed, then of the output. Of equal
+        trajectories the first one counts. Without points the values are -∞.
+
+    Raises:
+        RefusedError: A trajectory does not exist or is not finite.
+        StepError: A time step did not converge.
     """
     largest: Array = np.full((len(flow.time), len(flow.outputs), 2), -np.inf)
     index: Ints = np.zeros(largest.shape, np.int64)
