@@ -53,9 +53,17 @@ class Envelope(Bounds):
     tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
 
     def extremes_over_time(self, column: int) -> Extremes:
-        """Return bounds of the output with an index at all times, and their largest error.
+        """Return bounds of one output at all times, also between the time nodes.
 
-        The error is that at the nodes, and what the steps between them add.
+        What the output may add within a time step is included as far as it is known.
+
+        Args:
+            column: Index of the output.
+
+        Returns:
+            The smallest lower bound over time, the largest upper bound, and the largest error at a
+            node plus the largest addition within a step (NaN for an unknown error), shape
+            (levels,) each.
         """
         error = self.error[..., column].max(axis=1)
         between = None
@@ -69,9 +77,12 @@ class Envelope(Bounds):
         )
 
     def without_attained(self) -> Self:
-        """Return the bounds without attained values, as `Bounds.without_attained` does.
+        """Return a copy in which no value counts as attained, for inputs that enclose a set.
 
-        Nor is it known which responses of the enclosed set have small peaks.
+        If the box of the inputs was only drawn around the set of admissible inputs, its bounds
+        hold for the set, but the inputs that attain them may lie outside the set. Attained bounds
+        `inner` and their error become None, the inputs that attain bounds become NaN, and upper
+        bounds of the smallest peaks become +∞. Guaranteed bounds stay.
         """
         found = replace(super().without_attained(), attained_error=None)
         if self.least_peaks is not None:
@@ -82,10 +93,23 @@ class Envelope(Bounds):
         return found
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return the envelope as an xarray dataset with units, ready for NetCDF.
+        """Return the envelope as an xarray dataset, ready for NetCDF.
 
-        To the variables of `Bounds` it adds attained and guaranteed bounds, deviations between the
-        nodes, smallest peaks and the structures of the self-test, as far as they are known.
+        The bounds over (alpha, time, output), the inputs that attain them and the guarantees are
+        written as for any fuzzy result. As far as they are known, these variables are added:
+
+        - `inner_lower`, `inner_upper`: attained bounds; `proved_lower`, `proved_upper`: guaranteed
+          bounds; (alpha, time, output);
+        - `between`: what an output may add to the larger end of the step before a node, and
+          `attained_error`: error of the attained bounds; (time, output);
+        - `least_peak_proved`, `least_peak_reached`: lower bound of the smallest peak, and a peak
+          that some response does not exceed; (alpha, output);
+        - the structures that tested guaranteed bounds with their own axes, and, beside them, `cut`:
+          the ends of each input; (alpha, parameter, end).
+
+        The attribute `units` of a variable is the SI unit that all outputs share, "SI, by output"
+        if they have different ones, and "SI, by parameter" for inputs. Method, cost, notes and the
+        numbers in `facts` are attributes of the dataset.
         """
         dataset = super().to_dataset()
         band = ("alpha", "time", "output")
@@ -105,9 +129,12 @@ class Envelope(Bounds):
         if self.attained_error is not None:
             dataset["attained_error"] = (deviation, self.attained_error)
 
+        # NetCDF has one attribute for all outputs of a variable, so that only a unit that all
+        # share can be written there.
         units = sorted(set(self.units)) or ["SI"]
-        # One attribute serves all outputs of a variable.
-        unit = units[0] if len(units) == 1 else "SI, by output"
+        unit = units[0]
+        if len(units) > 1:
+            unit = "SI, by output"
         for name in set(dataset.data_vars) - {"nature", "label"}:
             is_input = name in ("lower_at", "upper_at")
             dataset[name].attrs["units"] = "SI, by parameter" if is_input else unit
@@ -129,11 +156,14 @@ def within_steps(size: Array, between: Array | None) -> Array:
 
     Args:
         size: Upper bound of the function at the nodes, shape (…, times).
-        between: By how much the function may exceed both ends of each step, shape (times,) or that
-            of `size`; None for nothing.
+        between: By how much the function may exceed the larger of its values at both ends of the
+            step before each node, 0 or more, shape (times,) or that of `size`; the entry of the
+            first node is not used. None if nothing is to be added.
 
     Returns:
-        Upper bounds, shape (…, times). The first one is that at the first node.
+        Upper bounds over the step before each node with both its ends, shape (…, times). Before
+        the first node there is no step, and its entry is the bound at this node. If `between` is
+        None, it is `size` itself: the bounds at the nodes alone.
     """
     if between is None:
         return size

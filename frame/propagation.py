@@ -145,10 +145,29 @@ def _build_problem(
     integrator: str | Integrator | None = None,
     **options: Any,
 ) -> Problem:
-    """Check the arguments of `envelope` and return the problem that they state.
+    """Check the arguments of `envelope`, fill in defaults and return the problem that they state.
+
+    Args:
+        model: The structure.
+        inputs: Fuzzy parameters by name, in SI units; a plain number is a crisp one.
+        method: Method or its name. None takes `Auto()` for structures with matrices of mass,
+            damping and stiffness, and `ImprovedFollower()` for other Lagrangian systems.
+        duration: Length of the simulation, in s.
+        step: Distance of the time nodes, in s.
+        alpha: Levels, rising within [0, 1].
+        integrator: Time integrator or its name. None takes "exact" if columns yield or the method
+            is `Auto` or a proof, and the structure has matrices; "midpoint" otherwise.
+        options: Fields of the method; only beside a name, or beside None.
+
+    Returns:
+        The method, the response over those cuts that differ from the cut of the next lower level,
+        all levels, and the row of the cut of each level.
 
     Raises:
-        RefusedError: As `envelope`.
+        RefusedError: The model is no structure; a method, an option, a parameter or an integrator
+            is unknown; the method needs derivatives, and columns yield; the duration is not a
+            whole number of steps; levels do not rise; or a support contains inadmissible values,
+            see `require_admissible`.
     """
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     is_structure = isinstance(model, StructureModel)
@@ -156,6 +175,7 @@ def _build_problem(
     if method is None:
         method = "auto" if has_matrices(model) else "improved-graph-follower"
     chosen = _chosen_method(method, options)
+    # The response of columns that yield has kinks as a function of the parameters.
     needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
     is_possible = not (yields(model) and needs_derivatives)
     allowed = "auto or quasi-monte-carlo where columns yield"
@@ -167,15 +187,21 @@ def _build_problem(
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
     require_admissible(model, cuts)
+    # The cuts of intervals are equal on all levels and need not be computed twice.
     distinct_cuts, rows = cuts.without_repetitions()
     return Problem(chosen, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)
 
 
 def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
-    """Return a method that is given by its name and options, or as an object.
+    """Return the method with a name and with options as its fields, or a given object itself.
+
+    Args:
+        method: Name of a method as in a case file, such as "proof", or a method object.
+        options: Values of the method's fields by their names; must be empty beside an object.
 
     Raises:
-        RefusedError: The name or an option is unknown, or options are given beside an object.
+        RefusedError: The name or an option is unknown, the value of an option is not allowed, the
+            object is no method, or options are given beside an object.
     """
     if not isinstance(method, str):
         allowed = f"{', '.join(METHODS)}, or an object as Proof()"
@@ -199,11 +225,24 @@ def require_envelope(
     method: Method | str | None = None,
     **arguments: Any,
 ) -> None:
-    """Check the arguments of `envelope` by the first steps of a few responses.
+    """Raise the errors of wrong arguments of `envelope` without computing an envelope.
+
+    The responses at the nominal inputs and at some corners of the box of the inputs are computed
+    for three time steps. For a proof it is also checked whether it is possible at all. Errors that
+    appear later in a response, or elsewhere in the box, are not found.
+
+    Args:
+        model: The structure.
+        inputs: Fuzzy parameters by name, in SI units; a plain number is a crisp one.
+        method: Method or its name; the default of `envelope` if it is None.
+        arguments: `duration` and `step`, both required, in s; `alpha`, `integrator`, and the
+            options of a method that is given by its name.
 
     Raises:
-        RefusedError: As `envelope`.
+        RefusedError: A name or an option is unknown, a value is out of range, a support contains
+            inadmissible values, or a response does not exist.
         UnprovedError: A proof is asked for, and there is none for such a structure.
+        FailedError: A time step did not converge.
     """
     problem = _build_problem(model, inputs, method, **arguments)
     flow = problem.flow.flow
@@ -218,15 +257,18 @@ def require_envelope(
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Return the envelope of a follower with guaranteed bounds of the exact response beside it.
-
-    If there is no proof, the envelope is returned as it is.
+    """Add guaranteed bounds of the exact response to an envelope from trajectories.
 
     Args:
-        followed: The envelope.
-        over: The problem.
-        proof: The method of the proof.
+        followed: The envelope, whose bounds are estimated.
+        over: The same problem, of a linear structure.
+        proof: The method of the proof, which is run here.
         tick: Called with the completed fraction.
+
+    Returns:
+        A copy with the guaranteed bounds as `outer`, and with the larger distance of each end from
+        the guaranteed bound and from the attained value as `error`. If the proof fails with an
+        `UnprovedError`, the envelope is returned as it is.
     """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
@@ -238,6 +280,7 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     # larger one of the distances from both.
     ends = np.stack([followed.lower, followed.upper])  # (lower or upper, levels, times, outputs)
     distances = [np.abs(ends - np.stack(known)) for known in (proved.proved, proved.attained)]
+    # The larger one over both known bounds and over both ends: (levels, times, outputs).
     error = np.max(distances, axis=(0, 1))
     largest = float((error / over.scale).max())
     facts = {**followed.facts, "gap": proved.facts["gap"], "estimated_error": largest}
@@ -245,13 +288,21 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
 
 
 def require_admissible(system: StructureModel, cuts: Boxes) -> None:
-    """Check that the supports of parameters contain admissible values only.
+    """Check that a structure has a response for all values of its parameters in a box.
+
+    Ranges and buckling are checked over the whole box. Mass matrices and the order of the modes are
+    checked at the nominal inputs and at up to 16 corners only. Of a structure without matrices of
+    mass, damping and stiffness the ranges alone are checked.
+
+    Args:
+        system: The structure.
+        cuts: Boxes of the parameters; the widest one is checked.
 
     Raises:
-        RefusedError: A support leaves the range of its parameter or seems to be in another unit
+        RefusedError: A support leaves the range of its parameter, or seems to be in another unit
             than the own value of the structure; the weight may buckle a storey; a mass matrix is
-            not positive definite; modes of unequal damping ratio may change places; or nothing
-            moves the structure.
+            not positive definite; modes of unequal damping ratio may change places; or no initial
+            state, record or force moves the structure.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         _require_range(system, name, low, high)
@@ -264,6 +315,7 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
     is_moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
         try:
+            # The matrices at one point have a first axis of length 1.
             matrices = evaluate(system, cuts.names, point[np.newaxis], derivatives=False)[0]
             is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
@@ -285,10 +337,18 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
 
 
 def _require_range(system: StructureModel, name: str, low: float, high: float) -> None:
-    """Check that the support of a parameter is in its range and in the unit of the structure.
+    """Check that the support of a parameter is within its range and not in a wrong unit.
+
+    Args:
+        system: Structure that has the parameter.
+        name: Name of the parameter.
+        low: Lower end of the support, in SI units.
+        high: Upper end.
 
     Raises:
-        RefusedError: It is not.
+        RefusedError: The support leaves the range, such as positive or finite values, or all of
+            its values differ from the value that the structure itself has by a factor of 500 or
+            more. If either is zero, no unit can be told from them, and the latter is not checked.
     """
     key = f"support of {name}"
     shown = f"[{low:g}, {high:g}]"
@@ -307,10 +367,13 @@ def _require_range(system: StructureModel, name: str, low: float, high: float) -
 def _on_levels(bounds: Envelope, alpha: Array, rows: Ints) -> Envelope:
     """Return an envelope on more levels, with the bounds of each level copied from a row.
 
+    It undoes the computation on different cuts alone. What does not depend on the level, such as
+    the addition between time nodes, and facts and notes stay as they are.
+
     Args:
         bounds: The envelope.
-        alpha: The levels, shape (levels,).
-        rows: Row of `bounds` for each level, shape (levels,).
+        alpha: The levels, rising, shape (levels,).
+        rows: Row of the bounds in `bounds` for each level, shape (levels,).
     """
     names = ("lower", "upper", "lower_at", "upper_at", "error")
     changes: dict[str, Any] = {name: getattr(bounds, name)[rows] for name in names}
