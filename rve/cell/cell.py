@@ -39,7 +39,15 @@ class Phase:
     loss: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse constants of no elastic solid; warn of a modulus that is probably not in Pa."""
+        """Check the constants, and warn of a modulus that is probably not in Pa.
+
+        The warning comes for moduli in [0.01 Pa, 10 kPa), but not for the number 1.
+
+        Raises:
+            RefusedError: A constant is no real number, the modulus is not positive and finite,
+                Poisson's ratio is not inside (−1, 0.5), or the loss factor is negative or not
+                finite.
+        """
         for what, value in (("Young's modulus", self.modulus), ("Poisson's ratio", self.poisson)):
             if not isinstance(value, Real) or isinstance(value, bool):
                 cure = "a fuzzy one is an input of fuzzy.propagate, each sample makes its own phase"
@@ -61,18 +69,23 @@ class Phase:
     def stiffness(self) -> Array:
         """Plane-strain stiffness in Voigt order (11, 22, 12 with 2 ε12), (3, 3), in Pa (eq. 6)."""
         nu = self.poisson
+        # Plane strain: ε33 = 0. The shear entry is half of that for tensors, since its strain is
+        # 2 ε12.
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
         return self.modulus / ((1 + nu) * (1 - 2 * nu)) * unit
 
     @property
     def bulk_and_shear(self) -> Array:
         """K of three dimensions and G, shape (2,), in Pa."""
+        # K of space, so that one name means the same for spheres and for fibres.
         bulk = self.modulus / (3 * (1 - 2 * self.poisson))
         return np.array([bulk, self.modulus / (2 * (1 + self.poisson))])
 
     @property
     def stiffness_parts(self) -> Array:
         """What K and what G give to the stiffness, shape (2, 3, 3), in Pa."""
+        # σ = K tr ε 1 + 2 G dev ε: in the plane K acts on ε11 + ε22 alone, and gives both normal
+        # stresses. What remains of the stiffness is proportional to G.
         by_bulk = np.zeros((3, 3))
         by_bulk[:2, :2] = self.bulk_and_shear[0]
         return np.array([by_bulk, self.stiffness - by_bulk])
@@ -92,15 +105,23 @@ class VoigtPhase:
     loss: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a stiffness that is not symmetric positive definite; make it exactly symmetric."""
+        """Check the stiffness, and make it exactly symmetric by the mean with its transpose.
+
+        Raises:
+            RefusedError: The rows are not 3 × 3 finite numbers, differ from their transpose by more
+                than 1e-9 of the largest entry, or have an eigenvalue that is not positive; or the
+                loss factor is negative or not finite.
+        """
         matrix = np.asarray(self.rows, float)
         is_symmetric = matrix.shape == (3, 3) and np.isfinite(matrix).all()
         if is_symmetric:
+            # Round-off of a matrix that was turned or inverted is far below 1e-9.
             is_symmetric = abs(matrix - matrix.T).max() <= 1e-9 * abs(matrix).max()
         if not is_symmetric or np.linalg.eigvalsh(matrix)[0] <= 0:
             allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
             raise RefusedError("stiffness of the phase", matrix.tolist(), allowed)
         require_loss(self.loss)
+        # The dataclass is frozen, so that it can be the key of a cache; tuples can be hashed.
         symmetric_rows = ((matrix + matrix.T) / 2).tolist()
         object.__setattr__(self, "rows", tuple(map(tuple, symmetric_rows)))
 
@@ -183,10 +204,15 @@ def require_points(points: int | None) -> None:
 
 
 def continuous_radii(radius_map: RadiusMap) -> Array:
-    """Return the radii at 2049 even steps of θ.
+    """Return the radii of a map at 2049 even steps of θ over its support, shape (2049,).
+
+    Args:
+        radius_map: What the user gave as the map r(θ), in halves of the cell's side, with the
+            distribution of θ.
 
     Raises:
-        RefusedError: The map has a jump, whose error no rule in θ can tell.
+        RefusedError: It is no radius map, a radius is outside (0, 1), or neighbouring radii differ
+            by more than 0.01: the map jumps, and no rule in θ can tell the error of a jump.
     """
     require_map(radius_map)
     distribution = radius_map.distribution
@@ -202,9 +228,17 @@ def continuous_radii(radius_map: RadiusMap) -> Array:
 
 
 def require_compressible(*phases: AnyPhase) -> None:
-    """Refuse phases that are so incompressible that quadratic elements lock."""
+    """Raise for phases that are so incompressible that quadratic elements lock.
+
+    Args:
+        phases: Materials. Those of any stiffness, which have no Poisson's ratio, pass.
+
+    Raises:
+        RefusedError: A Poisson's ratio is above 0.45.
+    """
     ratios = [phase.poisson for phase in phases if isinstance(phase, Phase)]
-    max_poisson = 0.45  # tuned: above, the errors of quadratic elements grow quickly
+    # Tuned: above, the errors of quadratic elements grow quickly.
+    max_poisson = 0.45
     if max(ratios, default=0.0) > max_poisson:
         cure = "finite elements lock above: take the series"
         allowed = f"values up to {max_poisson:g}"
@@ -214,13 +248,20 @@ def require_compressible(*phases: AnyPhase) -> None:
 def require_solve_arguments(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
-    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases.
+    """Raise for arguments of `solve` that are no radius map, no phase and no sequence of phases.
+
+    A map is a function with the attribute `distribution`; whether it has allowed radii is not
+    looked at.
 
     Args:
         radius_map: First argument.
         matrix: Second argument.
         inclusions: Third argument.
-        isotropic: Whether the model takes isotropic phases alone.
+        isotropic: Whether the model takes isotropic phases alone, and no VoigtPhase.
+
+    Raises:
+        RefusedError: One of the three is of another kind, or `inclusions` is empty. The message
+            names the types that were given.
     """
     is_map = callable(radius_map) and hasattr(radius_map, "distribution")
     has_phases = False

@@ -14,9 +14,6 @@ from alphacut.base.errors import RefusedError, array_of_call
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
 _ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
-CLOSEST = 0.9995
-"""Largest reach of what slices mesh, in halves of the cell's side: between particles that are
-nearer elements have no end."""
 
 
 def circle(angle: Array) -> Array:
@@ -37,12 +34,18 @@ class Ellipse:
     turn: float = 0.0
 
     def __post_init__(self) -> None:
+        """Check the arguments.
+
+        Raises:
+            RefusedError: `aspect` is outside [0.25, 4], or `turn` is not finite.
+        """
         if not (0.25 <= self.aspect <= 4 and np.isfinite(self.turn)):
             value = f"{self.aspect:g} turned by {self.turn:g}°"
             raise RefusedError("aspect of the ellipse", value, "values in [0.25, 4]")
 
     def __call__(self, angle: Array) -> Array:
         """Return the distances over ρ at angles."""
+        # The semi-axes are √a and 1/√a for the aspect a, so that their product is 1.
         turned = angle - np.radians(self.turn)
         along = np.cos(turned) ** 2 / self.aspect
         across = np.sin(turned) ** 2 * self.aspect
@@ -57,11 +60,14 @@ def require_outline(outline: object) -> None:
 
 def is_round(outline: Outline) -> bool:
     """Return whether an outline is a circle, but for round-off."""
+    # A circle of another radius than 1 counts as well.
     return bool(np.ptp(outline(_ANGLES)) < 1e-12)
 
 
 def area(outline: Outline) -> float:
     """Return the area for ρ = 1, ∮ s²/2 dφ: π for a circle."""
+    # The trapezoidal rule of a smooth periodic function converges faster than any power. The last
+    # angle is the first one once more.
     return float(np.mean(outline(_ANGLES[:-1]) ** 2) * np.pi)
 
 
@@ -74,7 +80,14 @@ class Extents(NamedTuple):
 
 
 def extents(outline: Outline) -> Extents:
-    """Return the extents of an outline."""
+    """Return the largest |x1|, the largest |x2| and the smallest distance of an outline.
+
+    They are those of the radius 1.
+
+    Args:
+        outline: Distance of the edge from the centre over the radius, as a function of the polar
+            angle in radians; it is taken at 720 even steps.
+    """
     distances = outline(_ANGLES)
     return Extents(
         half_width=float((distances * abs(np.cos(_ANGLES))).max()),
@@ -90,7 +103,18 @@ def reach(outline: Outline) -> float:
 
 
 def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
-    """Refuse a particle that reaches `limit` halves of the cell's side, or what is no outline."""
+    """Raise for a particle that does not fit into the square [−1, 1]², or for what is no outline.
+
+    Args:
+        outline: Distance of the edge from the centre over `radius`, as a function of the polar
+            angle in radians; it is taken at 720 even steps.
+        radius: Radius of the particle, in halves of the cell's side.
+        limit: What the largest coordinate of the particle must stay below, in halves of the side.
+
+    Raises:
+        RefusedError: A distance is not positive or the outline not periodic; `radius` is not
+            positive; or the particle reaches `limit`.
+    """
     distances = outline(_ANGLES)
     is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]
     if not (distances > 0).all() or not is_periodic:
@@ -101,13 +125,18 @@ def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
 
 
 def bend_radii(outline: Outline) -> tuple[Array, Array]:
-    """Return points of an outline with their bend radii, for ρ = 1.
+    """Return points of an outline with their bend radii, for the radius 1.
 
-    The bend radius is |x'|²/|x''| with derivatives in the polar angle φ. It is that of curvature
-    where φ runs evenly along the outline, and less elsewhere.
+    The bend radius is |x'|²/|x''| with derivatives in the polar angle φ, by central differences. It
+    is that of curvature where φ runs evenly along the outline, and less elsewhere.
+
+    Args:
+        outline: Distance of the edge from the centre over the radius, as a function of the polar
+            angle in radians, of period 2π.
 
     Returns:
-        Points x(φ) at 720 even steps of φ, shape (720, 2), and their bend radii, shape (720,).
+        Points x(φ) at 720 even steps of φ from 0, shape (720, 2), and their bend radii, positive,
+        shape (720,).
     """
     count = 720
     step = 2 * np.pi / count
@@ -118,5 +147,6 @@ def bend_radii(outline: Outline) -> tuple[Array, Array]:
     after = np.roll(points, -1, axis=0)
     first = (after - before) / (2 * step)
     second = (after - 2 * points + before) / step**2
-    second_norm = np.maximum(np.hypot(*second.T), 1e-12)  # never 0, also where x'' vanishes
+    # On a straight part x'' vanishes where φ runs evenly; the bend radius is then huge, not 1/0.
+    second_norm = np.maximum(np.hypot(*second.T), 1e-12)
     return points, np.asarray((first**2).sum(axis=1) / second_norm)

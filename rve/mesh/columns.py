@@ -33,28 +33,42 @@ def extrude(
     refinement: float = REFINEMENTS[0],
     parallel: bool = False,
 ) -> PrismGrid:
-    """Mesh the cell by Gmsh's triangles, opposite sides matching, and extrude them over θ.
+    """Mesh the square [−1, 1]² with triangles by Gmsh, and extrude them to prisms along θ.
+
+    θ is the random number on which the radius of the particle depends; it is the third coordinate
+    of the mesh. Opposite sides of the square get the same nodes.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
-        radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
-            it.
-        layers: Number of layers along θ, at least 1.
-        outline: Outline of the particle.
-        refinement: Refinement of the edges along an outline that is not round; see `bend_grading`.
-        parallel: Whether Gmsh runs on the first MPI rank, for all of them.
+        radius: Radius of the particle whose outline the triangles follow, in halves of the cell's
+            side, in (0, 1); 0 for a mesh without a particle.
+        layers: Number of layers of equal height along θ, at least 1.
+        outline: Distance of the particle's edge from its centre over `radius`, as a function of the
+            polar angle in radians.
+        refinement: Divisor of the edge length where an outline bends sharply; without effect on a
+            circle and where `radius` is 0.
+        parallel: Whether Gmsh runs on the first MPI rank alone, which sends the triangles to the
+            others. All ranks must call.
+
+    Returns:
+        Grid of six-node triangles times layers, with the heights of its levels from 0 to 1. Its
+        15-node prisms are numbered layer by layer. Where `radius` is positive, phase 0 is the
+        matrix, phase 1 the inclusion, and `conforming` is true; else there is the phase "matrix"
+        alone. The arguments are not checked.
     """
     has_bends = bool(radius) and not is_round(outline)
     bends = refinement if has_bends else 0.0
     make = partial(square.triangles, size, radius, outline, refinement=bends)
     points, triangles, phase = from_first_rank(make) if parallel else make()
-    # Sorted by their vertices, neighbours are near one another in memory.
+    # Sorted by their vertices, neighbours are near one another in memory. `lexsort` sorts by its
+    # last row first, so the rows are the vertices from the largest to the smallest number.
     order = np.lexsort(np.sort(triangles, axis=1).T[::-1])
     triangles = triangles[order]
     phase = phase[order]
     plane = _quadratic(points, triangles, phase, radius, outline)
 
-    # The nodes of all levels come first, then those of all mid-levels.
+    # The nodes of all levels come first, then those of all mid-levels. A mid-level has nodes at the
+    # vertices alone, since a serendipity prism has no node in the middle of a rectangular face.
     num_vertices = len(points)
     num_nodes = len(plane.points)
     on_levels = np.arange(layers + 1)[:, np.newaxis, np.newaxis] * num_nodes + plane.triangles
@@ -76,14 +90,19 @@ def extrude(
 def _quadratic(
     points: Array, triangles: Ints, phase: Ints, radius: float, outline: Outline
 ) -> Triangulation:
-    """Return straight-sided triangles with the midpoints of their edges as nodes.
+    """Return six-node triangles: straight ones with the midpoints of their edges as further nodes.
 
     Args:
         points: Vertices, shape (n, 2).
         triangles: Vertices of each triangle, shape (m, 3).
-        phase: Phase of each triangle, shape (m,).
+        phase: Phase of each triangle, shape (m,): matrix 0, particle 1.
         radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+
+    Returns:
+        Triangulation whose nodes are the n vertices and then one midpoint for each edge. Each row
+        of `triangles` has the shape (6,): vertices 0, 1, 2, then the midpoints of the edges 01, 02
+        and 12. `arc` marks the nodes on edges between the two phases.
     """
     inside = phase == NAMES.index("inclusion")
     ends, edges, on_interface = square.edges(triangles, inside)
@@ -94,7 +113,8 @@ def _quadratic(
         points=np.concatenate([points, points[ends].mean(axis=1)]),
         vertices=len(points),
         ends=ends,
-        triangles=np.hstack([triangles, len(points) + edges[:, ::-1]]),  # edges 01, 02, 12
+        # `square.edges` gives each triangle's edges as 12, 02, 01; Basix's prism has 01, 02, 12.
+        triangles=np.hstack([triangles, len(points) + edges[:, ::-1]]),
         inside=inside,
         arc=arc,
         radius=radius,
@@ -103,11 +123,15 @@ def _quadratic(
 
 
 def from_first_rank(make: Callable[[], T]) -> T:
-    """Return on all MPI ranks the result of `make` on the first one, or raise its exception.
+    """Return on all MPI ranks what `make` returns on the first one, or raise its exception on all.
 
-    MPI is imported here, since a process of its own does without.
+    All ranks must call; `make` is not called on the others. Its result and its exception are sent
+    by pickling.
+
+    Raises:
+        Exception: Whatever `make` raised on the first rank.
     """
-    from alphacut.rve.fenicsx import MPI
+    from alphacut.rve.fenicsx import MPI  # not above: a single process does without MPI
 
     result: T | Exception | None = None
     if MPI.COMM_WORLD.rank == 0:
@@ -122,17 +146,33 @@ def from_first_rank(make: Callable[[], T]) -> T:
 
 
 def grid_of(prisms: Prisms) -> PrismGrid:
-    """Return the grid of prisms where they are, with the plane mesh below them.
+    """Order prisms into columns and layers, with the plane mesh below them.
 
-    Nodes are numbered level by level, and prisms layer by layer.
+    The prisms come from a file: their nodes have any numbers, and columns may be bent. A level is a
+    set of nodes with the same θ (the third coordinate), a layer is the prisms between two levels.
+    Each prism has 15 nodes in Basix's order: vertices 0-2 below and 3-5 above, and midpoints of
+    edges.
+
+    Args:
+        prisms: The prisms; the first triangle of each must be the lower one.
+
+    Returns:
+        Grid with the nodes numbered level by level (vertices of the plane mesh first, then the
+        midpoints of its edges), and after all levels the nodes half-way between two levels. Prisms
+        are sorted by layer and then by triangle. `fixed` holds the coordinates of the file in the
+        new order, and `heights` the θ of the levels, scaled to 0 … 1. `plane` has the coordinates
+        of the lowest level and no particle: radius 0, no triangle inside.
 
     Raises:
-        MeshError: The prisms do not lie in columns, or a column does not pass all levels.
+        MeshError: A prism does not stand on one level with its top on the next, a column does not
+            pass all levels, or the layers have different numbers of prisms.
     """
     thetas, level = _levels(prisms)
     layers = len(thetas) - 1
 
-    # Nodes that vertical edges connect are one column.
+    # Nodes that vertical edges connect are one column: the edges of the graph are the vertical
+    # edges of the prisms, cut at their middle nodes, and the links between edge midpoints above
+    # one another. So columns are found whatever way they bend.
     below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
     above = prisms.cells[:, ABOVE + MID_LEVEL].ravel()
     num_points = len(prisms.points)
@@ -150,7 +190,7 @@ def grid_of(prisms: Prisms) -> PrismGrid:
     planar = planar_of_column[column]
     number = _number_nodes(prisms, level, planar=planar, layers=layers, vertices=len(vertices))
 
-    # Prisms above one triangle have the same three planar vertices.
+    # Prisms above one triangle have the same three planar vertices, by which they are matched.
     below_prisms = np.sort(planar[prisms.cells[:, :3]], axis=1)
     triangle = np.unique(below_prisms, axis=0, return_inverse=True)[1].ravel()
     if (np.bincount(triangle) != layers).any():
@@ -178,9 +218,16 @@ def grid_of(prisms: Prisms) -> PrismGrid:
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Ints]:
-    """Return θ of the levels, rising, and the level of each node, shape (nodes,).
+    """Find the levels of prisms: the values of θ (the third coordinate) at which triangles lie.
 
-    Nodes on mid-levels have the level −1.
+    Args:
+        prisms: Prisms whose first triangle is the lower one, with the nodes of each in Basix's
+            order.
+
+    Returns:
+        θ of the levels in rising order, shape (levels,), and the level of each node, shape
+        (nodes,): an index of the first array, or −1 for middles of vertical edges, which lie
+        between levels. Nodes whose θ differ by less than 1e-8 are on one level.
 
     Raises:
         MeshError: A prism does not stand on one level with its top on the next.
@@ -206,17 +253,20 @@ def _levels(prisms: Prisms) -> tuple[Array, Ints]:
 
 
 def _number_nodes(prisms: Prisms, level: Ints, *, planar: Ints, layers: int, vertices: int) -> Ints:
-    """Return the new number of each node: all levels, then the mid-levels, vertices first.
+    """Return the new number of each node, shape (nodes,).
+
+    First come the nodes of all levels, level by level, and then the nodes half-way between two
+    levels. Within a level the order is that of the plane mesh.
 
     Args:
         prisms: The prisms.
-        level: Level of each node, −1 on mid-levels.
-        planar: Node of the plane mesh below each node, −1 where its column is not a lowest one.
-        layers: Number of layers.
-        vertices: Number of vertices of the plane mesh.
+        level: Level of each node, counted from 0 at the lowest θ; −1 for middles of vertical edges.
+        planar: Node of the plane mesh below each node, −1 where its column does not reach level 0.
+        layers: Number of layers, one less than the levels.
+        vertices: Number of vertices of the plane mesh, which stand before its edge midpoints.
 
     Raises:
-        MeshError: A column does not pass all levels, so that numbers are missing.
+        MeshError: The new numbers are not 0, 1, 2, …, each once: a column does not pass all levels.
     """
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
@@ -224,6 +274,8 @@ def _number_nodes(prisms: Prisms, level: Ints, *, planar: Ints, layers: int, ver
     level_below = level[prisms.cells[:, :3]]
     first_on_mid_level = (layers + 1) * per_level + level_below * vertices
     number[on_mid_levels] = first_on_mid_level + planar[on_mid_levels]
+    # A column that lacks a level leaves a gap in the numbers, and two nodes of one column on the
+    # same level get the same number. So all columns are whole where each number comes once.
     expected = (layers + 1) * per_level + layers * vertices
     if (planar < 0).any() or not np.array_equal(np.sort(number), np.arange(expected)):
         raise MeshError("columns of prisms do not pass all levels", "extrude the whole plane")

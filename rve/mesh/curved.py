@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import require_mesh_size
-from alphacut.rve.cell.outline import CLOSEST, Outline, circle, is_round, require_fit
+from alphacut.rve.cell.outline import Outline, circle, is_round, require_fit
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.square import REFINEMENTS
@@ -52,20 +52,36 @@ class PlaneMesh:
 
 
 def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> PlaneMesh:
-    """Mesh one cell, finer where the particle is small or nearly touches its images.
+    """Mesh the square [−1, 1]² around a centred particle with triangles by Gmsh.
+
+    Edges are shorter where the particle is small, where it nearly touches its periodic images, and
+    where its outline bends. Opposite sides have the same nodes.
 
     Args:
         radius: Radius of the particle, in halves of the cell's side.
-        size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
-        outline: Outline of the particle.
+        size: Edge length far from the interface, in halves of the cell's side, in (0, 1]; above 0.7
+            it is taken as 0.7.
+        outline: Distance of the particle's edge from its centre over `radius`, as a function of the
+            polar angle in radians.
+
+    Returns:
+        Straight-sided triangles with the vertices of the interface on the outline. For an outline
+        that is no circle, edges at its bends are shortened step by step until no curved triangle of
+        the orders 2 to 5 is nearly folded: the smallest determinant of its Jacobian J exceeds 0.2
+        of the mean.
 
     Raises:
-        RefusedError: Particles nearly touch, so that the mesh between them would have no end; or an
-            outline is so sharp that elements fold however short they are.
+        RefusedError: `size` is outside (0, 1]; the outline is not positive or not periodic;
+            `radius` is not positive or the particle reaches 0.9995 of half the side, so that
+            elements between it and its images would have no end; or the outline is so sharp that
+            triangles fold at the shortest edges that are tried.
     """
     require_mesh_size(size)
-    require_fit(outline, radius, CLOSEST)
-    size = min(size, 0.7)  # on coarser meshes small particles hide from every order
+    # Nearer to its images, at 0.9995 of half the side, elements in the gap would have no end.
+    require_fit(outline, radius, limit=0.9995)
+    # On coarser meshes small particles hide from every order, and errors that are estimated by
+    # comparing orders come out too small.
+    size = min(size, 0.7)
     if is_round(outline):
         return _graded_mesh(radius, size, outline, refinement=0.0)
     for refinement in REFINEMENTS:
@@ -87,13 +103,24 @@ def _is_valid(mesh: PlaneMesh, order: int) -> bool:
 
 
 def _graded_mesh(radius: float, size: float, outline: Outline, *, refinement: float) -> PlaneMesh:
-    """Mesh with shorter edges near the particle, the interface's vertices on the outline."""
+    """Mesh the square [−1, 1]² with shorter edges near the particle, by Gmsh.
+
+    Args:
+        radius: Radius of the particle, in halves of the cell's side, positive.
+        size: Edge length far from the particle, in halves of the cell's side.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+        refinement: Divisor of the edge length at bends of the outline; 0 to leave bends alone.
+
+    Returns:
+        Triangles whose vertices between matrix (phase 0) and particle (phase 1) lie on the outline.
+    """
     points, triangles, phase = square.triangles(
         size, radius, outline, near_particle=True, refinement=refinement
     )
     inside = phase == PARTICLE
     on_interface = np.intersect1d(triangles[inside], triangles[~inside])
-    # Gmsh puts them on a spline, which is only near the outline.
+    # Gmsh puts vertices of the interface on a spline, which is only near the outline. Each is moved
+    # along its ray from the centre.
     x, y = points[on_interface].T
     distance = radius * outline(np.arctan2(y, x))
     points[on_interface] *= (distance / np.hypot(x, y))[:, np.newaxis]
@@ -107,15 +134,17 @@ def _lagrange_triangle(order: int) -> Any:
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
-    """Return the nodes of Lagrange triangles that are bent onto the outline.
+    """Return the nodes of Lagrange triangles; those at the particle are bent onto its outline.
 
     Args:
-        mesh: Straight-sided triangles.
-        order: Polynomial degree of the elements.
+        mesh: Straight-sided triangles with the vertices of the interface on the outline.
+        order: Polynomial degree of the elements, at least 1.
 
     Returns:
-        Positions of the nodes, shape (n, 2), and the nodes of each triangle in Basix's order, shape
-        (m, nodes of a triangle).
+        Positions of the nodes, shape (n, 2): vertices of the mesh first, then nodes inside edges,
+        then nodes inside triangles. And the nodes of each triangle, shape (m, nodes of a triangle),
+        as indices of the positions: its three vertices, the nodes of its edges 12, 02 and 01, and
+        those inside it, which is the order of the library Basix.
     """
     lattice: Array = np.asarray(_lagrange_triangle(order).points, float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
@@ -126,25 +155,30 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Ints]:
         edge_ends = mesh.triangles[bent][:, vertices]
         positions[bent] += _bend_onto_outline(mesh, edge_ends, barycentric[:, vertices])
     cells = _lagrange_nodes(mesh, edges, order=order, num_edges=len(ends))
+    # Triangles that share an edge agree on its nodes, so either of them may write the position.
     points = np.empty((cells.max() + 1, 2))
     points[cells] = positions
     return points, cells
 
 
 def _lagrange_nodes(mesh: PlaneMesh, edges: Ints, *, order: int, num_edges: int) -> Ints:
-    """Return the nodes of Lagrange triangles in Basix's order, shape (m, nodes of a triangle).
+    """Number the nodes of Lagrange triangles, shape (m, nodes of a triangle).
 
-    Numbered are first the vertices, then the nodes inside edges, and then those inside triangles.
+    The vertices of the mesh come first, then the order − 1 nodes inside each edge, and then the
+    nodes inside each triangle. A row holds the nodes of a triangle in the order of the library
+    Basix: three vertices, nodes of the edges 12, 02 and 01, nodes inside.
 
     Args:
-        mesh: Straight-sided triangles.
-        edges: Numbers of the edges of each triangle, shape (m, 3).
-        order: Polynomial degree of the elements.
+        mesh: Straight-sided triangles, m of them, each with its vertices in rising order.
+        edges: Numbers of the edges 12, 02 and 01 of each triangle, shape (m, 3).
+        order: Polynomial degree of the elements, at least 1.
         num_edges: Number of edges of the mesh.
     """
     num_vertices = len(mesh.points)
     per_edge = order - 1
     per_triangle = (order - 1) * (order - 2) // 2
+    # Vertices of a triangle rise, so both triangles at an edge run along it in the same direction
+    # and see its nodes in the same order.
     on_edges = num_vertices + edges[:, :, np.newaxis] * per_edge + np.arange(per_edge)
     first_inside = num_vertices + num_edges * per_edge
     first_of_triangle = first_inside + np.arange(len(mesh.triangles)) * per_triangle
@@ -155,28 +189,32 @@ def _lagrange_nodes(mesh: PlaneMesh, edges: Ints, *, order: int, num_edges: int)
 def _bend_onto_outline(mesh: PlaneMesh, ends: Ints, weights: Array) -> Array:
     """Return displacements of the nodes of k triangles that bend one edge of each onto the outline.
 
-    On the edge they take the chord to the outline. Inside the triangle they fade with the bubble of
-    the edge, so that the map stays smooth and the elements keep their order.
+    A node at the parameter s of the edge (0 at the first end, 1 at the second) moves by the
+    distance from the chord x(s) to the outline at the angle (1 − s) φ₀ + s φ₁, where φ₀, φ₁ are the
+    polar angles of the ends. Inside the triangle this displacement is multiplied by λ₀ λ₁ / (s (1 −
+    s)) with the barycentric coordinates λ₀, λ₁ of the ends and s = (1 + λ₁ − λ₀) / 2. The factor is
+    1 on the edge and 0 on both other edges, so neighbours stay joined.
 
     Args:
-        mesh: The mesh.
-        ends: Vertices at both ends of the edge of each triangle, shape (k, 2).
-        weights: Barycentric coordinates of the nodes at these ends, shape (nodes, 2).
+        mesh: The mesh, with `radius` and `outline` of the particle.
+        ends: Vertices at both ends of the edge of each triangle, shape (k, 2), on the outline.
+        weights: Barycentric coordinates λ₀, λ₁ of the reference nodes, shape (nodes, 2).
 
     Returns:
-        Displacements, shape (k, nodes, 2).
+        Displacements, shape (k, nodes, 2), in halves of the cell's side.
     """
     first = mesh.points[ends[:, 0]]
     second = mesh.points[ends[:, 1]]
     first_angle = np.arctan2(first[:, 1], first[:, 0])
     second_angle = np.arctan2(second[:, 1], second[:, 0])
-    difference = (second_angle - first_angle + np.pi) % (2 * np.pi) - np.pi  # across ±π too
+    # The edge is the shorter way round, also where it crosses the angle ±π.
+    difference = (second_angle - first_angle + np.pi) % (2 * np.pi) - np.pi
     along = (1 + weights[:, 1] - weights[:, 0]) / 2  # from 0 at the first end to 1 at the second
     angle = first_angle[:, np.newaxis] + difference[:, np.newaxis] * along
     distance = mesh.radius * np.asarray(mesh.outline(angle))
     arc = distance[..., np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     chord = first[:, np.newaxis] + (second - first)[:, np.newaxis] * along[:, np.newaxis]
-    # The bubble over its value on the edge is 1 there and 0 on both other edges.
+    # The product λ₀ λ₁ is zero at the ends and on both other edges, where 0/0 must give 0.
     bubble = weights.prod(axis=1)
     on_edge = along * (1 - along)
     fade = np.divide(bubble, on_edge, out=np.zeros_like(bubble), where=bubble > 1e-14)
@@ -189,16 +227,22 @@ def quadrature_degree(order: int) -> int:
 
 
 def jacobian_ratios(nodes: Array, cells: Ints, order: int) -> Array:
-    """Return the smallest det J over its mean in each isoparametric triangle, shape (m,).
+    """Return the smallest det J over its mean in each curved triangle, shape (m,).
+
+    J is the Jacobian matrix of the isoparametric map from the reference triangle. The minimum is
+    taken over the quadrature points of degree 2 · order + 1, the mean over the reference triangle.
+    A ratio of 1 means straight sides; below 0 the triangle is folded.
 
     Args:
         nodes: Positions of all nodes, shape (n, 2).
-        cells: Nodes of each triangle in Basix's order, shape (m, nodes of a triangle).
+        cells: Nodes of each triangle in Basix's order (vertices, nodes on the edges 12, 02, 01,
+            nodes inside), shape (m, nodes of a triangle).
         order: Polynomial degree of the triangles.
     """
     points, weights = basix.make_quadrature(basix.CellType.triangle, quadrature_degree(order))
     shape_functions = _lagrange_triangle(order).tabulate(1, points)
-    _, by_first, by_second = np.asarray(shape_functions)[:, :, :, 0]  # derivatives
+    # Basix gives values, ∂/∂X and ∂/∂Y along the first axis; then points, nodes, one component.
+    _, by_first, by_second = np.asarray(shape_functions)[:, :, :, 0]
     x, y = nodes[cells].transpose(2, 1, 0)
     determinants = (by_first @ x) * (by_second @ y) - (by_second @ x) * (by_first @ y)
     means = weights @ determinants / weights.sum()

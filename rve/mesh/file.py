@@ -23,16 +23,30 @@ from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
-PRISM_15 = 18  # Gmsh's type of the element
+PRISM_15 = 18  # Gmsh's number of the type "Prism 15", in its table of MSH file elements
 MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms"
 PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2"
-EXTRUDE = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"
-COMMENTS, END_OF_COMMENTS = b"$Comments", b"$EndComments"
-FILLED = 1e-6  # of the cell that prisms may leave or take twice
 
 
 def read_grid(path: Path | str) -> PrismGrid:
-    """Extruded prisms of a Gmsh file, where they are, numbered by level; MeshError if no cell."""
+    """Read a mesh of the cell from a file in Gmsh's format MSH and check it.
+
+    The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on the square [−1,
+    1]², with the random number θ as third coordinate. Each physical group of volumes is a material.
+
+    Args:
+        path: The file, MSH 2.x or 4.1, text or binary.
+
+    Returns:
+        The prisms where the file has them (`fixed`), with nodes numbered level by level of θ.
+
+    Raises:
+        RefusedError: The file cannot be read, is not in that format, or contradicts itself.
+        MeshError: It is no mesh of a cell: other elements than prisms, a volume without a group or
+            in two, θ along another axis, a square other than [−1, 1]², no columns, folded prisms,
+            voids or overlaps, opposite sides that do not match, slits, or a material that changes
+            along θ.
+    """
     try:
         mesh = parse_msh(mesh_content(path))
     except DamagedMeshError as error:
@@ -49,21 +63,24 @@ def read_grid(path: Path | str) -> PrismGrid:
 
 
 def mesh_content(path: Path | str) -> bytes:
-    """Return a file in Gmsh's format MSH from its section $MeshFormat on.
+    """Return the bytes of a file in Gmsh's format MSH from its section $MeshFormat on.
 
     A file that begins otherwise may be a script of Gmsh, whose commands Gmsh would run; here Gmsh
-    reads no file at all. Sections $Comments before $MeshFormat are left out.
+    reads no file at all. Sections $Comments before $MeshFormat are left out; what follows
+    $MeshFormat is not looked at.
 
     Raises:
-        RefusedError: The file cannot be read, or begins otherwise.
+        RefusedError: The file does not exist, is a pipe or a device, is too large for the free
+            memory, or begins with neither $MeshFormat nor $Comments; so does an empty file.
     """
     try:
         require_text(Path(path))
         content = Path(path).read_bytes()
     except OSError as error:
         raise RefusedError("mesh.file", path, MESH_FILES, error.strerror or str(error)) from None
-    while content.startswith(COMMENTS):
-        _, _, content = content.partition(END_OF_COMMENTS)
+    # A section of comments that does not end leaves nothing, which is refused below.
+    while content.startswith(b"$Comments"):
+        _, _, content = content.partition(b"$EndComments")
         content = content.lstrip()
     is_mesh = re.match(rb"\$MeshFormat\s", content) is not None
     cure = 'write it by gmsh.write("NAME.msh") or `gmsh -save`; a .geo script is no mesh'
@@ -72,16 +89,27 @@ def mesh_content(path: Path | str) -> bytes:
 
 
 def read_prisms(mesh: MshFile) -> Prisms:
-    """All prisms of a file, each physical group of volumes a phase, by rising number of the group.
+    """Collect all prisms of a parsed file; each physical group of volumes becomes a phase.
+
+    Args:
+        mesh: What the file says: points, elements by volume and type, groups of volumes and names.
+
+    Returns:
+        Points that belong to a prism, shape (n, 3); the 15 nodes of each prism as indices of these
+        points, shape (m, 15), in Basix's order; the phase of each prism, shape (m,), an index of
+        the names; and the names by rising number of the group. A group without a name is "group
+        NUMBER".
 
     Raises:
-        MeshError: A volume is in no physical group or in two, or has other elements.
+        MeshError: The mesh is divided into partitions or has no volumes; a volume is in no physical
+            group or in two; or a volume has no elements or others than 15-node prisms.
     """
     if mesh.partitions:
         cure = "write the mesh before it is divided among processes"
         raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", cure)
     if not mesh.volumes and not mesh.elements:
-        raise MeshError("the mesh is plane: it has no volumes, and prisms are wanted", EXTRUDE)
+        cure = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"
+        raise MeshError("the mesh is plane: it has no volumes, and prisms are wanted", cure)
     names: list[str] = []
     cells: list[Ints] = []
     phases: list[Ints] = []
@@ -102,13 +130,26 @@ def read_prisms(mesh: MshFile) -> Prisms:
         what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
         cure = 'name each phase: gmsh.model.addPhysicalGroup(3, volumes, name="matrix")'
         raise MeshError(f"{what} has no physical group that names its phase", cure)
-    # nodes of curves and surfaces alone belong to no prism
+    # Nodes of curves and surfaces alone belong to no prism; they would be unknowns without
+    # stiffness.
     used, compact = np.unique(np.concatenate(cells), return_inverse=True)
     return Prisms(mesh.points[used], compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
 
 
 def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
-    """Indices of the nodes of the prisms of a volume, shape (m, 15), in Basix's order."""
+    """Return the nodes of the prisms of one volume as indices of the file's points, shape (m, 15).
+
+    The order within a prism is that of Gmsh's type "Prism 15", which is Basix's: vertices, then
+    midpoints of edges.
+
+    Args:
+        mesh: Elements by the tag of their volume and the number of their type.
+        volume: Tag of the volume.
+        name: Name of its physical group, for the message.
+
+    Raises:
+        MeshError: The volume has no elements, or other ones beside or instead of 15-node prisms.
+    """
     kinds = [kind for entity, kind in mesh.elements if entity == volume]
     if kinds != [PRISM_15]:
         found = ", ".join(element_name(kind) for kind in kinds)
@@ -122,8 +163,17 @@ def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
 def refined(grid: PrismGrid) -> PrismGrid:
     """Split each prism of a mesh from a file into eight, in the place of its own curved shape.
 
+    A prism is halved along θ, and its triangle is split into four at the midpoints of the edges.
     The eight span all polynomials of the one, so that the displacements of the coarser mesh are
     among those of the finer one, whose stiffness is therefore nowhere larger.
+
+    Args:
+        grid: A mesh with the positions `fixed` of all nodes; without them an AssertionError is
+            raised.
+
+    Returns:
+        A new grid with twice the layers and four times the triangles, and the phases of the old
+        one.
 
     Raises:
         MeshError: Middles of vertical edges lie at θ of their own, so that there is no mid-level.
@@ -139,9 +189,11 @@ def refined(grid: PrismGrid) -> PrismGrid:
     at = np.concatenate([planar, heights[..., np.newaxis]], axis=-1).reshape(-1, 3)
     shapes = np.asarray(wedge(1).tabulate(0, at)[0]).reshape(len(at), -1)
 
-    # A node that prisms share has the same weights of the vertices that they share. They are
-    # sixteenths, so that vertex and weight make one whole number.
-    across = np.stack([1 - at[:, 0] - at[:, 1], at[:, 0], at[:, 1]], axis=1)
+    # A new node that prisms share is recognised by its trilinear weights of their six vertices,
+    # which are zero for all vertices that they do not share; positions would need a tolerance.
+    # Barycentric coordinates are quarters and heights are quarters, so the weights are sixteenths
+    # from 0 to 16, and 17 · vertex + weight is one whole number for both. Weights 0 become −1.
+    across = np.stack([1 - at[:, 0] - at[:, 1], at[:, 0], at[:, 1]], axis=1)  # of the triangle
     weights = np.hstack([across * (1 - at[:, 2:]), across * at[:, 2:]])
     sixteenths = np.rint(16 * weights).astype(int)
     keys = np.where(sixteenths > 0, grid.cells[:, np.newaxis, :6] * 17 + sixteenths, -1)
@@ -155,7 +207,11 @@ def refined(grid: PrismGrid) -> PrismGrid:
 def _quarters() -> Array:
     """Return the vertices of the four triangles that halve the edges of the reference triangle.
 
-    Shape (4, 3, 2).
+    The reference triangle has the vertices (0, 0), (1, 0) and (0, 1). The first three triangles
+    stand at these vertices, the last is the middle one. All are counterclockwise.
+
+    Returns:
+        Coordinates, shape (4, 3, 2): triangles, vertices, x and y.
     """
     a, b, c = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     ab = (a + b) / 2
@@ -171,7 +227,18 @@ MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
 
 
 def orient(prisms: Prisms) -> Prisms:
-    """Reorder the nodes of prisms so that the first triangle is the lower one, counterclockwise."""
+    """Reorder the nodes of prisms so that the first triangle is the lower one, counterclockwise.
+
+    "Lower" is by θ, the third coordinate; the turn is seen in the plane of the first two. Only
+    vertices are looked at. Prisms that are in order already, and those without height or area, keep
+    their nodes.
+
+    Args:
+        prisms: Prisms with 15 nodes each in Basix's order.
+
+    Returns:
+        New prisms with reordered `cells`; points, phases and names are those of `prisms`.
+    """
     cells = prisms.cells.copy()
     points = prisms.points
     is_falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
@@ -185,7 +252,20 @@ def orient(prisms: Prisms) -> Prisms:
 
 
 def _require_filled(grid: PrismGrid) -> None:
-    """Refuse voids, overlaps and folded prisms, by det J at the quadrature points."""
+    """Raise unless the prisms of a mesh from a file fill the cell, by det J at quadrature points.
+
+    J is the Jacobian matrix of the map from the reference prism. The sum of its determinants times
+    the weights is the volume of the prisms; it is compared with the volume of the box around all
+    nodes.
+
+    Args:
+        grid: A mesh with the positions `fixed` of all nodes; without them an AssertionError is
+            raised.
+
+    Raises:
+        MeshError: A determinant is zero or negative, so that a prism is folded; or the volume
+            differs from that of the box by more than a millionth (voids, prisms that overlap).
+    """
     assert grid.fixed is not None
     points, weights = prism_rule()
     slopes = np.array(wedge(1).tabulate(1, points)[1:]).reshape(3, len(points), -1)
@@ -198,7 +278,9 @@ def _require_filled(grid: PrismGrid) -> None:
         raise MeshError(what, cure)
     low, high = grid.fixed.min(axis=0), grid.fixed.max(axis=0)
     filled = float((determinants @ weights).sum() / np.prod(high - low))
-    if abs(filled - 1) > FILLED:
+    # Round-off of the volume is far below 1e-6, and a single missing prism of any usable mesh is
+    # far above it.
+    if abs(filled - 1) > 1e-6:
         cure = "give holes a phase of their own, soft as air"
         if filled > 1:
             cure = "split surfaces that lie on one another: occ.fragment, both objects removed"
@@ -206,7 +288,17 @@ def _require_filled(grid: PrismGrid) -> None:
 
 
 def _require_joined_columns(grid: PrismGrid) -> None:
-    """Refuse slits, and columns of prisms whose phase changes along θ."""
+    """Raise if a mesh has slits, or columns of prisms whose phase changes along θ.
+
+    A slit is an edge inside the square that belongs to one triangle alone: surfaces that touch
+    without common nodes.
+
+    Args:
+        grid: Prisms sorted layer by layer and, in each layer, by the triangle of the plane mesh.
+
+    Raises:
+        MeshError: There is a slit, or a prism and the one above it have different phases.
+    """
     triangles, points = grid.plane.triangles[:, :3], grid.plane.points
     ends, edges, _ = square.edges(triangles, grid.plane.inside)
     middles = points[ends].mean(axis=1)
@@ -230,10 +322,17 @@ def _require_joined_columns(grid: PrismGrid) -> None:
 
 
 def _require_theta_last(points: Array) -> None:
-    """Refuse points, shape (n, 3), of a cell whose third coordinate is not the one along θ.
+    """Raise if the third coordinate of a cell is not the one along θ but one along a side.
 
-    The cell spans −1 … 1 in two coordinates. If it does so in the third one and in only one of the
-    others, θ was taken along the remaining one.
+    The cell spans −1 … 1 in the two coordinates of its sides, and any range along θ. If it spans −1
+    … 1 in the third coordinate and in only one of the others, θ was taken along the remaining one.
+    Where all three span −1 … 1, nothing is raised, since the axes cannot be told apart.
+
+    Args:
+        points: Positions of the nodes, shape (n, 3), n at least 1.
+
+    Raises:
+        MeshError: θ is the first or the second coordinate; the hint says which axes to exchange.
     """
     ends = np.array([points.min(axis=0), points.max(axis=0)])
     is_side = (np.abs(ends - [[-1], [1]]) <= SAME_PLACE).all(axis=0)
@@ -247,7 +346,16 @@ def _require_theta_last(points: Array) -> None:
 
 
 def _require_square(xy: Array, what: str) -> None:
-    """Refuse points (n, 2) whose box is not the cell's."""
+    """Raise unless the box around points is the square [−1, 1]², within 1e-8.
+
+    Args:
+        xy: Points, shape (n, 2), n at least 1.
+        what: What the points are of, the subject of the message, such as "the cell".
+
+    Raises:
+        MeshError: The box is another one. For a square the hint says how to scale and move the
+            mesh.
+    """
     box = np.array([xy.min(axis=0), xy.max(axis=0)])
     if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
         shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
@@ -260,7 +368,16 @@ def _require_square(xy: Array, what: str) -> None:
 
 
 def _require_periodic_square(grid: PrismGrid) -> None:
-    """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match."""
+    """Raise unless each level of θ fills the square [−1, 1]² and its opposite sides match.
+
+    Args:
+        grid: A mesh with the positions `fixed` of all nodes (else an AssertionError is raised),
+            which are numbered level by level.
+
+    Raises:
+        MeshError: The nodes of a level span another square, a node on a side has no partner on the
+            opposite side, or nodes are partners on one level and not on another.
+    """
     assert grid.fixed is not None
     per_level = len(grid.plane.points)
     lowest: Ints | None = None  # unknowns of its nodes, which partners have in common
@@ -285,15 +402,19 @@ def write(
     names: Sequence[str],
     fields: Mapping[str, Array] | None = None,
 ) -> None:
-    """Write prisms to a binary file of Gmsh, each phase a physical group.
+    """Write prisms to a binary file in Gmsh's format MSH, each phase a physical group of volumes.
+
+    A file that exists is replaced. Gmsh must be installed.
 
     Args:
-        path: A name that ends in .msh.
-        points: (x1, x2, θ), shape (n, 3).
-        cells: Nodes in Basix's order, shape (m, 15).
+        path: A name that ends in .msh; Gmsh tells the format by the ending.
+        points: Coordinates (x1, x2, θ), shape (n, 3).
+        cells: Indices of the nodes of each prism in `points`, in Basix's order (which is Gmsh's),
+            shape (m, 15).
         phase: Index in `names` of each prism's phase, shape (m,).
-        names: Names of the phases.
-        fields: Values at the nodes of the prisms by name, shape (m, 15, components).
+        names: Names of the phases, which become those of the physical groups; at least one.
+        fields: Values at the nodes of the prisms by name, shape (m, 15, components). Each becomes a
+            view behind the mesh. Element k of a view is the k-th prism.
     """
     with square.model() as gmsh:
         gmsh.option.setNumber("Mesh.Binary", 1)
@@ -313,5 +434,6 @@ def write(
             view, elements = gmsh.view.add(name), np.arange(1, len(values) + 1)
             data = view, 0, model, "ElementNodeData", elements, values.ravel()
             gmsh.view.addHomogeneousModelData(*data, numComponents=values.shape[-1])
+            # Else each view would bring the whole mesh into the file once more.
             gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
             gmsh.view.write(view, str(path), append=True)

@@ -64,10 +64,23 @@ class MshFile:
 
 
 def parse_msh(content: bytes) -> MshFile:
-    """Return the volumes of a file in the format MSH, from its first section $MeshFormat on.
+    """Return what a mesh file in Gmsh's format MSH says of its volumes.
+
+    Versions 2 to 2.2 and 4.1 are read, in text or in bytes of either order. Of elements only those
+    of three dimensions are kept, by the tag of their volume and the number of their type, and of
+    physical groups only those of volumes.
+
+    Args:
+        content: The file from its first section $MeshFormat on.
+
+    Returns:
+        MshFile with the coordinates of all nodes; elements as indices of these nodes; volumes, also
+        empty ones; groups; names of groups; and the number of partitions, 0 for a mesh that is
+        whole. A file without volumes gives empty ones.
 
     Raises:
-        DamagedMeshError: The file is cut off, contradicts itself, or is of another version.
+        DamagedMeshError: The file is cut off, contradicts itself (counts that do not fit, tags that
+            come twice or are missing), lacks $Nodes or $Elements, or is of another version.
     """
     sections = _sections(content)
     match = re.match(rb"\s*(\S+)\s+([01])\s+(\d+)[ \t\r]*\n", sections.get(b"MeshFormat", b""))
@@ -89,6 +102,7 @@ def parse_msh(content: bytes) -> MshFile:
         raise DamagedMeshError("in bytes, where the line below $MeshFormat says text (0)")
 
     def numbers(name: bytes) -> _Numbers:
+        """Return the numbers of a section; DamagedMeshError if there is no such section."""
         if name not in sections:
             raise DamagedMeshError(f"without ${name.decode()}")
         return _Binary(sections[name], order) if is_binary else _Text(sections[name])
@@ -110,14 +124,18 @@ class _Numbers:
     """Numbers of a section, taken one after another; DamagedMeshError is raised where it ends."""
 
     def take(self, count: int, kind: str) -> NDArray[np.generic]:
-        """Return the next numbers.
+        """Return the next numbers, and move behind them.
 
         Args:
-            count: How many.
+            count: How many; 0 gives an empty array.
             kind: Type of NumPy without its byte order: "i4", "u8" or "f8".
 
+        Returns:
+            Array of shape (count,). Its type is `kind` for bytes, and float for text.
+
         Raises:
-            DamagedMeshError: There are fewer, or a number is not of the type.
+            DamagedMeshError: `count` is negative or more than what is left, or a number in text is
+                not of the type: broken or too large for "i4" and "u8", negative for "u8".
         """
         raise NotImplementedError
 
@@ -126,10 +144,11 @@ class _Numbers:
         return self.take(count, "i4").astype(np.int64)
 
     def sizes(self, count: int) -> Ints:
-        """Return the next numbers that version 4.1 calls size_t.
+        """Return the next numbers that version 4.1 calls size_t, shape (count,).
 
         Raises:
-            DamagedMeshError: One is 2⁵³ or more, which no mesh has and a float does not hold.
+            DamagedMeshError: One is 2⁵³ or more, which no mesh has and a float does not hold; or
+                fewer than `count` are left, or `count` or a number is negative.
         """
         values = self.take(count, "u8").astype(float)
         if (values >= 2.0**53).any():
@@ -165,10 +184,23 @@ class _Text(_Numbers):
         self.place = 0
 
     def take(self, count: int, kind: str) -> NDArray[np.generic]:
+        """Return the next numbers of a text as floats, shape (count,), and move behind them.
+
+        Args:
+            count: How many; 0 gives an empty array.
+            kind: "f8" for any numbers, NaN and infinite ones too; "i4" for whole numbers; "u8" for
+                whole numbers that are not negative.
+
+        Raises:
+            DamagedMeshError: `count` is negative or more than what is left; a number for "i4" or
+                "u8" is not whole, not finite, or 2⁵³ or more in magnitude; or one for "u8" is
+                negative.
+        """
         if not 0 <= count <= len(self.values) - self.place:
             raise DamagedMeshError(f"with {count} numbers promised and fewer there")
         values = self.values[self.place : self.place + count]
         self.place += count
+        # All numbers were read as floats, which hold whole ones exactly only up to 2⁵³.
         is_whole = np.isfinite(values) & (values == np.floor(values)) & (np.abs(values) < 2.0**53)
         if kind != "f8" and not is_whole.all():
             raise DamagedMeshError("with a count or tag that is no whole number")
@@ -190,6 +222,8 @@ class _Binary(_Numbers):
 
     def records(self, count: int, dtype: np.dtype[Any]) -> NDArray[np.generic]:
         """Return the next records of a type of NumPy, shape (count,); errors as of `take`."""
+        # The count comes from the file. It is compared with the bytes that are there before any
+        # memory is taken, so that a damaged count cannot ask for terabytes.
         if not 0 <= count * dtype.itemsize <= len(self.content) - self.place:
             raise DamagedMeshError(f"with {count} numbers promised and fewer there")
         values = np.frombuffer(self.content, dtype, count, self.place)
@@ -206,7 +240,10 @@ class _Binary(_Numbers):
 
 
 def _sections(content: bytes) -> dict[bytes, bytes]:
-    """Return what stands between $NAME and $EndNAME, by name; the first of a name that comes twice.
+    """Return what stands between the lines $NAME and $EndNAME, by name without the dollar sign.
+
+    Of a name that comes twice the first section counts; what stands between sections is left out. A
+    file without sections gives an empty dictionary.
 
     Raises:
         DamagedMeshError: A section does not end.
@@ -224,14 +261,22 @@ def _sections(content: bytes) -> dict[bytes, bytes]:
 
 
 def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
-    """Return the volumes of version 4.1, whose physical groups stand with the entities.
+    """Read the volumes of a file of version 4.1.
+
+    The sections $Entities (which gives the physical groups of each volume), $Nodes and $Elements
+    are used. Elements of fewer than three dimensions are checked and left out.
 
     Args:
-        numbers: Function that returns the numbers of a section.
-        has_entities: Whether the file has the section $Entities.
+        numbers: Function that returns the numbers of a section, to be taken one after another.
+        has_entities: Whether the file has the section $Entities; without it there are no groups.
+
+    Returns:
+        Points, elements as indices of the points by volume and type, groups, and volumes; names and
+        partitions are not filled in.
 
     Raises:
-        DamagedMeshError: The sections contradict themselves or one another.
+        DamagedMeshError: A section is missing or too short, or the sections contradict themselves
+            or one another.
     """
     mesh = MshFile(np.empty((0, 3)), {})
     groups = defaultdict[int, list[int]](list)
@@ -252,7 +297,8 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
         if is_parametric not in (0, 1) or dimension not in range(4):
             raise DamagedMeshError("with a block of nodes of an unknown kind")
         tags.append(source.sizes(count))
-        # Behind the coordinates may stand as many parameters as the entity has dimensions.
+        # All tags of a block come before all its coordinates. Behind the coordinates of each node
+        # may stand as many parameters as the entity has dimensions.
         width = 3 + dimension * is_parametric
         points.append(source.floats(count * width).reshape(count, width)[:, :3])
     mesh.points = np.concatenate(points)
@@ -273,7 +319,19 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
 
 
 def _volumes_of_version_4(source: _Numbers) -> Iterator[tuple[int, list[int]]]:
-    """Yield the tag of each volume in a section $Entities, and the groups that it is in."""
+    """Yield the volumes of a section $Entities of version 4.1.
+
+    Points, curves and surfaces stand before the volumes and are passed over.
+
+    Args:
+        source: Numbers of the section, from its start; they are taken.
+
+    Yields:
+        The tag of a volume and the tags of the physical groups that it is in, which may be none.
+
+    Raises:
+        DamagedMeshError: The section ends too early, or a count is no whole number of 0 or more.
+    """
     counts = source.size_list(4)  # of points, curves, surfaces and volumes
     for dimension, count in enumerate(counts):
         for _ in range(count):
@@ -287,13 +345,20 @@ def _volumes_of_version_4(source: _Numbers) -> Iterator[tuple[int, list[int]]]:
 
 
 def _read_version_2(numbers: _Source) -> MshFile:
-    """Return the volumes of version 2, whose elements name their physical group and their entity.
+    """Read the volumes of a file of version 2, whose elements name their physical group and volume.
+
+    Elements of fewer than three dimensions are left out. The group 0 stands for none.
 
     Args:
-        numbers: Function that returns the numbers of a section.
+        numbers: Function that returns the numbers of a section, to be taken one after another.
+
+    Returns:
+        Points, elements as indices of the points by volume and type, groups with the volumes of
+        each, volumes, and the largest number of a partition; names are not filled in.
 
     Raises:
-        DamagedMeshError: The sections contradict themselves or one another.
+        DamagedMeshError: A section is missing or too short, an element has fewer than two labels,
+            or the sections contradict themselves or one another.
     """
     tags, points = _nodes_of_version_2(numbers(b"Nodes"))
     mesh = MshFile(points, {})
@@ -319,7 +384,18 @@ def _read_version_2(numbers: _Source) -> MshFile:
 
 
 def _nodes_of_version_2(source: _Numbers) -> tuple[Ints, Array]:
-    """Return the tags, shape (n,), and the points, shape (n, 3), of the nodes of version 2."""
+    """Read the section $Nodes of version 2: a count, then tag and coordinates of each node.
+
+    Args:
+        source: Numbers of the section, from its start, in text or in bytes; they are taken.
+
+    Returns:
+        Tags, shape (n,), and coordinates, shape (n, 3). Neither need be unique or finite here.
+
+    Raises:
+        DamagedMeshError: There are fewer numbers than the count says, or no count. A tag in text
+            that is no whole number is cut to one.
+    """
     if isinstance(source, _Binary):
         order = source.order
         kind = np.dtype([("tag", f"{order}i4"), ("point", f"{order}f8", (3,))])
@@ -347,8 +423,19 @@ class _Run(NamedTuple):
 def _runs_of_version_2(source: _Numbers) -> Iterator[_Run]:
     """Yield the elements of version 2, of one type and number of labels at a time.
 
+    In bytes the file has such runs itself; in text, where each element stands by itself, elements
+    are collected by type and number of labels.
+
+    Args:
+        source: Numbers of the section $Elements, from its start; they are taken.
+
+    Yields:
+        Gmsh's number of the type; labels (physical group, volume, and perhaps partitions), shape
+        (elements, labels); and tags of the nodes, shape (elements, nodes of one).
+
     Raises:
-        DamagedMeshError: A run has more elements than remain, or an element is of no known type.
+        DamagedMeshError: The section is too short, a run has no elements or more than remain, an
+            element is of no known type, or it has a negative number of labels or more than 1000.
     """
     if isinstance(source, _Binary):
         remaining = source.line_with_count()
@@ -377,7 +464,10 @@ def element_name(kind: int) -> str:
 
 
 def _node_count(kind: int) -> int:
-    """Return the number of nodes of an element of a type.
+    """Return the number of nodes of an element.
+
+    Args:
+        kind: Gmsh's number of the type of the element, such as 4 for a tetrahedron of four nodes.
 
     Raises:
         DamagedMeshError: Gmsh has no such type.
@@ -388,10 +478,11 @@ def _node_count(kind: int) -> int:
 
 
 def _label_count(count: int) -> int:
-    """Return the number of labels of an element of version 2, if it is a believable one.
+    """Return the number of labels of an element of version 2, after a check.
 
     Raises:
-        DamagedMeshError: It is not.
+        DamagedMeshError: The number is not in 0 … 1000. More labels (group, volume, partitions)
+            than that mean that the file is damaged; a product with it could be huge.
     """
     if not 0 <= count <= 1000:
         raise DamagedMeshError(f"with {count} tags of an element")
@@ -401,13 +492,17 @@ def _label_count(count: int) -> int:
 def _with_elements(
     mesh: MshFile, tags: Ints, runs: Mapping[tuple[int, int], list[Ints]]
 ) -> MshFile:
-    """Return a mesh to which its elements were added, whose tags of nodes become indices.
+    """Add elements to a mesh, with their nodes as indices of the mesh's points in place of tags.
 
     Args:
-        mesh: The mesh with its points, shape (n, 3); it is changed in place.
-        tags: Tags of the points, shape (n,).
-        runs: Elements of a volume and a type, each an array of tags of nodes, shape (elements,
-            nodes of one).
+        mesh: The mesh with its points, shape (n, 3). Its `elements` and `volumes` are changed in
+            place.
+        tags: Tags of the points, any whole numbers in any order, shape (n,).
+        runs: Elements by the tag of their volume and the number of their type; arrays of tags of
+            nodes, each of shape (elements, nodes of one), which are put behind one another.
+
+    Returns:
+        `mesh` itself.
 
     Raises:
         DamagedMeshError: A point is not finite, two have one tag, or an element names a tag that no
@@ -421,6 +516,7 @@ def _with_elements(
         raise DamagedMeshError("with two nodes of one tag")
     for key, arrays in runs.items():
         wanted = np.concatenate(arrays)
+        # A tag above all others would be looked for behind the last one, where nothing is.
         place = np.minimum(np.searchsorted(rising, wanted), max(len(rising) - 1, 0))
         if wanted.size and (not len(rising) or (rising[place] != wanted).any()):
             raise DamagedMeshError("with an element whose node is not there")

@@ -21,20 +21,25 @@ class MeshError(FailedError):
 
 
 def unknowns(points: Array) -> Ints:
-    """Return the number of each node's unknown, the same for periodic partners, shape (n,).
-
-    It is −1 at the corners.
+    """Number the unknowns of a periodic field on a square: partners on opposite sides share one.
 
     Args:
         points: Positions of the nodes in the cell [−1, 1]², shape (n, 2).
 
+    Returns:
+        Number of each node's unknown, shape (n,), from 0 without gaps. Nodes with the same
+        coordinate on two opposite sides have the same number. The corners, where the field is held,
+        have −1.
+
     Raises:
-        MeshError: A node on a side has no partner within `SAME_PLACE`.
+        MeshError: A node on a side has no partner within 1e-8 on the opposite side.
     """
     on_side = abs(abs(points) - 1) <= SAME_PLACE
     representative: Ints = np.arange(len(points))
     for axis in (0, 1):
         first, second = _partners(points, on_side[:, axis], axis)
+        # No node but a corner lies on both pairs of sides, so the pairs of the second axis do not
+        # break up those of the first.
         representative[first] = representative[second] = np.minimum(first, second)
     free = ~on_side.all(axis=1)
     unknown: Ints = np.full(len(points), -1)
@@ -43,18 +48,20 @@ def unknowns(points: Array) -> Ints:
 
 
 def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
-    """Return the nodes of two opposite sides, sorted along them.
+    """Pair the nodes of two opposite sides of the square [−1, 1]², sorted along the sides.
 
     Args:
         points: Positions of all nodes, shape (n, 2).
         on_side: Whether a node lies on one of the two sides, shape (n,).
-        axis: Coordinate that is −1 on the first side and 1 on the second.
+        axis: 0 or 1: the coordinate that is −1 on the first side and 1 on the second.
 
     Returns:
-        Nodes of the first side, and their partners on the second, shape (k,) each.
+        Nodes of the first side, and their partners on the second, shape (k,) each; empty if no node
+        lies on either side.
 
     Raises:
-        MeshError: A node has no partner.
+        MeshError: The sides have different numbers of nodes, or two nodes of the same rank are more
+            than 1e-8 apart along the sides.
     """
     along = points[:, 1 - axis]
     is_first = points[:, axis] < 0

@@ -67,10 +67,21 @@ class Prisms:
 
 
 def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
-    """Return the radius of the planar mesh that is moved to all radii of a map.
+    """Choose the radius of a particle at which its planar mesh is made, to be moved to other radii.
 
-    It is the midpoint of their range, rounded to 1/20, in [0.1, 0.9 / reach of the outline], so
-    that many maps have one mesh.
+    It is the midpoint of the range of the map's radii, rounded to 1/20, so that many maps share one
+    mesh. It is then clipped to 0.1 … 0.9 / (largest coordinate of the outline of radius 1), where
+    the mesh leaves room inside the particle and between the particle and the side.
+
+    Args:
+        radius_map: Function r(θ), in halves of the cell's side, with the distribution of θ; its
+            range is taken from 65 points.
+        outline: Distance of the particle's edge over r, as a function of the polar angle in
+            radians.
+
+    Raises:
+        RefusedError: `radius_map` is no such map or leaves (0, 1), the outline is not positive and
+            periodic, or the largest particle does not fit into the square.
     """
     require_map(radius_map)
     distribution = radius_map.distribution
@@ -95,10 +106,6 @@ LevelFunction = Callable[[Array, Array, Array], Array]
 """Takes x1, x2 and θ of one shape, gives z of it; z < 0 in the particles."""
 
 
-SIGNS = "numbers that are negative in the particles and positive in the matrix"
-DISTANCE = "return a distance such as np.hypot(x1, x2) - radius; of a mask of particles 0.5 - mask"
-
-
 @dataclass(frozen=True)
 class LevelSet(FixedCell):
     """Particles where z is negative, on a mesh that ignores them, with the law of θ."""
@@ -106,13 +113,22 @@ class LevelSet(FixedCell):
     z: LevelFunction
 
     def values(self, points: Array) -> Array:
-        """Return z at points (x1, x2, θ), shape (…, 3), as an array of shape (…).
+        """Return the values of the level set function z at points, shape (…).
+
+        Args:
+            points: Points (x1, x2, θ), shape (…, 3), with θ the random number of the cell.
+
+        Returns:
+            z: negative in the particles, positive or zero in the matrix. Infinite values are kept.
 
         Raises:
-            RefusedError: The function is a mask, or does not give a number at each point.
+            RefusedError: z is no function, raises an exception itself, returns Booleans, another
+                shape, something else than numbers, or NaN.
         """
         kinds: list[bool] = []
 
+        # `array_of_call` makes floats of what z returns. A mask of the particles would pass as
+        # zeros and ones, all in the matrix, so its type is noted before.
         def noted(*coordinates: Array) -> Array:
             found = np.asarray(self.z(*coordinates))
             kinds.append(found.dtype == bool)
@@ -122,35 +138,50 @@ class LevelSet(FixedCell):
         allowed = "a function of three arrays x1, x2 and θ that gives a number at each point"
         values = array_of_call("level set", z, *np.moveaxis(points, -1, 0), allowed=allowed)
         if any(kinds):
-            raise RefusedError("level set", "a mask of True and False", SIGNS, DISTANCE)
+            raise _sign_error("a mask of True and False")
         if np.isnan(values).any():
             raise RefusedError("level set", "NaN", allowed)
         return np.asarray(values)
 
     def require_both_signs(self, lowest: float, highest: float) -> None:
-        """Refuse a function that lies within `lowest` … `highest`, which are of one sign.
+        """Raise unless a level set function has both signs, so that the cell has two materials.
 
-        The cell would be of one material.
+        Args:
+            lowest: Smallest value in the whole cell; particles are where the function is negative.
+            highest: Largest value in the whole cell.
+
+        Raises:
+            RefusedError: `lowest` is not negative (no particle), or `highest` is (no matrix), or
+                one of them is NaN.
         """
         if not lowest < 0 <= highest:
             what = f"from {lowest:g} to {highest:g} in the whole cell, without a change of sign"
-            raise RefusedError("level set", what, SIGNS, DISTANCE)
+            raise _sign_error(what)
+
+
+def _sign_error(value: str) -> RefusedError:
+    """Return the error of a level set whose values have no useful signs."""
+    allowed = "numbers that are negative in the particles and positive in the matrix"
+    cure = "return a distance such as np.hypot(x1, x2) - radius; of a mask of particles 0.5 - mask"
+    return RefusedError("level set", value, allowed, cure)
 
 
 def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
-    """Return the positions of all nodes of a planar mesh at radii of its particle.
+    """Move the nodes of a planar mesh of the cell [−1, 1]² to other radii of its particle.
 
-    Nodes slide along rays from the centre: inside the particle in proportion, outside between the
-    outline and the side of the square. Edge midpoints slide too, so that the layers between a large
-    particle and the side bend with it; only an edge across a diagonal of the square, where sliding
-    has a kink, stays straight.
+    Nodes slide along rays from the centre: inside the particle in proportion to the radius; outside
+    so that their distance from the outline over the distance between the outline and the side of
+    the square stays. Midpoints of edges slide too, so that the layers between a large particle and
+    the side bend with it; only an edge across a diagonal of the square, where sliding has a kink,
+    stays straight, unless it lies on the outline.
 
     Args:
-        mesh: The mesh at its own radius.
-        radii: Radii, shape (k,).
+        mesh: Six-node triangles at the radius `mesh.radius`, which is positive.
+        radii: Radii in halves of the cell's side, shape (k,), positive and so small that the
+            particle fits into the square; this is not checked.
 
     Returns:
-        Positions, shape (k, nodes, 2).
+        Positions (x1, x2), shape (k, nodes, 2).
     """
     radius = radii[:, np.newaxis]
     x, y = mesh.points.T
@@ -165,10 +196,13 @@ def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
         stretch = (side - new_edge) / (side - old_edge)
         outer_scale = (new_edge + (distance - old_edge) * stretch) / distance
         scale = np.where(in_particle, radius / mesh.radius, outer_scale)
-        scale = np.where(mesh.arc, radius * outline / distance, scale)  # z = 0 of eq. 14
+        # Nodes on the interface are put on the outline itself (z = 0 of eq. 14). Midpoints of its
+        # edges lie on the chord in the planar mesh, so scaling alone would leave them inside.
+        scale = np.where(mesh.arc, radius * outline / distance, scale)
     points = mesh.points * scale[..., np.newaxis]
 
     # The ends of an edge across the diagonal x = y or x = −y have x − y or x + y of either sign.
+    # The tolerance keeps edges that end on the diagonal from crossing it by round-off.
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
     crosses_first = (x - y).prod(axis=0) < -1e-12
     crosses_second = (x + y).prod(axis=0) < -1e-12
@@ -217,7 +251,16 @@ class PrismGrid:
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
     def positions(self, radius_map: RadiusMap) -> Array:
-        """Return (x1, x2, θ) of all nodes at a map, shape (nodes, 3)."""
+        """Return (x1, x2, θ) of all nodes for a map of the particle's radius, shape (nodes, 3).
+
+        The nodes of all levels of θ come first, level by level, then those half-way between two
+        levels. Positions that a file gave are returned as they are, whatever the map. In a grid
+        whose phases are not those of the prisms (`conforming` is false) x1 and x2 do not depend on
+        the map.
+
+        Args:
+            radius_map: Function of θ with the distribution of θ, whose support the levels span.
+        """
         if self.fixed is not None:
             return self.fixed
         levels = self.level_thetas(radius_map.distribution)
@@ -228,13 +271,16 @@ class PrismGrid:
         )
 
     def positions_by_level(self, radius_map: RadiusMap) -> tuple[Array, Array]:
-        """Return (x1, x2) of the nodes of all levels and of all mid-levels.
+        """Return (x1, x2) of the nodes of all levels of θ and of all mid-levels between two levels.
 
-        It is not for a mesh that a file gives.
+        Positions that a file gave are not looked at: call it only where `fixed` is None.
+
+        Args:
+            radius_map: Map r(θ) of the particle's radius, with the distribution of θ.
 
         Returns:
             Positions on levels, shape (layers + 1, nodes of the plane mesh, 2), and on mid-levels,
-            shape (layers, vertices of the plane mesh, 2).
+            where only vertices have nodes, shape (layers, vertices of the plane mesh, 2).
         """
         levels = self.level_thetas(radius_map.distribution)
         mid_levels = (levels[1:] + levels[:-1]) / 2

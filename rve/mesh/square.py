@@ -68,14 +68,24 @@ def triangles(
     near_particle: bool = False,
     refinement: float = 0.0,
 ) -> Triangles:
-    """Mesh the cell by Gmsh, or take the mesh from the user's cache.
+    """Mesh the square [−1, 1]² around its particle by Gmsh, or take the mesh from the user's cache.
+
+    The centre of the square is that of the particle. Opposite sides have the same nodes.
 
     Args:
-        size: Wanted edge length, in halves of the cell's side.
-        radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
-        near_particle: Whether edges shorten by `particle_grading`.
-        refinement: Refinement of `bend_grading`; 0: edges do not shorten at bends.
+        size: Wanted edge length, in halves of the cell's side, positive.
+        radius: Radius of the particle, in halves of the cell's side; 0 for none.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle in
+            radians; it must fit into the square.
+        near_particle: Whether edges shorten near a small particle and in gaps between it and the
+            sides; `radius` must then be positive.
+        refinement: Divisor of the edge length at bends of the outline; 0 not to shorten edges
+            there.
+
+    Returns:
+        Vertices, shape (n, 2); vertices of each triangle, shape (m, 3); and phase of each triangle,
+        shape (m,): matrix 0, particle 1. Vertices of the interface are near the outline, on a
+        spline.
     """
     gradings: list[Sizes] = []
     if near_particle:
@@ -91,6 +101,7 @@ def triangles(
 
     # The key of the cache is all that Gmsh is given: the numbers, the outline at the points of its
     # spline, its bends, this file, and the version of Gmsh.
+    # A function cannot be hashed, and two outlines that agree at these points give one mesh.
     angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
     numbers = np.array([size, radius, near_particle, refinement, *extents(outline)])
     points, bends = bend_radii(outline)
@@ -106,13 +117,22 @@ def triangles(
 
 
 def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | None) -> Triangles:
-    """Mesh the cell by Gmsh.
+    """Mesh the square [−1, 1]² around its particle by Gmsh.
 
     Args:
         size: Wanted edge length, in halves of the cell's side.
-        radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
-        sizes: Edge length at a point (x1, x2), in place of `size`.
+        radius: Radius of the particle, in halves of the cell's side; 0 for none.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+        sizes: Edge length in halves of the cell's side as a function of x1 and x2, in place of
+            `size`; None for `size` everywhere.
+
+    Returns:
+        Vertices that triangles use, shape (n, 2); vertices of each triangle, shape (m, 3); and
+        phase of each triangle, shape (m,): matrix 0, particle 1, particle first.
+
+    Raises:
+        Exception: Whatever Gmsh raises if it cannot mesh the square, such as an outline that
+            crosses itself or a side.
     """
     with model() as gmsh:
         phase_surfaces = surfaces(size, radius, outline)
@@ -125,11 +145,13 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
             gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)
             gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: sizes(x, y))
         gmsh.model.mesh.generate(2)
+        # Tags of nodes need not be consecutive, so a table leads from a tag to its row in `xyz`.
         node_tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(node_tags.max()) + 1, np.int64)
         number[node_tags] = np.arange(len(node_tags))
         cells, phases = [], []
         for phase, surface in phase_surfaces.items():
+            # 2 is Gmsh's number of the type of three-node triangles.
             vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)[1].astype(np.int64)
             cells.append(number[vertex_tags].reshape(-1, 3))
             phases.append(np.full(len(cells[-1]), phase))
@@ -140,15 +162,16 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
 
 
 def surfaces(size: float, radius: float, outline: Outline) -> dict[int, int]:
-    """Add the cell's geometry to the current Gmsh model; return its surfaces by phase.
+    """Add the square [−1, 1]² and its particle to the current, empty Gmsh model.
 
     Args:
-        size: Edge length of elements.
-        radius: Radius of the particle, 0 for none.
-        outline: Outline of the particle.
+        size: Edge length of elements, in halves of the cell's side.
+        radius: Radius of the particle, in halves of the cell's side; 0 for none.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
 
     Returns:
-        Tags of the surfaces by the number of the phase: matrix 0, and particle 1 if there is one.
+        Gmsh's tags of the surfaces by the number of the phase: particle 1 first, if there is one,
+        then matrix 0.
     """
     import gmsh
 
@@ -162,11 +185,17 @@ def surfaces(size: float, radius: float, outline: Outline) -> dict[int, int]:
 
 
 def edges(triangles: Ints, inside: Mask) -> Edges:
-    """Return the edges of triangles.
+    """Find the edges of triangles, each once.
 
     Args:
         triangles: Vertices of each triangle, shape (m, 3).
         inside: Whether a triangle lies in the particle, shape (m,).
+
+    Returns:
+        `ends`, both vertices of each edge, the smaller number first, shape (edges, 2);
+        `of_triangles`, the edges of each triangle as indices of `ends`, shape (m, 3), in the order:
+        opposite vertex 0, opposite vertex 1, opposite vertex 2; and `on_interface`, whether an edge
+        has a triangle of the particle and one of the matrix, shape (edges,).
     """
     vertex_pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
     ends, number = np.unique(vertex_pairs, axis=0, return_inverse=True)
@@ -180,10 +209,21 @@ def edges(triangles: Ints, inside: Mask) -> Edges:
 
 @contextmanager
 def model() -> Iterator[Any]:
-    """Context of Gmsh with an empty model, quiet, on one thread; Ctrl-C waits for its end."""
+    """Open Gmsh with an empty model, and close it when the `with` block ends or raises.
+
+    Gmsh prints nothing and uses one thread. Ctrl-C takes effect at the end of the block; a second
+    one ends the process at once. Gmsh may not be open already.
+
+    Yields:
+        The module `gmsh`, initialised.
+
+    Raises:
+        ImportError: Gmsh is not installed.
+    """
     import gmsh
 
-    with uninterrupted(second_ends=True):  # Gmsh loses exceptions of functions that it calls
+    # Gmsh loses exceptions of functions that it calls, KeyboardInterrupt among them.
+    with uninterrupted(second_ends=True):
         gmsh.initialize(["", "-v", "0"], readConfigFiles=False, interruptible=False)
         try:
             gmsh.option.setNumber("General.NumThreads", 1)
@@ -193,14 +233,23 @@ def model() -> Iterator[Any]:
 
 
 def _square_loop(geo: Any, size: float) -> int:
-    """Add the boundary of the square, opposite sides periodic; return the tag of its curve loop."""
+    """Add the boundary of [−1, 1]² to the current Gmsh model; return the tag of its curve loop.
+
+    Opposite sides are made periodic, so that Gmsh gives them the same nodes.
+
+    Args:
+        geo: Gmsh's built-in kernel of geometry, `gmsh.model.geo`.
+        size: Edge length at the corners, in halves of the cell's side.
+    """
     import gmsh
 
     corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     sides = [geo.addLine(corners[side], corners[(side + 1) % 4]) for side in range(4)]
+    # The model knows curves of the kernel only after it is synchronised.
     geo.synchronize()
     bottom, right, top, left = sides
     for first, second, shift in ((left, right, (2, 0)), (bottom, top, (0, 2))):
+        # Gmsh takes the map from the first side to the second as a matrix of 4 × 4, row by row.
         affine = np.eye(4)
         affine[:2, 3] = shift
         gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
@@ -208,10 +257,14 @@ def _square_loop(geo: Any, size: float) -> int:
 
 
 def _spline_steps(outline: Outline) -> int:
-    """Return the number of steps of the spline through a quarter of an outline.
+    """Return the number of steps of the spline through each quarter of an outline, a multiple of 4.
 
-    There are about four for a radian of its turn, so that the spline keeps lobes apart, and 16 to
-    128. Vertices are put on the outline itself afterwards.
+    It is about four for a radian by which the outline turns where it bends most, so that the spline
+    keeps lobes apart, and at least 16 and at most 128. Vertices are put on the outline itself
+    afterwards.
+
+    Args:
+        outline: Distance of the edge over the radius, as a function of the polar angle in radians.
     """
     points, radii = bend_radii(outline)
     largest_ratio = float((np.hypot(*points.T) / radii).max())
@@ -219,16 +272,20 @@ def _spline_steps(outline: Outline) -> int:
 
 
 def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
-    """Add a particle bounded by four curves and the matrix around it.
+    """Add a particle bounded by four curves, and the matrix around it, to the current Gmsh model.
+
+    A circle is made of four arcs, any other outline of four splines between the axes.
 
     Args:
-        geo: Gmsh's kernel of geometry.
-        size: Edge length of elements.
-        radius: Radius of the particle.
-        outline: Outline of the particle.
+        geo: Gmsh's built-in kernel of geometry, `gmsh.model.geo`.
+        size: Edge length of elements, in halves of the cell's side.
+        radius: Radius of the particle, in halves of the cell's side, positive.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle in
+            radians.
 
     Returns:
-        Tags of the surfaces of the particle and of the matrix.
+        Tags of the surfaces of the particle and of the matrix. The centre becomes a vertex of the
+        mesh.
     """
     import gmsh
 
@@ -261,7 +318,17 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
 
 
 def particle_grading(outline: Outline, radius: float) -> Sizes:
-    """Return the edge length near a particle and in gaps, over the nominal one, by the point."""
+    """Return a function of x1 and x2 that shortens edges near a particle and in gaps.
+
+    The function gives the wanted edge length over the nominal one, in (0, 1]: the smallest of 1,
+    1.4 times the distance from the centre (at least that of the nearest point of the outline), and
+    four times the width of the gap to the sides of the square.
+
+    Args:
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle; it
+            must fit into the square [−1, 1]².
+        radius: Radius of the particle, in halves of the cell's side, positive.
+    """
     unit = extents(outline)
     half_width = radius * unit.half_width
     half_height = radius * unit.half_height
@@ -270,7 +337,8 @@ def particle_grading(outline: Outline, radius: float) -> Sizes:
     def over_nominal(x: float, y: float) -> float:  # Gmsh asks a point at a time: no NumPy
         x, y = abs(x), abs(y)
         by_distance = PER_RADIUS * max(hypot(x, y), min_distance)
-        # Width of the gap to the cell's side, which grows along the side as beside a circle.
+        # Width of the gap to the cell's side. At the height y beside a circle of the radius a it is
+        # 1 − a + y²/(2 a) to second order, and the last term lets it grow inside the particle.
         gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
         gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)
         return min(1.0, by_distance, 4 * gap_beside, 4 * gap_above)
@@ -279,15 +347,17 @@ def particle_grading(outline: Outline, radius: float) -> Sizes:
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
-    """Return the edge length by the bends of an outline, over the nominal one, by the point.
+    """Return a function of x1 and x2 that shortens edges where an outline bends.
 
-    It is proportional to the smallest sum of bend radius and distance over the outline's points, so
-    that on a circle it is the same at all of them and grows with the distance.
+    The function gives the wanted edge length over the nominal one. It is 1.4 / `refinement` times
+    the smallest sum of the bend radius of a point of the outline and the distance from it, over 720
+    points of the outline. So it is the same everywhere on a circle and grows with the distance from
+    it. It may exceed 1.
 
     Args:
-        outline: Outline of the particle.
-        radius: Radius of the particle.
-        refinement: Divisor of the edge length.
+        outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+        radius: Radius of the particle, in halves of the cell's side, positive.
+        refinement: Divisor of the edge length, positive.
     """
     points, unit_bend_radii = bend_radii(outline)
     px, py = radius * points.T

@@ -21,7 +21,14 @@ PRISM = basix.CellType.prism
 
 
 def _span(points: Array) -> Array:
-    """Return the 15 spanning functions at points, shape (15, n), for points of shape (n, 3)."""
+    """Return the 15 functions that span the serendipity space of a prism, at points, shape (15, n).
+
+    They are 1, x, y, x², x y, y², each of them times z, and z², x z², y z². So the space is
+    quadratic in the plane and contains z² times linear functions.
+
+    Args:
+        points: Points (x, y, z) of the reference prism, shape (n, 3).
+    """
     x, y, z = points.T
     linear = [np.ones_like(x), x, y]
     quadratic = [*linear, x * x, x * y, y * y]
@@ -31,9 +38,12 @@ def _span(points: Array) -> Array:
 
 
 def _points_by_entity() -> list[list[Array]]:
-    """Return the evaluation points of every vertex, edge, face and the cell, as Basix wants them.
+    """Return the points at which degrees of freedom evaluate a function, in the layout of Basix.
 
-    Vertices and edges have one point each, which is the vertex or the midpoint.
+    Returns:
+        Four lists, for the vertices, edges, faces and the interior of the reference prism, with one
+        array of shape (points, 3) for each entity. A vertex has itself, an edge its midpoint; faces
+        and the interior have no points, arrays of shape (0, 3).
     """
     vertices = basix.geometry(PRISM)
     topology = basix.topology(PRISM)
@@ -45,13 +55,23 @@ def _points_by_entity() -> list[list[Array]]:
 
 @cache
 def wedge(components: int) -> Any:
-    """UFL element of the 15-node serendipity prism with `components` values at each node."""
-    # rows: the span in the orthonormal polynomials of degree 2 on the prism, shape (15, 18)
+    """Return the UFL element of the 15-node serendipity prism, made once for each argument.
+
+    Basix has no serendipity element on prisms, so it is given as a custom element: the span of the
+    functions {1, x, y, x², x y, y²} ⊗ {1, z} and z² {1, x, y}, with the values at the six vertices
+    and the nine edge midpoints as degrees of freedom, in this order.
+
+    Args:
+        components: Number of values at each node, at least 1; the element is blocked.
+    """
+    # Basix wants the span as rows of coefficients in its orthonormal polynomials of degree 2 on the
+    # prism, shape (15, 18). They are the integrals of the products; the rule of degree 4 is exact
+    # for them. QR makes the rows orthonormal, which keeps Basix's inversion well conditioned.
     at, weights = basix.make_quadrature(PRISM, 4)
     orthonormal = basix.tabulate_polynomials(basix.PolynomialType.legendre, PRISM, 2, at)
     coefficients = np.linalg.qr((_span(at) * weights @ orthonormal.T).T)[0].T
     points = _points_by_entity()
-    # degrees of freedom are point values: one evaluation with weight 1 each
+    # Degrees of freedom are point values: one evaluation with weight 1 each.
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
@@ -74,10 +94,13 @@ def wedge(components: int) -> Any:
 
 @cache
 def prism_rule() -> tuple[Array, Array]:
-    """Return the quadrature of a prism: six points of a triangle times three of Gauss along ζ.
+    """Return the quadrature of the reference prism: six points in the triangle times three along z.
+
+    The rule is exact for polynomials of degree 4 in the triangle and of degree 5 along z.
 
     Returns:
-        Points, by ζ first, shape (18, 3), and weights, whose sum is the volume 1/2, shape (18,).
+        Points (x, y, z), shape (18, 3), six at the lowest z first, then six at the middle one, then
+        six at the highest; and weights, shape (18,), whose sum is the volume 1/2.
     """
     triangle, planar_weights = basix.make_quadrature(basix.CellType.triangle, 4)
     z, line_weights = basix.make_quadrature(basix.CellType.interval, 5)
