@@ -45,10 +45,16 @@ class CellFields:
         The ending of the name chooses the format. A file of Gmsh (.msh) holds the mesh once, with
         fields as values at the nodes of its elements. In those of VTK (.vtu) and in XDMF (.xdmf)
         nodes of the interface stand twice, since stresses jump there, and each prism is three
-        quadratic tetrahedra, which ParaView and PyVista draw.
+        quadratic tetrahedra, which ParaView and PyVista draw. A file that exists is replaced.
+        Fields are named by load, counted from 1: "displacement_1_in_half_sides", "stress_1_11_Pa"
+        and so on.
+
+        Args:
+            path: Name that ends in .msh, .vtu or .xdmf.
 
         Raises:
             RefusedError: The name has none of these endings.
+            OSError: The file cannot be written.
         """
         path = Path(path)
         kind = FORMATS.get(path.suffix)
@@ -65,12 +71,20 @@ class CellFields:
             point_data=fine._point_fields(),
             cell_data={"phase": [fine.phase]},
         )
+        # XDMF else keeps its arrays in a second file, in HDF5, which takes the package h5py.
         options = {"data_format": "XML"} if kind == "xdmf" else {}
         meshio.write(path, mesh, file_format=kind, **options)
         return len(fine.points)
 
     def _write_gmsh(self, path: Path) -> int:
-        """Write the mesh with its fields by Gmsh, and return the number of its nodes."""
+        """Write the mesh with its fields to a file of Gmsh, and return the number of its nodes.
+
+        Points that are one node of the mesh (one for each phase that meets there) become one node
+        again; values are written for each node of each prism, so jumps of stresses stay.
+
+        Args:
+            path: Name that ends in .msh; a file that exists is replaced.
+        """
         points: Array = np.empty((self.node.max() + 1, 3))
         points[self.node] = self.points
         values = {
@@ -81,22 +95,31 @@ class CellFields:
         return len(points)
 
     def _point_fields(self) -> dict[str, Array]:
-        """Return displacements, (n, 3), and stresses, (n,), of each load by name with unit."""
+        """Return the values at the n points by names that end in the unit.
+
+        Loads are counted from 1.
+
+        Returns:
+            "displacement_K_in_half_sides": (u1, u2, 0) in halves of the cell's side, shape (n, 3);
+            and "stress_K_11_Pa", "stress_K_22_Pa" and "stress_K_12_Pa", shape (n,) each.
+        """
         data = {}
         for load in range(self.displacement.shape[-1]):
-            in_space = np.pad(self.displacement[..., load], ((0, 0), (0, 1)))  # none along θ
+            # Viewers want vectors of three components; nothing is displaced along θ.
+            in_space = np.pad(self.displacement[..., load], ((0, 0), (0, 1)))
             data[f"displacement_{load + 1}_in_half_sides"] = in_space
             for row, name in enumerate(("11", "22", "12")):
                 data[f"stress_{load + 1}_{name}_Pa"] = self.stress[:, row, load]
         return data
 
     def in_tetrahedra(self) -> CellFields:
-        """Return the fields with each prism as three quadratic tetrahedra.
+        """Return the fields with each prism divided into three quadratic tetrahedra.
 
         Returns:
-            Fields whose `cells` are nodes of tetrahedra in VTK's order, shape (3 m, 10). The
-            centres of the prisms' sides, where diagonals have their midpoints, come last among the
-            points. Their values are interpolated as in the prism, and their `node` is −1.
+            New fields whose `cells` are the ten nodes of each tetrahedron in VTK's order, shape (3
+            m, 10), three after another for each of the m prisms. The centres of the prisms' sides,
+            where diagonals of the division have their midpoints, come last among the points. Their
+            coordinates and values are interpolated as in the prism, and their `node` is −1.
         """
         # Sides that two prisms share get one number, by their corners.
         prism_sides = self.cells[:, SIDES].reshape(-1, 8)
@@ -115,7 +138,11 @@ class CellFields:
         sides = prism_sides[first]
 
         def with_centres(values: Array) -> Array:
-            """Return values at points with those at centres of sides, by shape functions there."""
+            """Append the values at the centres of sides to those at points, along the first axis.
+
+            There the serendipity shape functions are 1/2 at the four midpoints of a side's edges
+            and −1/4 at its four corners.
+            """
             at_midpoints = values[sides[:, 4:]].sum(axis=1) / 2
             at_corners = values[sides[:, :4]].sum(axis=1) / 4
             return np.concatenate([values, at_midpoints - at_corners])
@@ -138,11 +165,16 @@ SIDES = np.array(
 
 
 def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
-    """Return the nodes of the three tetrahedra of a prism, shape (3, 10), in VTK's order.
+    """Return the nodes of three quadratic tetrahedra that fill a prism, shape (3, 10).
+
+    Nodes are numbered 0 to 14 as in Basix's 15-node prism (vertices 0-2 below, 3-5 above, midpoints
+    of edges), and 15 to 17 are the centres of the three sides. VTK's order is four corners,
+    counterclockwise seen from the fourth, and the midpoints of the edges 01, 12, 20, 03, 13, 23.
 
     Args:
-        columns: Vertical edges of the prism, 0 to 2, in the order in which diagonals rise: from
-            the lower end of an earlier one to the upper end of a later one.
+        columns: Vertical edges of the prism, a permutation of 0, 1, 2, in the order in which the
+            diagonals of the sides rise: from the lower end of an earlier edge to the upper end of a
+            later one.
     """
     edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # of Basix
     midpoints = {frozenset(edge): 6 + number for number, edge in enumerate(edges)}
@@ -155,8 +187,12 @@ def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
     lower = list(columns)
     upper = [3 + column for column in columns]
     tetrahedra = []
+    # Kuhn's subdivision: with the lower ends a, b, c of the vertical edges in the given order and
+    # the upper ends a', b', c' the tetrahedra are a a' b' c', a b b' c' and a b c c'. All their
+    # edges are edges of the prism or rising diagonals, ab', ac' and bc'.
     for k in range(3):
         corners = lower[: k + 1] + upper[k:]
+        # VTK wants a positive volume; exchanging two corners turns the sign.
         if np.linalg.det(vertices[corners[1:]] - vertices[corners[0]]) < 0:
             corners[:2] = corners[1], corners[0]
         nodes = list(corners)

@@ -20,13 +20,22 @@ from alphacut.rve.solver.krylov import SolverOptions, solve
 def solved_fields(
     problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
 ) -> CellFields:
-    """Solve a cell and return its fields under macroscopic strains.
+    """Solve a cell and return its displacements and stresses under macroscopic strains.
 
     Args:
-        problem: The cell, moved to its map; on one rank.
-        stiffness: Stiffness of each phase, (3, 3) each, in Pa.
+        problem: The cell on one rank, moved to its radius map.
+        stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each, in
+            Pa, in the order of the problem's phases.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
-        options: The linear solver.
+        options: PETSc's options of the linear solver.
+
+    Returns:
+        Displacements and stresses for each load at the nodes; nodes where phases meet stand once
+        for each phase.
+
+    Raises:
+        ConvergenceError: The linear solver did not reach its tolerance.
+        RefusedError: PETSc does not use one of the options.
     """
     matrix = problem.assemble(stiffness)
     solutions = solve(problem.solver(options, matrix), problem.loads(loads))
@@ -45,16 +54,23 @@ def solved_fields(
 def fields_of_solution(
     problem: PrismProblem, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], load: Array
 ) -> CellFields:
-    """Return the fields of a solution of the user.
+    """Return displacements and stresses at the nodes, for a solution of a law of the user.
 
     Args:
         problem: The cell that it was solved on, on one rank.
-        u: Fluctuation of the displacements.
-        stress: (σ11, σ22, σ12) of each phase by its name, expressions of three components, in Pa.
+        u: Fluctuation of the displacements, without those of the macroscopic strain, in halves of
+            the cell's side.
+        stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of three components, in
+            Pa.
         load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
 
+    Returns:
+        Total displacements, and stresses as means over the prisms of one phase that meet in a node,
+        for the one load.
+
     Raises:
-        RefusedError: A phase has no stress, or an expression has not three components.
+        RefusedError: The names in `stress` are not exactly those of the phases, or an expression
+            has not three components.
     """
     names = problem.grid.names
     require(set(stress) == set(names), "stress of phases", [*stress], ", ".join(names))
@@ -62,6 +78,8 @@ def fields_of_solution(
         shape = expression.ufl_shape
         require(shape == (3,), f"shape of the stress of {name}", shape, "(3,): σ11, σ22, σ12")
     phase = phase_at_nodes(problem)
+    # Every law is evaluated in all prisms, since a level set may cut a prism; shape (phases,
+    # prisms, 15, 3). Of these the law of the phase at each node is taken.
     of_phases = np.stack([_at_nodes_of_prisms(problem, stress[name]) for name in names])
     prism, node = np.indices(phase.shape)
     values = of_phases[phase, prism, node][..., np.newaxis]
@@ -72,7 +90,14 @@ def fields_of_solution(
 def phase_at_nodes(problem: PrismProblem) -> Ints:
     """Return the index of the phase at each node of this rank's prisms, shape (prisms, 15).
 
-    It is that of the prism, or follows from the sign of the function of a level set there (eq. 14).
+    It is the phase of the prism, or for a level set z(x1, x2, θ) the inclusion (1) where z < 0 at
+    the node and the matrix (0) elsewhere (eq. 14).
+
+    Args:
+        problem: The cell, moved to its radius map or level set.
+
+    Raises:
+        RefusedError: The level set does not give a number at each node.
     """
     grid = problem.grid
     if isinstance(problem.map, LevelSet):
@@ -94,13 +119,20 @@ def nodal_fields(
 ) -> CellFields:
     """Return total displacements, and stresses as means over the prisms that meet in a node.
 
+    Only prisms of the same phase at a node enter a mean, since stresses jump between phases.
+
     Args:
         problem: The cell, on one rank.
         fluctuation: Displacements at DOLFINx's nodes without the macroscopic strain's, in halves of
             the cell's side, shape (nodes, 2, loads).
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
-        stress: Stress at the nodes of each prism, shape (prisms, 15, 3, loads), in Pa.
+        stress: (σ11, σ22, σ12) at the 15 nodes of each prism, shape (prisms, 15, 3, loads), in Pa.
         phase: Index of the phase at the nodes of each prism, shape (prisms, 15).
+
+    Returns:
+        Fields with one point for each pair of a node and a phase that meets there, sorted by phase
+        and then by node; `cells` are indices of these points. The phase of a prism that a level set
+        cuts is that of most of its nodes.
     """
     grid = problem.grid
     positions = grid.positions(problem.map)
@@ -121,7 +153,8 @@ def nodal_fields(
     return CellFields(
         points=positions[node],
         cells=cells,
-        phase=np.rint(phase.mean(axis=1)).astype(int),  # of a cut prism that of most of its nodes
+        # Only level sets cut prisms, and they have the phases 0 and 1.
+        phase=np.rint(phase.mean(axis=1)).astype(int),
         displacement=displacement[node],
         stress=mean_stress,
         names=NAMES if isinstance(problem.map, LevelSet) else grid.names,

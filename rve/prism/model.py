@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from time import perf_counter
 from typing import ClassVar, Self, TypeVar
 
@@ -88,6 +88,14 @@ class PrismModel(CellModel):
     convention: ClassVar[str] = AVERAGES[AXES]
 
     def __post_init__(self) -> None:
+        """Check the arguments.
+
+        Raises:
+            RefusedError: `mesh_size` is outside (0, 1], `layers` is no whole number of 1 or more,
+                `petsc` is no table of options, `outline` is no function of an array of angles, or
+                `modulus_range` is not a pair of finite numbers. The order of the pair is not
+                checked.
+        """
         require_prisms(self.mesh_size, self.layers)
         require_petsc(self.petsc)
         require_outline(self.outline)
@@ -98,7 +106,12 @@ class PrismModel(CellModel):
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
-        """Return the prisms of a resolution; see `CellModel`."""
+        """Return prisms with the mesh size, layers and solver that a resolution asks for.
+
+        A third load is solved if the resolution asks for the whole stiffness. Its `tolerance` and
+        `energies` are not used: prisms have no error that is known before, and always give
+        energies. `modulus_range` stays None.
+        """
         return cls(
             resolution.mesh_size,
             resolution.layers,
@@ -127,11 +140,25 @@ class PrismModel(CellModel):
     ) -> list[HomogenisedStiffness]:
         """Return the homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
+        Args:
+            radius_map: Radius r(θ) of the particle, in halves of the cell's side, with the
+                distribution of the random number θ.
+            matrix: Material outside the particle.
+            inclusions: Materials of the particle, at least one.
+
+        Returns:
+            One result for each inclusion, with errors against a more accurate model if `estimate`
+            is set. Properties that every right result has (symmetry, bounds of the stiffness) are
+            checked.
+
         Raises:
-            ConvergenceError: The linear solver stopped early.
+            ConvergenceError: The linear solver stopped before its tolerance was reached.
             CertificateError: A property that every right result has is violated.
             FoldedMeshError: The map bends more than the layers can follow.
-            RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
+            RefusedError: Arguments are no map, phase and list of phases, a Poisson's ratio is above
+                0.45, a radius does not fit into the cell, the density of θ is zero at a quadrature
+                point, or PETSc does not use an option. With `estimate`, also what the more accurate
+                model raises.
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
@@ -139,7 +166,25 @@ class PrismModel(CellModel):
         return self._on_valid_grid(radius_map, lambda grid: self._solve_on(grid, cells))
 
     def _solve_on(self, grid: PrismGrid, cells: Sequence[Cell]) -> list[HomogenisedStiffness]:
-        """Return the checked results of cells that differ in the inclusion, on one grid."""
+        """Return the checked results of cells that differ in the inclusion alone, on one grid.
+
+        All cells have the radius map, the matrix and the outline of the first one.
+
+        Args:
+            grid: Prisms at the reference radius of the map, which are moved to it.
+            cells: At least one cell.
+
+        Returns:
+            One result for each cell in their order. The time for what they share counts for the
+            first.
+
+        Raises:
+            FoldedMeshError: An element folds where the grid follows the map.
+            ConvergenceError: The linear solver did not reach its tolerance.
+            CertificateError: A result violates a bound or symmetry by more than its error allows.
+            RefusedError: The density of θ is zero at a quadrature point, PETSc does not use an
+                option, or the reference model, used with `estimate`, refuses the cell.
+        """
         started = perf_counter()
         basis = self._basis(grid, cells)
         results = []
@@ -161,7 +206,8 @@ class PrismModel(CellModel):
                 result = with_distance(result, _reference_result(cell))
 
             # Bounds of the stiffness may be violated by the error of the mesh. Where no error is
-            # declared, the order of triangles of degree 2 with a margin stands for it.
+            # declared, 0.1 h³ stands for it, which is tuned: energies of quadratic triangles
+            # converge with h⁴ where fields are smooth, so the margin grows as meshes get finer.
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
             checks = checks_within_limits(result.checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))
@@ -171,10 +217,22 @@ class PrismModel(CellModel):
     def fields(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> CellFields:
-        """Return displacements and stresses at the nodes, for one inclusion; the cell is solved.
+        """Solve the cell for one inclusion, and return displacements and stresses at the nodes.
+
+        Args:
+            radius_map: Radius r(θ) of the particle, with the distribution of θ.
+            matrix: Material outside the particle.
+            inclusions: A list with the material of the particle.
+
+        Returns:
+            Fields under the model's two or three macroscopic strains.
 
         Raises:
-            As `solve`, and RefusedError of several inclusions.
+            RefusedError: There is not exactly one inclusion, an argument is of the wrong kind, a
+                radius does not fit into the cell, the density of θ is zero at a quadrature point,
+                or PETSc does not use an option. Poisson's ratio is not limited here.
+            FoldedMeshError: The map bends more than the layers can follow.
+            ConvergenceError: The linear solver did not reach its tolerance.
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require(len(inclusions) == 1, "inclusions", len(inclusions), "one, for fields")
@@ -183,13 +241,15 @@ class PrismModel(CellModel):
         return solved_fields(problem, cell.stiffness, self.loads(cell), self.options)
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
-        """Return DOLFINx's mesh and form over prisms for a map.
+        """Return DOLFINx's mesh and form over prisms for a radius map.
 
-        It is cached: the next map of the same reference radius moves its mesh.
+        The object is cached: a later call with a map of the same reference radius moves the mesh of
+        the object that was returned before.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
-            RefusedError: A radius does not fit into the cell.
+            RefusedError: It is no radius map, a radius does not fit into the cell, or the density
+                of θ is zero at a quadrature point.
         """
         return self._on_valid_grid(radius_map, lambda grid: self._moved_prisms(grid, radius_map))
 
@@ -214,29 +274,38 @@ class PrismModel(CellModel):
         return problem
 
     def _on_valid_grid(self, radius_map: RadiusMap, function: Callable[[PrismGrid], T]) -> T:
-        """Return the value of a function of the grid of a map's reference radius.
+        """Return what a function of the grid returns, on a grid whose elements do not fold.
 
-        Elements at the bends of an outline may fold where the grid is moved to the map, which
-        raises FoldedMeshError in the function: it is then called with shorter edges there.
+        The grid is meshed at the reference radius of a map (about the midpoint of its radii).
+        Elements at the bends of an outline may fold where it is moved to the map, for which the
+        function is to raise FoldedMeshError: it is then called again with a grid of shorter edges
+        there, six times at most, and only once for a circle.
+
+        Args:
+            radius_map: Radius r(θ) of the particle, with the distribution of θ.
+            function: Takes a grid, which it must move to the map.
+
+        Raises:
+            FoldedMeshError: The function raised it on the last grid.
+            RefusedError: It is no radius map, or a radius does not fit into the cell.
+            Exception: Whatever else the function raises, at once.
         """
         radius = reference_radius(radius_map, self.outline)
 
-        def grid(refinement: float) -> PrismGrid:
-            return cached_grid(
-                size=self.mesh_size,
-                radius=radius,
-                layers=self.layers,
-                outline=self.outline,
-                refinement=refinement,
-                parallel=self.parallel,
-            )
-
+        grid = partial(
+            cached_grid,
+            size=self.mesh_size,
+            radius=radius,
+            layers=self.layers,
+            outline=self.outline,
+            parallel=self.parallel,
+        )
         if is_round(self.outline):
-            return function(grid(REFINEMENTS[0]))
+            return function(grid(refinement=REFINEMENTS[0]))
         for refinement in REFINEMENTS[:-1]:
             with suppress(FoldedMeshError):
-                return function(grid(refinement))
-        return function(grid(REFINEMENTS[-1]))
+                return function(grid(refinement=refinement))
+        return function(grid(refinement=REFINEMENTS[-1]))
 
     @property
     def options(self) -> SolverOptions:
@@ -253,8 +322,24 @@ class PrismModel(CellModel):
     def _basis(self, grid: PrismGrid, cells: Sequence[Cell]) -> ModulusBasis | None:
         """Return a reduced basis for cells that differ in the inclusion's modulus alone.
 
-        None where they differ in more, a modulus lies outside `modulus_range`, or the energy that
-        projection on the basis leaves out is too large.
+        It holds the solutions at two moduli, from which the solutions at all moduli of
+        `modulus_range` are projected.
+
+        Args:
+            grid: Prisms at the reference radius of the cells' common map.
+            cells: Cells with the same map and matrix.
+
+        Returns:
+            The basis; None where `modulus_range` is not set or is a single value, the form is
+            assembled over prisms and not over slices, an inclusion is not isotropic, Poisson's
+            ratios differ, a modulus lies outside the range, or the energy that projection leaves
+            out is too large.
+
+        Raises:
+            FoldedMeshError: An element folds where the grid follows the map.
+            ConvergenceError: The linear solver did not reach its tolerance.
+            RefusedError: The density of θ is zero at a quadrature point, or PETSc does not use an
+                option.
         """
         if self.modulus_range is None or not self.by_slices:
             return None
@@ -275,7 +360,7 @@ class PrismModel(CellModel):
             strains=self.loads(cells[0]),
             options=self.options,
         )
-        # Of the energy. The error of E is at most half of it.
+        # Relative error of the energy. The error of E is at most half of it.
         tolerance = 2e-10
         return basis if basis.error <= tolerance else None
 
@@ -291,17 +376,31 @@ def require_prisms(mesh_size: float, layers: int) -> None:
 def prism_result(
     solved: Solved, phases: Sequence[AnyPhase], loads: Array, options: SolverOptions
 ) -> HomogenisedStiffness:
-    """Return stress over θ, energies and checks (Hill–Mandel, symmetry, bounds), as measured.
+    """Return the homogenised stiffness of a solved cell, with its energies and checks.
 
     Args:
-        solved: Mean strains of the slices.
+        solved: Mean strains of the phases on each slice of θ under each load, and what the solver
+            did.
         phases: Materials, in the order of those of `solved`.
-        loads: Macroscopic strains, shape (2 or 3, 3); three give the whole plane stiffness.
-        options: Options of the linear solver, for the name of it.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12): two of shape (2, 3), of which the first
+            stretches both axes and the second shears; or three, shape (3, 3), which give the whole
+            plane stiffness.
+        options: Options of the linear solver, for its name.
+
+    Returns:
+        Stress over θ (σ11 under the first load, σ12 under the second, and the stiffness (3, 3) at
+        each θ for three loads), strain energies by phase without errors, and `checks`: relative
+        violations of the Hill-Mandel condition, of symmetry and of the bounds of Reuss, Voigt and
+        Hashin-Shtrikman, and the residual of the solver. They are measured here and compared with
+        no limit.
+
+    Raises:
+        numpy.linalg.LinAlgError: Three loads are linearly dependent.
     """
     strains = solved.strains
     stiffness = [phase.stiffness for phase in phases]
     stress = strains.stress(stiffness)
+    # Columns of `stress` and rows of `loads` are load cases: Σ = C Lᵀ, so C = Σ L⁻ᵀ at each θ.
     stiffness_by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
     curve = StressCurve(
         strains.theta,
@@ -312,7 +411,8 @@ def prism_result(
         error=solved.curve_error,
     )
 
-    # By Hill and Mandel's lemma the work of mean stress in mean strain is the mean energy.
+    # By Hill and Mandel's lemma the work of mean stress in mean strain is the mean energy. Both are
+    # computed by other sums, so that a wrong constraint or weight shows.
     work = loads @ mean(strains.weights, stress)
     energy = total_energy(strains.products, stiffness)
     checks = {"hill_mandel": float(abs(work.T - energy).max() / abs(energy).max())}
@@ -332,10 +432,19 @@ def prism_result(
 
 
 def _reference_result(cell: Cell) -> HomogenisedStiffness:
-    """Return the result of the series, or of slices where it has no formula.
+    """Return the result of a model that is more accurate than prisms, for the same cell.
 
-    Both are more accurate than prisms. The accuracy of the series and the nodes in θ of the slices
-    are chosen so that the reference's own error, which is added, hardly counts.
+    It is the multipole series for a circle of isotropic phases, and triangles of order 4 at single
+    θ ("slices") for all others. The accuracy of the series (1e-9) and the number of nodes in θ of
+    the slices (14) are chosen so that the reference's own error, which is added, hardly counts.
+
+    Args:
+        cell: Two phases, the radius map and the outline of the particle.
+
+    Raises:
+        RefusedError: The slices cannot mesh the cell (particles that nearly touch), or the map has
+            a jump.
+        FailedError: The series, its rule in θ, or a linear system of the slices did not converge.
     """
     matrix = cell.matrix
     inclusion = cell.inclusion
@@ -349,16 +458,29 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
 def with_distance(
     result: HomogenisedStiffness, reference: HomogenisedStiffness, *, safety: float = 1.0
 ) -> HomogenisedStiffness:
-    """Return a copy of a result with declared errors: its distance from a reference.
+    """Return a copy of a result with declared errors: its distance from a more accurate one.
+
+    With the ratio q of a modulus and the reference's, the distance is d = max(q, 1/q) − 1, and the
+    declared relative error is (1 + safety · d) (1 + e) − 1 with the error e that the reference
+    declares itself, or 0 if it declares none. The moduli are C11 + C12, C11 − C12 and C33. Where
+    C11 and C22 differ, the largest distance along both axes counts. A modulus that was not computed
+    has the error NaN.
 
     Args:
         result: Result with two or three loads.
-        reference: More accurate result. Its declared error, if there is one, is added.
-        safety: Factor of the distance.
+        reference: More accurate result with three loads, or with as many as `result`.
+        safety: Factor of the distance, 1 or more where the reference has an error of similar size.
+
+    Returns:
+        The result with `errors` = {"space": shape (3,)}, and with absolute errors of its energies:
+        the largest distance of any energy of the same modulus times `safety`, plus the reference's
+        error. Energies stay as they are where one of both has none.
     """
     moduli = _mean_moduli(result.curve)
     reference_moduli = _mean_moduli(reference.curve)
-    if len(moduli) == 1:  # with two loads s11 is along x1
+    if len(moduli) == 1:
+        # Two loads give σ11 alone, so the modulus is that with C11: the second row of the
+        # reference's three, which are with the mean of C11 and C22, with C11, and with C22.
         reference_moduli = reference_moduli[1:2]
     ratios = moduli / reference_moduli
     distance = (np.maximum(ratios, 1 / ratios) - 1).max(axis=0)  # nan where not computed
@@ -378,9 +500,15 @@ def with_distance(
 
 
 def _mean_moduli(curve: StressCurve) -> Array:
-    """Return the mean C11 + C12, C11 − C12 and C33 over θ, shape (rows, 3), in Pa.
+    """Return the mean C11 + C12, C11 − C12 and C33 over θ, in Pa, along the last axis.
 
-    Of three loads they are those of `axial_moduli`, of two loads one row by C11.
+    Args:
+        curve: Stress over θ under two loads, or the whole stiffness over θ from three loads.
+
+    Returns:
+        Of three loads shape (3, 3): with the mean of C11 and C22 in the first row, with C11 in the
+        second and with C22 in the third. Of two loads shape (1, 3), with C11, and NaN for C11 −
+        C12, which a stretch of both axes and a shear do not tell.
     """
     if curve.stiffness is None:
         s11, s12 = curve.mean

@@ -61,11 +61,22 @@ class ModulusBasis:
         return Solved(strains, self.iterations, self.error, self.unknowns, self.curve_error)
 
     def coefficients(self, modulus: float) -> Array:
-        """Return the coefficients of the solutions for each load, shape (fields, loads)."""
+        """Return the coefficients of the stored solutions that make up the solution for each load.
+
+        They solve the projected system (Galerkin): K(E) c = F(E), with K and F interpolated in E.
+
+        Args:
+            modulus: Young's modulus E of the particle, in Pa, inside the range of the basis;
+                outside it the result is extrapolated.
+
+        Returns:
+            Coefficients, shape (stored solutions, loads).
+        """
         system = self.at(modulus, self.stiffness)
         loads = self.at(modulus, self.loads)
         # Solutions at two moduli are nearly parallel, and equal to round-off in a narrow range.
-        # Directions with less than this part of the largest energy are left out.
+        # Directions with less than this part of the largest energy are left out, which plain
+        # elimination would blow up.
         round_off = 1e-14
         return np.asarray(np.linalg.lstsq(system, loads, rcond=round_off)[0])
 
@@ -143,6 +154,8 @@ def modulus_basis(
     energies = _energies(ksp.pc.getPythonContext(), np.concatenate(residuals)).reshape(
         2, len(strains)
     )
+    # They are compared with the energy of the affine field in a cell of matrix alone: the scale of
+    # the problem, which needs no solution.
     affine_energies = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
     return replace(basis, error=float((energies / affine_energies).max()))
 
@@ -162,6 +175,8 @@ def _products(matrix: PETSc.Mat, fields: Array) -> Array:
 
 def _energies(preconditioner: ThetaPreconditioner, residuals: Array) -> Array:
     """Return rᵀ P⁻¹ r of residuals r, shape (fields, size), about the energy of their error."""
+    # The error of a field is K⁻¹ r, and its energy rᵀ K⁻¹ r. P⁻¹ is near K⁻¹, which would take a
+    # further solution.
     r = PETSc.Vec().createWithArray(residuals.ravel(), comm=PETSc.COMM_SELF)
     corrections = r.duplicate()
     preconditioner.apply(None, r, corrections)

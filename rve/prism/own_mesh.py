@@ -37,10 +37,6 @@ from alphacut.rve.solver.krylov import SolverOptions, require_petsc
 from alphacut.stochastic import ThetaDistribution
 from alphacut.stochastic.theta.distribution import require_distribution
 
-SAME_LEVEL = 1e-6
-"""Distance of an end of the support of θ from that of a mesh that counts as none, over the support:
-far above the noise of Gmsh's coordinates."""
-
 
 class _NamedModel(NamedPhasesModel):
     """A model whose materials have names."""
@@ -70,16 +66,25 @@ class _NamedModel(NamedPhasesModel):
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """Return the homogenised stiffness, one result in a list.
+        """Return the homogenised stiffness of a mesh with named phases, one result in a list.
 
         Args:
-            law: Distribution of θ.
+            law: Distribution of the random number θ, the third coordinate of the mesh.
             phases: Materials by the name of their physical group, or of a level set "matrix" and
-                "inclusion". Energies of the result are in their order.
+                "inclusion". Energies of the result are in the order of this mapping.
+
+        Returns:
+            The result under three loads, so with the whole plane stiffness. It declares no error.
 
         Raises:
-            MeshError: The mesh is no cell of prisms.
-            RefusedError: Distribution or phases are not those of the mesh.
+            MeshError: The file holds no mesh of a cell of prisms.
+            RefusedError: The file cannot be read, the distribution or the phases are not those of
+                the mesh, a level set has one sign, the density of θ is zero at a quadrature point,
+                or PETSc does not use an option.
+            FoldedMeshError: An element folds.
+            ConvergenceError: The linear solver did not reach its tolerance.
+            CertificateError: Bounds of the stiffness are violated by more than a tenth, or symmetry
+                is violated.
         """
         started = perf_counter()
         problem = self.moved_problem(law)
@@ -89,6 +94,7 @@ class _NamedModel(NamedPhasesModel):
         solved = solve_over_prisms(problem, stiffness, THREE_LOADS, options=self.options)
         result = prism_result(solved, materials, THREE_LOADS, self.options)
         energies = cast("PhaseEnergies", result.energies)
+        # Problems number phases as the mesh does, the user's mapping may have another order.
         order = [list(named).index(name) for name in phases]
         # Nobody knows the error of a user's mesh. Bounds that it violates by more than a tenth show
         # a mistake.
@@ -103,9 +109,21 @@ class _NamedModel(NamedPhasesModel):
         ]
 
     def fields(self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]) -> CellFields:
-        """Return displacements and stresses at the nodes under three unit strains.
+        """Solve the cell and return displacements and stresses at the nodes, under three loads.
 
-        The cell is solved for them. Arguments and errors are those of `solve`.
+        The macroscopic strains (ε11, ε22, 2 ε12) are (0.01, 0.01, 0), (0, 0, 0.02) and (0.01,
+        −0.01, 0).
+
+        Args:
+            law: Distribution of the random number θ.
+            phases: Materials by name, as for `solve`.
+
+        Raises:
+            MeshError: The file holds no mesh of a cell of prisms.
+            RefusedError: The file, the distribution, the phases, the level set or an option of
+                PETSc is not allowed.
+            FoldedMeshError: An element folds.
+            ConvergenceError: The linear solver did not reach its tolerance.
         """
         problem = self.moved_problem(law)
         named = self.named_phases(problem, phases)
@@ -139,7 +157,25 @@ class MeshModel(_NamedModel):
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
     ) -> list[HomogenisedStiffness]:
-        """Return the stiffness as `_NamedModel.solve`, with declared errors if refined."""
+        """Return the homogenised stiffness of the mesh, one result in a list.
+
+        With `refine` the cell is solved on the mesh and on one with each prism split into eight.
+        The result is that of the finer mesh, and its declared error is 2.5 times the distance of
+        both.
+
+        Args:
+            law: Distribution of the random number θ; its support is the range of the third
+                coordinate.
+            phases: Materials by the name of their physical group.
+
+        Raises:
+            MeshError: The file holds no mesh of a cell of prisms, or one that cannot be refined.
+            RefusedError: The file, the distribution, the phases or an option of PETSc is not
+                allowed.
+            FoldedMeshError: An element folds.
+            ConvergenceError: The linear solver did not reach its tolerance.
+            CertificateError: A bound of the stiffness is violated by more than a tenth.
+        """
         results = super().solve(law, phases)
         if not self.refine:
             return results
@@ -161,6 +197,7 @@ class MeshModel(_NamedModel):
         if not isinstance(self.file, str | Path) or not Path(self.file).is_file():
             raise RefusedError("mesh.file", self.file, "path of a file of Gmsh")
         path = Path(self.file)
+        # The time of the last change is part of the cache's key: a new file is read anew.
         return _mesh_problem(str(path), path.stat().st_mtime_ns, self.parallel, self.refine)
 
 
@@ -199,8 +236,19 @@ class LevelSetModel(_NamedModel):
         require_petsc(self.petsc)
 
     def moved_problem(self, distribution: object) -> PrismProblem:
-        """Return the problem on a cached mesh; see `_NamedModel`."""
+        """Return the cached problem on a plain mesh, with the phases of the level set.
+
+        A later call moves the same object.
+
+        Args:
+            distribution: Distribution of the random number θ, which is checked.
+
+        Raises:
+            RefusedError: It is no distribution of θ, its density is zero at a quadrature point, or
+                the level set does not give numbers or has one sign in the whole cell.
+        """
         require_distribution(distribution)
+        # A mesh without a particle serves all level sets.
         grid = cached_grid(
             size=self.mesh_size, radius=0.0, layers=self.layers, parallel=self.parallel
         )
@@ -216,8 +264,14 @@ class LevelSetModel(_NamedModel):
 def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
     """Return the materials in the order of `names`, those of the mesh.
 
+    Args:
+        names: Names of the phases of the mesh.
+        phases: What the user gave as materials by name.
+
     Raises:
-        RefusedError: There is not one material for each name, or Poisson's ratio is too large.
+        RefusedError: `phases` is no mapping, has a name that is not in `names` or lacks one, a
+            value is neither a Phase nor a VoigtPhase, or a Poisson's ratio is above 0.45, where
+            quadratic elements lock.
     """
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
@@ -238,10 +292,19 @@ def in_order_of(names: Sequence[str], phases: object) -> dict[str, AnyPhase]:
 
 
 def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
-    """Return the distribution of θ for a mesh from a file, whose levels span its support.
+    """Return the distribution of θ for a mesh from a file, in the place of a radius map.
+
+    Args:
+        grid: A mesh with the positions `fixed` of all nodes, whose third coordinate is θ; without
+            them an AssertionError is raised.
+        law: What the user gave as the distribution of θ.
+
+    Returns:
+        A map that has the distribution and no radii (NaN).
 
     Raises:
-        RefusedError: It is no distribution of θ, or one on another support.
+        RefusedError: `law` is no distribution of θ, or its support differs from the range of θ of
+            the mesh by more than a millionth of that range.
     """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
@@ -249,7 +312,8 @@ def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
     high = theta.max()
     require_distribution(law)
     distribution = cast("ThetaDistribution", law)
-    tolerance = SAME_LEVEL * (high - low)
+    # Ends that differ by less count as the same: far above the noise of Gmsh's coordinates.
+    tolerance = 1e-6 * (high - low)
     distances = abs(distribution.lower - low), abs(distribution.upper - high)
     if max(distances) > tolerance:
         value = f"on {distribution.lower:g} … {distribution.upper:g}"

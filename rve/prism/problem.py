@@ -55,7 +55,13 @@ class SliceStrains:
 
     @classmethod
     def zeros(cls, rule: ThetaRule, *, phases: int, fields: int) -> SliceStrains:
-        """Return integrals over no part of the cell, to which `add` adds."""
+        """Return integrals over no part of the cell, to which `add` adds those over triangles.
+
+        Args:
+            rule: Nodes and weights of the slices in θ.
+            phases: Number of phases.
+            fields: Number of strain fields.
+        """
         slices = len(rule.nodes)
         return cls(
             rule.nodes,
@@ -68,14 +74,19 @@ class SliceStrains:
     def add(self, strain: Array, areas: Array, slices: Ints) -> None:
         """Add the integrals over some triangles of the slices.
 
+        `strain`, `fractions` and `products` are changed in place.
+
         Args:
-            strain: At the points of the triangles, shape (triangles, points, 3, fields).
-            areas: Weights of the points in each phase, over the area of the cell, shape (phases,
-                triangles, points).
-            slices: Number of each triangle's slice, shape (triangles,).
+            strain: (ε11, ε22, 2 ε12) at the quadrature points of the triangles, shape (triangles,
+                points, 3, fields).
+            areas: Weights of the points in each phase, divided by the area of the cell, shape
+                (phases, triangles, points); 0 where a point is in another phase.
+            slices: Number of each triangle's slice, an index of the rule in θ, shape (triangles,).
         """
         for phase in range(len(areas)):
             phase_areas: Array = areas[phase]
+            # Each triangle lies in one phase, unless a level set cuts it. So the products are taken
+            # once for each triangle and not once for each phase.
             has_phase = phase_areas.any(axis=1)
             points = strain[has_phase]
             weights = phase_areas[has_phase]
@@ -89,6 +100,7 @@ class SliceStrains:
 
     def combined(self, coefficients: Array) -> SliceStrains:
         """Return the strains of sums of the fields, with coefficients of shape (fields, loads)."""
+        # Products are quadratic in the fields, so that the coefficients enter twice.
         products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
         return replace(self, strain=self.strain @ coefficients, products=products)
 
@@ -119,10 +131,15 @@ class Solved(NamedTuple):
 
 
 def positive_density(distribution: ThetaDistribution, theta: Array) -> Array:
-    """Return the density of θ at quadrature points, shape (n,).
+    """Return the probability density of θ at quadrature points, shape (n,).
+
+    Args:
+        distribution: Distribution of the random number θ.
+        theta: Points inside its support, shape (n,).
 
     Raises:
-        RefusedError: It is not positive at a point, so that the stiffness would be singular.
+        RefusedError: The density is zero, negative or NaN at a point. Slices with weight 0 have no
+            stiffness, so the system would be singular.
     """
     density = np.asarray(distribution.pdf(theta))
     if not (density > 0).all():
@@ -135,16 +152,20 @@ def positive_density(distribution: ThetaDistribution, theta: Array) -> Array:
 def require_valid_elements(
     grid: PrismGrid, areas: Array, comm: MPI.Intracomm | None = None
 ) -> None:
-    """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
+    """Raise if elements are inverted, or nearly inverted around an outline that is not a circle.
+
+    The determinant of the Jacobian at each quadrature point must exceed 0, or 0.2 of its mean over
+    the element where the outline is no circle: there edges are curved and refined.
 
     Args:
         grid: The prisms.
-        areas: Weights of the quadrature points of prisms in their slices, shape (prisms, 3,
-            points).
-        comm: Ranks that have some of the prisms each; None for this process alone.
+        areas: Weights of the quadrature points of the prisms in their slices, with the sign of the
+            determinant, shape (prisms, 3 slices, 6 points).
+        comm: MPI ranks that have some of the prisms each, all of which must call; None for this
+            process alone.
 
     Raises:
-        FoldedMeshError: An element of any rank is inverted.
+        FoldedMeshError: An element of any rank is inverted; the error is raised on all of them.
     """
     determinants = areas / slice_weights()
     means = determinants.mean(axis=(1, 2), keepdims=True)
@@ -190,6 +211,8 @@ class PrismProblem:
         sizes = self.space.dofmap.index_map
         geometry = self.mesh.geometry
         self.node: Ints = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
+        # DOLFINx numbers nodes of the geometry and of the space each in its own way. Both lists of
+        # a cell's nodes are in Basix's order, so they are the same nodes entry by entry.
         self.node[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
         self._compile_forms()
 
@@ -208,7 +231,13 @@ class PrismProblem:
         self.matrix = self.elimination.matrix
 
     def _compile_forms(self) -> None:
-        """Make measures, density, form and strains at the quadrature points."""
+        """Make measures, density, the form of elasticity and strains at the quadrature points.
+
+        They set the attributes `dx`, `density`, `_phases`, `_elastic` and `_strains`. `_phases`
+        says whether a phase is at a point, shape (phases, prisms, 1, 1), for prisms of one phase
+        each. The values of density and stiffness are set later, by `move` and `assemble`. DOLFINx
+        compiles the forms, or takes them from its cache.
+        """
         points, weights = prism_rule()
         metadata = {
             "quadrature_rule": "custom",
@@ -222,6 +251,7 @@ class PrismProblem:
         self.dx = {name: dx(number) for number, name in enumerate(self.grid.names)}
 
         def at_points(*shape: int) -> fem.FunctionSpace:
+            """Return the space of values, of a shape, at the quadrature points."""
             element = basix.ufl.quadrature_element(
                 "prism", value_shape=shape, points=points, weights=weights
             )
@@ -229,6 +259,8 @@ class PrismProblem:
 
         self.density = fem.Function(at_points())
         self._phases = np.equal.outer(numbers, phase)[..., np.newaxis, np.newaxis]
+        # A prism of one phase has one stiffness. One that a level set cuts has two, so that each
+        # quadrature point needs its own.
         if self.grid.conforming:
             stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
         else:
@@ -237,13 +269,19 @@ class PrismProblem:
         self._strains = PointStrains(self.space, points)
 
     def move(self, radius_map: RadiusMap) -> None:
-        """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
+        """Move the nodes to the interface r(θ) of a map, or mark the particles of a level set.
 
-        After an error it is to be moved again before use.
+        It sets `map`, `density` and `areas`, and the phases of a level set (eq. 13, 14). After an
+        error the object must be moved again before use.
+
+        Args:
+            radius_map: Radius of the particle over θ with the distribution of θ, or a level set
+                with it. A mesh from a file stays where it is.
 
         Raises:
             FoldedMeshError: An element is inverted.
-            RefusedError: The density of θ is not positive at a quadrature point.
+            RefusedError: The density of θ is not positive at a quadrature point, or a level set
+                does not give numbers or has one sign in the whole cell.
         """
         self.map = radius_map
         positions = self.grid.positions(radius_map)
@@ -265,24 +303,35 @@ class PrismProblem:
             self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
 
     def _sign_of(self, level_set: LevelSet, positions: Array) -> Array:
-        """Return a level set's function at the points of this rank's prisms, (prisms, points).
+        """Return a level set's function at the points of this rank's prisms, shape (prisms, 18).
+
+        Args:
+            level_set: The function z(x1, x2, θ), negative in the particles.
+            positions: Positions (x1, x2, θ) of all nodes of the grid, shape (nodes, 3).
 
         Raises:
-            RefusedError: It has one sign at all points of all ranks.
+            RefusedError: It does not give a number at each point, or has one sign at all points of
+                all ranks.
         """
         points, _ = prism_rule()
         shapes: Array = wedge(1).tabulate(0, points)[0].reshape(-1, 15)
         corners = positions[self.grid.cells[self.wedge]]
         values = level_set.values(np.einsum("qn,cnd->cqd", shapes, corners))
+        # A rank may have no prisms, or those of one phase alone.
         lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
         highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
         level_set.require_both_signs(lowest, highest)
         return values
 
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
-        """Assemble the reduced stiffness of eq. 7 for the stiffness of the phases, and return it.
+        """Assemble the reduced stiffness of eq. 7 and return it.
 
-        Each call returns the same matrix. The phases stay set in the form, for `loads`.
+        Each call overwrites and returns the same matrix. The stiffness of the phases stays set in
+        the form, where `loads` takes it from.
+
+        Args:
+            stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each,
+                in Pa, in the order of the grid's names (of a level set matrix, inclusion).
         """
         at_points = np.tensordot(self._phases, np.array(stiffness), axes=(0, 0))  # eq. 13
         self._elastic.stiffness.x.array[:] = at_points.ravel()
@@ -303,7 +352,17 @@ class PrismProblem:
         return preconditioner.set_up(self.map.distribution, level_blocks(matrix, self.numbering))
 
     def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
-        """Return the reduced matrix Pᵀ A P of a bilinear form of the user on `space`."""
+        """Assemble a bilinear form of the user on `space`, and return the reduced matrix Pᵀ A P.
+
+        P leads from the reduced unknowns (periodic, zero at one corner) to displacements of all
+        nodes.
+
+        Args:
+            form: Compiled form with a test and a trial function in `space`; this is not checked.
+
+        Returns:
+            A new matrix, which need not be symmetric.
+        """
         matrix = self.matrix.duplicate()
         # The pattern is that of the stiffness, but these properties are not known of this form.
         matrix.setOption(PETSc.Mat.Option.SPD, False)
@@ -315,9 +374,15 @@ class PrismProblem:
     def slice_strains(self, strains: Array, fluctuations: Sequence[PETSc.Vec]) -> SliceStrains:
         """Return integrals over the slices of fields ε̄ + ε(u), summed over the ranks.
 
+        All ranks must call, and get the same values.
+
         Args:
-            strains: Macroscopic strain ε̄ of each field, shape (fields, 3).
-            fluctuations: Reduced unknowns of u of each field.
+            strains: Macroscopic strain ε̄ = (ε11, ε22, 2 ε12) of each field, shape (fields, 3).
+            fluctuations: Reduced unknowns of u of each field, as many as there are strains.
+
+        Returns:
+            Mean strains, area fractions and means of products of strains by phase, divided by the
+            area of the cell.
         """
         num_prisms = len(self.wedge)
         shape = num_prisms * SLICES_PER_LAYER, POINTS_PER_SLICE, 3, len(strains)
@@ -331,6 +396,7 @@ class PrismProblem:
         integrals = SliceStrains.zeros(self._rule, phases=len(areas), fields=len(strains))
         of_slices: Array = areas.reshape(len(areas), -1, POINTS_PER_SLICE)
         integrals.add(values, of_slices, slices.ravel())
+        # Sums in place; θ and the weights are the same on all ranks.
         for part in (integrals.strain, integrals.fractions, integrals.products):
             self.comm.Allreduce(MPI.IN_PLACE, part)
         return integrals
@@ -339,19 +405,27 @@ class PrismProblem:
 def solve_over_prisms(
     problem: PrismProblem, stiffness: Sequence[Array], strains: Array, *, options: SolverOptions
 ) -> Solved:
-    """Solve eq. 7 over prisms under some macroscopic strains, and average over slices.
+    """Solve the cell problem (eq. 7) over prisms under some macroscopic strains, and average.
 
     It is for several MPI ranks, meshes from files, level sets and preconditioners that need a
-    matrix with entries; `slices.solve_sample` is the default, and shows the whole way.
+    matrix with entries. Without these, assembly over slices (`slices.solve_sample`) is the default
+    and faster.
 
     Args:
-        problem: Mesh, constraint and form, moved to the map.
-        stiffness: Stiffness of each phase, (3, 3) each, in Pa.
+        problem: Mesh, constraint and form, moved to the radius map. Its stiffness matrix is
+            overwritten.
+        stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each, in
+            Pa.
         strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
         options: PETSc's options, with those of the default solver.
 
+    Returns:
+        Mean strains of each phase on each slice of θ for each load, iterations for each load, the
+        largest relative residual, and the number of unknowns.
+
     Raises:
         ConvergenceError: The tolerance of the residual, relative to the load, was not reached.
+        RefusedError: PETSc does not use one of the options.
     """
     matrix = problem.assemble(stiffness)
     loads = problem.loads(strains)

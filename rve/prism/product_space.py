@@ -23,13 +23,6 @@ from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaDistribution
 
-ARITIES = {
-    0: "scalar form (without test or trial function)",
-    1: "linear form (with a test function)",
-    2: "bilinear form (with a trial and a test function)",
-}
-"""What a form is called by its number of arguments."""
-
 
 class ProductSpace:
     """Periodic fluctuations on cell × θ, zero on the line of one corner over θ.
@@ -91,15 +84,21 @@ class ProductSpace:
     def fields(
         self, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], strain: Sequence[float]
     ) -> CellFields:
-        """Displacements and stresses at the nodes of a solution, to be drawn or written.
+        """Return displacements and stresses at the nodes for a solution, to be drawn or written.
 
         Args:
-            u: The fluctuation of the displacements, a function of `space`.
-            stress: (σ11, σ22, σ12) of each phase by its name, as UFL vectors, in Pa.
+            u: The fluctuation of the displacements, a function of `space`, without those of the
+                macroscopic strain; in halves of the cell's side.
+            stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of shape (3,), in Pa.
             strain: The macroscopic strain (ε11, ε22, 2 ε12).
 
+        Returns:
+            Total displacements, and stresses as means over the prisms of one phase that meet in a
+            node.
+
         Raises:
-            RefusedError: A phase has no stress, or one that has not three components.
+            RefusedError: The names in `stress` are not exactly those of the phases, or an
+                expression has not three components.
         """
         return fields_of_solution(self._problem, u, stress, np.asarray(strain, float))
 
@@ -115,7 +114,15 @@ class ProductSpace:
     ) -> Solutions:
         """Solve A x = b for each load, by default by conjugate gradients preconditioned along θ.
 
-        `petsc_options` are without their prefix `rve_`; the model's if left out.
+        Args:
+            matrix: Symmetric reduced matrix, as `assemble_matrix` returns it.
+            loads: Reduced right-hand sides, at least one, as `assemble_vector` returns them.
+            petsc_options: Options of PETSc without the prefix `rve_`, which override the default
+                solver; those of the model if left out.
+
+        Returns:
+            The reduced solutions in the order of the loads, iterations, and the largest relative
+            residual.
 
         Raises:
             RefusedError: The matrix is not symmetric, or PETSc does not use an option.
@@ -126,10 +133,15 @@ class ProductSpace:
         return solve(self._problem.solver(options, matrix), loads)
 
     def _compiled(self, form: ufl.Form, *, num_arguments: int) -> fem.Form:
-        """Return the compiled form; its coefficients keep the values that they have when assembled.
+        """Return a form compiled by DOLFINx, after a check; that of the same form is kept.
 
-        DOLFINx assembles by the number of the form's arguments (test and trial functions) and by
-        their spaces without a check, and would write beyond its arrays.
+        A kept form uses the values that its coefficients have when it is assembled, not those of
+        now. The check is needed since DOLFINx assembles by the number of the form's arguments (test
+        and trial functions) and by their spaces without looking, and would write beyond its arrays.
+
+        Args:
+            form: Form of the user.
+            num_arguments: 0 for a scalar, 1 for a vector, 2 for a matrix.
 
         Raises:
             RefusedError: It is no form on this mesh with `num_arguments` arguments in `space`.
@@ -141,14 +153,29 @@ class ProductSpace:
 
 
 def require_form(form: object, *, space: fem.FunctionSpace, num_arguments: int) -> None:
-    """Refuse what is no form on the mesh of `space` with that many arguments, all in `space`."""
-    allowed = f"a {ARITIES[num_arguments]}, in `space` of this ProductSpace"
+    """Raise unless a form is one on the mesh of `space` with some number of arguments, all in it.
+
+    Args:
+        form: What the user gave as a form.
+        space: The only space that its test and trial functions may have.
+        num_arguments: 0 for a scalar form, 1 with a test function, 2 with a trial function too.
+
+    Raises:
+        RefusedError: It is no UFL form, has another number of arguments, has one in another space,
+            or is integrated over another mesh.
+    """
+    arities = {
+        0: "scalar form (without test or trial function)",
+        1: "linear form (with a test function)",
+        2: "bilinear form (with a trial and a test function)",
+    }
+    allowed = f"a {arities[num_arguments]}, in `space` of this ProductSpace"
     cure = "write it with `ufl.TrialFunction(space)`, `ufl.TestFunction(space)` and its `dx`"
     if not isinstance(form, ufl.Form):
         raise RefusedError("form", type(form).__name__, allowed, cure)
     arguments = form.arguments()
     if len(arguments) != num_arguments:
-        value = f"a {ARITIES.get(len(arguments), 'multilinear form')}"
+        value = f"a {arities.get(len(arguments), 'multilinear form')}"
         raise RefusedError("form", value, allowed, cure)
     in_space = all(argument.ufl_function_space() == space for argument in arguments)
     domains = form.ufl_domains()
@@ -159,7 +186,21 @@ def require_form(form: object, *, space: fem.FunctionSpace, num_arguments: int) 
 def _separate_problem(
     model: PrismModel | MeshModel, law: RadiusMap | ThetaDistribution
 ) -> PrismProblem:
-    """New problem for a map or law; the cached ones of the model would move to its next map."""
+    """Return a new problem for a map or distribution, moved to it.
+
+    The cached problem of the model would move to the next map of the model. Only the grid, which
+    does not change, is taken from it.
+
+    Args:
+        model: Prisms around a particle, or a mesh from a file.
+        law: Radius map for prisms; distribution of θ for a mesh from a file.
+
+    Raises:
+        FoldedMeshError: The map bends more than the layers can follow.
+        MeshError: The file holds no mesh of a cell.
+        RefusedError: `law` is not of the kind that the model takes, does not fit the mesh, or has a
+            density that is zero at a quadrature point.
+    """
     if isinstance(model, MeshModel):
         cached = model.cached_problem()
         radius_map: RadiusMap = mesh_law(cached.grid, law)
@@ -172,10 +213,16 @@ def _separate_problem(
 
 
 def require_symmetric(matrix: PETSc.Mat) -> None:
-    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong.
+    """Raise unless a matrix A is symmetric; for others conjugate gradients would be wrong.
 
-    It is compared with its transpose on one random vector.
+    A x and Aᵀ x are compared for one random vector x, always the same for a number of ranks. A zero
+    matrix passes. All ranks that share the matrix must call.
+
+    Raises:
+        RefusedError: |(A − Aᵀ) x| exceeds 1e-8 |A x|, or one of them is NaN.
     """
+    # For an asymmetric matrix (A − Aᵀ) x vanishes only for x in a proper subspace, which a random
+    # vector misses with probability 1. A comparison of entries would need the transpose.
     x, product = matrix.createVecs()
     difference = x.duplicate()
     x.array[:] = np.random.default_rng(x.owner_range[0]).standard_normal(x.local_size)

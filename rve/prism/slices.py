@@ -47,8 +47,6 @@ from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
 
-QUADRATURE_DEGREE = 4
-"""Of the rule on triangles, exact for products of two strains of straight six-node triangles."""
 INCLUSION = NAMES.index("inclusion")
 """Index of the inclusion among the phases."""
 
@@ -63,17 +61,21 @@ def solve_sample(
 ) -> Solved:
     """Homogenise one cell: solve eq. 7 under some macroscopic strains, and average over slices.
 
-    Mesh, constraint and form depend on the grid alone and are kept for the next sample.
+    Eq. 7 is Σ_s ∫ w_s C (ε̄ + ε(u)) : ε(v) dx = 0 for all v, a sum over slices at fixed θ_s. u and
+    v are displacements of prisms on cell × θ, periodic and zero at one corner. Mesh, constraint and
+    form depend on the grid alone and are kept for the next sample.
 
     Args:
         grid: Prisms whose nodes follow the interface.
         radius_map: Radius of the particle over θ, with the distribution of θ.
-        stiffness: Stiffness C of each phase in Voigt order, (3, 3) each, in Pa.
+        stiffness: Stiffness C of each phase (matrix, inclusion) in Voigt order (11, 22, 12 with 2
+            ε12), (3, 3) each, in Pa.
         strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
         options: PETSc's options, with those of the default solver.
 
     Returns:
-        Mean strains of each phase on each slice, and the iterations and the residual of the solver.
+        Mean strains of each phase on each slice, the iterations for each load, the largest relative
+        residual, and the number of unknowns.
 
     Raises:
         FoldedMeshError: An element is inverted where the mesh follows the map.
@@ -142,14 +144,18 @@ class SliceMesh:
         self.space = fem.functionspace(self.mesh, element)
         self.weight = fem.Function(fem.functionspace(self.mesh, ("DG", 0)))
         self.stiffness_space = fem.functionspace(self.mesh, ("DG", 0, (3, 3)))
+        # A rule of degree 4 has the six points of a slice of the prisms' rule. It is exact for
+        # products of two strains, of degree 1 each on straight triangles, with some reserve for
+        # curved ones.
+        degree = 4
         inclusion_cells = np.flatnonzero(self.phase == INCLUSION).astype(np.int32)
         self.dx = ufl.Measure(
             "dx",
             self.mesh,
             subdomain_data=[(INCLUSION, inclusion_cells)],
-            metadata={"quadrature_degree": QUADRATURE_DEGREE},
+            metadata={"quadrature_degree": degree},
         )
-        points, _ = basix.make_quadrature(basix.CellType.triangle, QUADRATURE_DEGREE)
+        points, _ = basix.make_quadrature(basix.CellType.triangle, degree)
         self.point_strains = PointStrains(self.space, points)
 
         geometry = self.mesh.geometry
@@ -157,14 +163,21 @@ class SliceMesh:
         interpolation = layer_interpolation(plane, self.heights)
         self._geometry_interpolation = interpolation[geometry.input_global_indices]
         self.node: Ints = np.empty(num_nodes, int)
+        # Both lists of a cell's nodes are in Basix's order, that of the space and the geometry's.
         self.node[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
         self.interpolation = interpolation[self.node]
 
     def move(self, radius_map: RadiusMap) -> None:
-        """Move the slices of all layers to the interface r(θ) of a map.
+        """Move the slices of all layers to the interface r(θ) of a radius map.
+
+        It sets `map`, `rule` (nodes and weights in θ) and `areas`. After an error the mesh must be
+        moved again before use.
+
+        Args:
+            radius_map: Radius of the particle over θ, with the distribution of θ.
 
         Raises:
-            FoldedMeshError: An element is inverted. The mesh is to be moved again before use.
+            FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
         """
         grid = self.grid
@@ -173,11 +186,12 @@ class SliceMesh:
         self.rule = level_rule(law, grid.level_thetas(law), points=SLICES_PER_LAYER)
         positive_density(law, self.rule.nodes)
         levels, mid_levels = grid.positions_by_level(radius_map)
+        # Nodes of each layer of prisms: of the level below, of the mid-level, of the level above.
         by_layer = np.concatenate([levels[:-1], mid_levels, levels[1:]], axis=1)
         self._positions = [self._geometry_interpolation @ positions for positions in by_layer]
         determinants = [self.point_strains.determinants() for _ in self.layers()]
         self.areas = np.array(determinants) * slice_weights()[0]
-        # Sort the cells by prism, as shape (prisms, slices, points).
+        # DOLFINx reorders cells. Undo it, and sort the cells by prism: (prisms, slices, points).
         sorted_areas = self.areas[:, np.argsort(self._cell)]
         by_slice = sorted_areas.reshape(grid.layers, SLICES_PER_LAYER, -1, POINTS_PER_SLICE)
         by_prism = by_slice.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
@@ -263,11 +277,14 @@ class SliceProblem:
         """Return the blocks of 2 × 2 entries that DOLFINx assembles over the slices of each layer.
 
         Args:
-            form: The form of the problem, or `inclusion_form`. The phases stay set in it.
-            stiffness: Stiffness of the phases, (3, 3) each, in Pa.
+            form: The form of this problem, or `inclusion_form` of its mesh, which has the same
+                pattern. The stiffness stays set in it, for `loads`.
+            stiffness: Stiffness of the phases (matrix, inclusion) in Voigt order, (3, 3) each, in
+                Pa.
 
         Returns:
-            Blocks of A_k of the layers k, shape (layers, blocks, 4).
+            Blocks of the matrices of the layers, row by row, shape (layers, blocks, 4). Which nodes
+            a block couples is the pattern of DOLFINx's matrix, the same for all layers.
         """
         form.stiffness.x.array[:] = np.array(stiffness)[self.mesh.phase].ravel()
         layer_matrix, pattern = _layer_matrix(self.constraint, self.form)
@@ -286,9 +303,12 @@ class SliceProblem:
         return PETSc.Mat().createPython((size, size), context, comm=PETSc.COMM_SELF)
 
     def loads(self, form: CellForm, strains: Array) -> list[PETSc.Vec]:
-        """Return the reduced forces of macroscopic strains, shape (loads, 3).
+        """Return the reduced forces of macroscopic strains, one vector for each.
 
-        The phases are those that are set in the form.
+        Args:
+            form: The form of this problem or `inclusion_form`, with the stiffness that was set
+                last.
+            strains: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         """
         by_layer = [[form.load(strain) for strain in strains] for _ in self.mesh.layers()]
         forces = self.constraint.forces(np.array(by_layer).swapaxes(0, 1))
@@ -297,7 +317,16 @@ class SliceProblem:
     def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int) -> PETSc.KSP:
         """Return PETSc's solver of an assembled stiffness for some loads at once.
 
-        That of an earlier stiffness is spent, since both have the same preconditioner.
+        A solver that was made before for the same grid and options can no longer be used, since
+        both have the same preconditioner, which is factorised anew.
+
+        Args:
+            options: PETSc's options, with those of the default solver.
+            matrix: Stiffness, as `matrix` of this problem returns it.
+            loads: Number of loads; vectors of the solver hold them one after another.
+
+        Raises:
+            RefusedError: PETSc does not use one of the options.
         """
         preconditioner = _preconditioner(self.numbering, str(options))
         blocks = matrix.getPythonContext().level_blocks()
@@ -316,8 +345,13 @@ class SliceProblem:
         """Return integrals over the slices of the strains ε̄ + ε(u) of some fields.
 
         Args:
-            strains: Macroscopic strain ε̄ of each field, shape (fields, 3).
-            fluctuations: Reduced unknowns of u of each field; None where u is zero.
+            strains: Macroscopic strain ε̄ = (ε11, ε22, 2 ε12) of each field, shape (fields, 3).
+            fluctuations: Reduced unknowns of u of each field; None where u is zero. At least one is
+                not None.
+
+        Returns:
+            Mean strains, area fractions and means of products of strains by phase (matrix,
+            inclusion), divided by the area of the cell.
         """
         mesh = self.mesh
         count = len(strains)
@@ -329,6 +363,7 @@ class SliceProblem:
         integrals = SliceStrains.zeros(mesh.rule, phases=len(phases), fields=count)
         for layer in mesh.layers():
             values: Array = np.empty((*mesh.areas.shape[1:], 3, count))
+            # The macroscopic strain is the same everywhere; fields without u have it alone.
             values[:] = strains.T
             for number, field in enumerate(vectors):
                 values[..., field] += mesh.point_strains(displacements[number, layer])
@@ -339,5 +374,7 @@ class SliceProblem:
 
 def repeated(matrix: PETSc.Mat, times: int) -> PETSc.Mat:
     """Return a stiffness as operator on several fields, one after another in a vector."""
+    # The matrix has no entries but a Python object that multiplies, which takes as many fields as
+    # the vector holds; only the sizes must fit.
     size = times * matrix.size[0]
     return PETSc.Mat().createPython((size, size), matrix.getPythonContext(), comm=PETSc.COMM_SELF)
