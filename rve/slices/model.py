@@ -100,14 +100,19 @@ class PlaneCell:
     def strains(self, phases: Sequence[Array]) -> Array:
         """Return the strains at the quadrature points under three unit strains.
 
+        The linear system is factorised and solved; the matrix of this object is overwritten.
+
         Args:
-            phases: Stiffness of each phase, (3, 3) each, in Pa.
+            phases: Stiffness of each phase (matrix 0, particle 1) in Voigt order, (3, 3) each, in
+                Pa.
 
         Returns:
-            (ε11, ε22, 2 ε12) under each unit strain (last axis), shape (points, 3, 3).
+            (ε11, ε22, 2 ε12), the second axis, under each unit strain of these components, the last
+            axis; shape (points of all triangles, 3, 3).
 
         Raises:
-            ConvergenceError: The linear system was not solved.
+            ConvergenceError: The system was not solved: a relative residual exceeds 1e-8 or is not
+                finite.
         """
         matrix = self._elimination.matrix
         unit_strains = np.eye(3)
@@ -129,7 +134,16 @@ class PlaneCell:
     def solve(self, phases: Sequence[AnyPhase]) -> tuple[Array, Array]:
         """Return the homogenised stiffness and the energies of the phases, both in Pa.
 
-        Their shapes are (3, 3) and (phases, 2, 3); see `energies_by_phase`.
+        Args:
+            phases: Materials: matrix, particle.
+
+        Returns:
+            Stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3). And the parts X ∂c/∂X of
+            the bulk modulus X = K and the shear modulus X = G of each phase in the moduli c = C11 +
+            C12, C11 − C12, C33 of the cell, shape (phases, 2, 3).
+
+        Raises:
+            ConvergenceError: The linear system was not solved.
         """
         stiffness = [phase.stiffness for phase in phases]
         products = strain_products(self.strains(stiffness), self.weights)
@@ -164,18 +178,29 @@ def solve_slice(
     mesh_size: float,
     outline: Outline = circle,
 ) -> list[Slice]:
-    """Solve the plane cell with each of `inclusions`, and declare its error.
+    """Solve the plane cell with each of `inclusions` by elements of order 4, and declare its error.
 
     The error is the larger of two distances of order 4 from order 5, on the same mesh and on a
-    second one, each with a safety factor. Without the symmetry of the square, the larger of the
-    errors with C11 and with C22 counts.
+    second one of twice the edge length (or half of it, if twice would be above 0.7), each with a
+    safety factor. Without the symmetry of the square, the larger of the errors with C11 and with
+    C22 counts.
 
     Args:
         radius: Radius of the particle, in halves of the cell's side.
         matrix: Material outside the particle.
         inclusions: Materials of the particle.
-        mesh_size: Edge length far from the interface, in halves of the cell's side.
-        outline: Outline of the particle.
+        mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
+        outline: Distance of the particle's edge from its centre over `radius`, as a function of the
+            polar angle in radians.
+
+    Returns:
+        For each inclusion the stiffness, the declared relative errors of C11 + C12, C11 − C12 and
+        C33, the energies of the phases with their absolute errors, and the number of unknowns.
+
+    Raises:
+        RefusedError: The mesh size is not allowed, or the particle does not fit or has too sharp an
+            outline to be meshed.
+        ConvergenceError: A linear system was not solved.
     """
     is_coarser = 2 * mesh_size <= MAX_SECOND_SIZE
     second_size = 2 * mesh_size if is_coarser else mesh_size / 2
@@ -197,7 +222,8 @@ def solve_slice(
         square = is_round(outline) and all(isinstance(phase, Phase) for phase in phases)
         by_order = 1.6 * _distance(stiffness, higher_stiffness, square=square)
         by_mesh = 1.1 * _distance(stiffness, second_stiffness, square=square)
-        # Round-off grows with the contrast, since displacements of the particle cancel.
+        # Round-off grows with the contrast, since displacements of the particle cancel. Below it
+        # two orders may agree by chance. The factors are tuned.
         contrast = inclusion.stiffness[2, 2] / matrix.stiffness[2, 2]
         round_off = 1e-13 + 2e-14 * radius * contrast
         energy_round_off = 1e-12 * energies.sum(axis=(0, 1))
@@ -269,11 +295,25 @@ class SlicesModel(CellModel):
     ) -> list[HomogenisedStiffness]:
         """Return the homogenised stiffness for each of `inclusions`, in their order.
 
-        The results have the energies of the phases.
+        The plane cell is solved at each node of a Gauss rule in θ, and at the smallest and the
+        largest radius of the map for the error in θ.
+
+        Args:
+            radius_map: Radius r(θ) of the particle, in halves of the cell's side, with the
+                distribution of the random number θ.
+            matrix: Material outside the particle.
+            inclusions: Materials of the particle, at least one.
+
+        Returns:
+            Results with declared errors, energies of the phases, and violations of bounds as
+            checks. `seconds` of each is the time for all of them together.
 
         Raises:
             ConvergenceError: A linear system was not solved.
-            RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
+            CertificateError: A result violates symmetry or a bound by more than its errors.
+            RefusedError: Arguments are no map, phase and list of phases, a Poisson's ratio is above
+                0.45, the map has a jump, a radius does not fit or the outline is too sharp to be
+                meshed.
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
@@ -303,10 +343,15 @@ def _mean_of_slices(
     """Return the mean over θ of a cell with its declared errors.
 
     Args:
-        cell: The cell.
-        rule: Nodes in θ.
-        radii: Radii of the slices, rising, among them those of the nodes and the two extreme ones.
-        slices: Slice of each radius.
+        cell: Phases, radius map and outline.
+        rule: Nodes and weights in θ.
+        radii: Radii of the slices, rising and rounded to twelve decimals, shape (n,); among them
+            those of the nodes and the two extreme ones.
+        slices: Slice of each radius: stiffness, errors, energies and number of unknowns.
+
+    Returns:
+        Result with the stiffness at the nodes, energies, and errors "space" (of the meshes) and
+        "theta" (of the rule) of C11 + C12, C11 − C12 and C33.
     """
     nodes = _radius_of_nodes(cell, rule, radii)
     stiffness = np.array([one.stiffness for one in slices])
@@ -314,6 +359,7 @@ def _mean_of_slices(
     moduli = square_moduli(stiffness)
     mean = rule.mean(moduli[nodes])
     absolute_errors = moduli * np.array([one.errors for one in slices])
+    # The error of a mean is at most the mean of the absolute errors: the weights are positive.
     space_errors = rule.mean(absolute_errors[nodes]) / mean
     if cell.square:
         # C11 and C22 differ by the mesh alone. s11 has C11, and the moduli have their mean.
@@ -340,14 +386,19 @@ def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array
     """Return mean energies of the phases over θ with their declared errors.
 
     Args:
-        cell: The cell.
-        rule: Nodes in θ.
-        radii: Radii of the slices, shape (n,).
-        energies: Energies and their errors at the radii, shape (n, 2, phases, 2, 3), in Pa.
+        cell: Phases, radius map and outline.
+        rule: Nodes and weights in θ.
+        radii: Radii of the slices, rising, shape (n,).
+        energies: At the radii, shape (n, 2, phases, 2, 3), in Pa. Axes: radius; the energy and its
+            absolute error; phase; bulk or shear modulus; C11 + C12, C11 − C12, C33.
+
+    Returns:
+        Energies and absolute errors, shape (phases, 2, 3) each, in Pa.
     """
     nodes = _radius_of_nodes(cell, rule, radii)
 
     def absolute_theta_error(moduli: Array) -> Array:
+        """Return the error of the mean of moduli at the radii, shape (n, 3), in Pa, shape (3,)."""
         relative_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
         return relative_errors * rule.mean(moduli[nodes])
 
@@ -369,14 +420,16 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
 
     The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
     particles or an incompressible matrix make the modulus itself steep. Its weighted least-squares
-    polynomials of several degrees are averaged by a fine rule. The error is the largest distance of
-    these means from that by `rule`, with a safety factor.
+    polynomials of several degrees are averaged by a rule of 128 nodes. The error is the largest
+    distance of these means from that by `rule`, times a tuned safety factor, so it is an estimate.
 
     Args:
-        cell: The cell.
-        rule: The rule in θ.
-        radii: Radii of the slices, rising, shape (m,): those of the nodes and the two extreme ones.
-        moduli: C11 + C12, C11 − C12 and C33 at `radii`, or others, positive, shape (m, 3).
+        cell: Phases and radius map.
+        rule: Nodes and weights in θ of the mean that is judged.
+        radii: Radii of the slices, rising, inside (0, 1), shape (m,): those of the nodes and the
+            two extreme ones, at least one.
+        moduli: C11 + C12, C11 − C12 and C33 at `radii`, or others that behave like them, positive,
+            shape (m, 3).
     """
     # Radii that are no node of the rule have a small weight, so that fits do not leave them.
     nodes = _radius_of_nodes(cell, rule, radii)
@@ -386,6 +439,7 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     fine_radii = cell.radius_map(fine.nodes)
 
     def mori_tanaka_moduli(r: Array) -> Array:
+        """Return C11 + C12, C11 − C12 and C33 of a circle at radii, along a new last axis."""
         bulk, shear = mori_tanaka(np.pi / 4 * r**2, [cell.matrix, cell.inclusion])
         return np.stack([2 * bulk, 2 * shear, shear], axis=-1)
 

@@ -23,10 +23,17 @@ def strain(u: Any) -> Any:
 
 
 def virtual_work(stiffness: Any, strain_of_u: Any, v: Any, weight: Any) -> Any:
-    """Return the integrand of eq. 7: the work of the stress C ε in ε(v), times a weight.
+    """Return the integrand of eq. 7: the work of the stress C ε in the strain of v, times a weight.
 
     It is Galerkin's projection (eq. 4) of −div σ (eq. 2) in the inner product of eq. 1, whose
-    weight is the density f_Θ, or over a slice at θ_s the weight w_s of its quadrature along θ.
+    weight is the density f_Θ of the random number θ, or over a slice at θ_s the weight w_s of its
+    quadrature along θ.
+
+    Args:
+        stiffness: UFL matrix C of shape (3, 3) in Voigt order (11, 22, 12 with 2 ε12), in Pa.
+        strain_of_u: UFL vector ε = (ε11, ε22, 2 ε12) of the trial function, or a constant strain.
+        v: Test function of two components.
+        weight: UFL scalar or number.
     """
     stress = stiffness * strain_of_u  # eq. 6: σ = C ε in Voigt order
     return weight * ufl.dot(stress, strain(v))
@@ -64,9 +71,13 @@ class CellForm:
         matrix.assemble()
 
     def load(self, uniform: Array) -> Array:
-        """Return the forces of a macroscopic strain ε̄, shape (3,), on this rank's nodes.
+        """Return the forces of a macroscopic strain on this rank's nodes, shape (2 nodes,).
 
-        They are the right-hand side of eq. 7 for each nodal displacement, shape (2 nodes,).
+        They are the right-hand side −∫ f_Θ C ε̄ : ε(v) of eq. 7 for each nodal displacement v: two
+        entries after another for each node. The stiffness C is the one that is set.
+
+        Args:
+            uniform: Macroscopic strain ε̄ = (ε11, ε22, 2 ε12), shape (3,).
         """
         self._uniform.value[:] = uniform
         return np.asarray(fem.assemble_vector(self._load).array)
@@ -88,9 +99,11 @@ class PointStrains:
         self._determinant = at_points(ufl.JacobianDeterminant(self._mesh), points)
 
     def __call__(self, displacement: Array) -> Array:
-        """Return (ε11, ε22, 2 ε12) of displacements of nodes, shape (cells, points, 3).
+        """Return (ε11, ε22, 2 ε12) at the points of each cell, shape (cells, points, 3).
 
-        `displacement` has the shape (nodes, 2) or (2 nodes,).
+        Args:
+            displacement: Displacements of this rank's nodes, shape (nodes, 2) or (2 nodes,), in
+                DOLFINx's order.
         """
         self._u.x.array[:] = displacement.ravel()
         values = np.asarray(self._strain.eval(self._mesh, self._cells))
@@ -106,11 +119,12 @@ def strain_products(strains: Array, weights: Array) -> Array:
     """Return the integral of ε_a ⊗ ε_b over each phase for all pairs of fields a, b.
 
     Args:
-        strains: Strains at n points, shape (n, 3, fields).
+        strains: Strains (ε11, ε22, 2 ε12) at n points, shape (n, 3, fields).
         weights: Quadrature weights of the points in each phase, shape (phases, n).
 
     Returns:
-        Products, shape (phases, 3, fields, 3, fields).
+        Products, shape (phases, 3, fields, 3, fields): components of ε_a, a, components of ε_b, b.
+        Without points they are zero.
     """
     fields = strains.shape[-1]
     flat = strains.reshape(-1, 3 * fields)
@@ -119,33 +133,42 @@ def strain_products(strains: Array, weights: Array) -> Array:
 
 
 def total_energy(products: Array, stiffness: Sequence[Array]) -> Array:
-    """Return the mean of σ_a : ε_b over all phases, shape (fields, fields), in Pa.
+    """Return the mean of σ_a : ε_b over all phases for all pairs of fields, in Pa.
 
     Args:
-        products: Result of `strain_products`.
-        stiffness: Stiffness of each phase, (3, 3), in Pa.
+        products: Means of products of two strains, shape (phases, 3, fields, 3, fields), with
+            components (11, 22, 12 with 2 ε12) of ε_a, a, components of ε_b, b.
+        stiffness: Stiffness of each phase in the same order of components, (3, 3), in Pa.
+
+    Returns:
+        Energies, shape (fields a, fields b), symmetric but for round-off.
     """
     return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), products))
 
 
 def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array) -> Array:
-    """Return the parts X ∂c/∂X of X = K, G of each phase in the three moduli c.
+    """Return the parts X ∂c/∂X of X = K, G of each phase in the three moduli c of the cell.
 
-    By Hill and Mandel's lemma they are the energies ε : C_X ε, where C_X is what X gives to the
-    stiffness of its phase.
+    By Hill and Mandel's lemma they are the energies ε : C_X ε over the squared macroscopic strain,
+    where C_X is what the bulk modulus K or the shear modulus G gives to the stiffness of its phase.
 
     Args:
-        products: Result of `strain_products` for fields under the loads.
-        phases: Materials.
-        loads: Macroscopic strains of the fields, `LOADS` or `THREE_LOADS`, shape (2 or 3, 3).
+        products: Means of products of two strains, shape (phases, 3, loads, 3, loads), under the
+            loads: components of ε_a, a, components of ε_b, b.
+        phases: Materials, in the order of the first axis of `products`. A phase with any stiffness
+            has all its energy in the place of G.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12): (s, s, 0), (0, 0, 2 s) and, if there are
+            three, (s, −s, 0), for any s; shape (2 or 3, 3).
 
     Returns:
-        Energies in C11 + C12, C11 − C12 and C33, shape (phases, 2, 3), in Pa; nan for C11 − C12
-        without the third load.
+        Energies, shape (phases, 2 for K and G, 3), in Pa, in C11 + C12, C11 − C12 and C33; NaN for
+        C11 − C12 without the third load.
     """
     parts = np.array([phase.stiffness_parts for phase in phases])
     energies = np.einsum("pxij,piaja->pxa", parts, products)
     moduli = np.full((*energies.shape[:-1], 3), np.nan)
-    columns = [0, 2, 1][: len(loads)]  # what the equibiaxial, shear and deviatoric load give
+    # The loads give C11 + C12, C33 and C11 − C12 in this order. The energy of (s, s, 0) is
+    # 2 s² (C11 + C12), and |load|² is 2 s²; so for the other two, as (2 s)² C33 and 4 s².
+    columns = [0, 2, 1][: len(loads)]
     moduli[..., columns] = energies / (loads**2).sum(axis=1)
     return moduli

@@ -20,15 +20,6 @@ from alphacut.rve.fenicsx import PETSc, option_is_used
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.theta_preconditioner import PREFIX, ThetaPreconditioner
 
-DEFAULTS = {
-    "ksp_type": "cg",
-    "ksp_rtol": "1e-8",
-    "ksp_norm_type": "unpreconditioned",
-    "pc_type": "python",
-}
-PRINTS = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
-"""Options that make PETSc print: to standard error if they have no value."""
-
 
 @dataclass(frozen=True)
 class SolverOptions:
@@ -44,10 +35,25 @@ class SolverOptions:
 
     @property
     def all(self) -> dict[str, str]:
-        """Everything that is put to PETSc."""
-        chosen = {**DEFAULTS, **self.environment, **self.overrides}
+        """Everything that is put to PETSc: values of options by their names without prefix.
+
+        The default solver (conjugate gradients to a relative residual of 1e-8, preconditioned along
+        θ) is overridden by the environment, and both by `overrides`. Options that print get
+        standard error as their value if they have none. Unless something else is said, iterations
+        end at 500 with the preconditioner along θ, and at 5000 with others.
+        """
+        defaults = {
+            "ksp_type": "cg",
+            "ksp_rtol": "1e-8",
+            "ksp_norm_type": "unpreconditioned",
+            "pc_type": "python",
+        }
+        chosen = defaults | dict(self.environment) | dict(self.overrides)
+        # Options that make PETSc print do so to standard error if they have no value: tables of
+        # results go to standard output.
+        prints = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
         for name, value in chosen.items():
-            if PRINTS.search(name) and not value:
+            if prints.search(name) and not value:
                 chosen[name] = "ascii:stderr"
         # The preconditioner along θ takes tens of iterations at most, others may take hundreds.
         max_iterations = 500 if chosen["pc_type"] == "python" else 5000
@@ -71,7 +77,14 @@ class SolverOptions:
 
 
 def require_petsc(petsc: object) -> None:
-    """Refuse what is no table of PETSc's options by their names without dash and prefix."""
+    """Raise unless `petsc` is a mapping of PETSc's options by their names without dash and prefix.
+
+    Values are not looked at, and whether PETSc knows the names turns out when it is set up.
+
+    Raises:
+        RefusedError: It is no mapping, or a name begins with a dash or with `rve_`. For a command
+            line such as "-ksp_type cg" the hint says what to write.
+    """
     allowed = 'a dict of options without dash and prefix, as {"ksp_type": "gmres"}'
     if not isinstance(petsc, Mapping):
         cure = ""
@@ -112,23 +125,27 @@ class Solutions:
 def krylov_solver(
     matrix: PETSc.Mat, options: SolverOptions, preconditioner: Callable[[], ThetaPreconditioner]
 ) -> PETSc.KSP:
-    """Return PETSc's Krylov solver of a reduced stiffness, set up.
+    """Return PETSc's Krylov solver of a reduced stiffness, set up for solving.
+
+    Its preconditioner is factorised. All ranks of the matrix must call.
 
     Args:
-        matrix: Symmetric positive definite matrix or operator.
-        options: The options.
+        matrix: Symmetric positive definite matrix or operator, with the two displacements of each
+            node one after another. The translations are set as its near null space.
+        options: The default solver and what overrides it.
         preconditioner: Function that makes the preconditioner along θ. It is called where the
             options do not name another one.
 
     Raises:
         RefusedError: PETSc refuses an option or its value, or does not use it.
-        ConvergenceError: A factorisation failed.
+        ConvergenceError: A factorisation failed though no option overrides the default.
     """
     PETSc.garbage_cleanup(matrix.comm)  # frees the solvers of earlier samples, on all ranks
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
-    # Multigrid takes the translations, which have almost no energy.
+    # Algebraic multigrid needs the displacements with almost no energy, which are translations:
+    # only one corner is held. Rotations are not periodic.
     translations = [matrix.createVecRight() for _ in range(2)]
     for component, vector in enumerate(translations):
         vector.array[component::2] = 1.0
@@ -146,15 +163,20 @@ def krylov_solver(
 def solve(
     ksp: PETSc.KSP, loads: Sequence[PETSc.Vec], guesses: Sequence[PETSc.Vec] = ()
 ) -> Solutions:
-    """Solve K x = f for each load.
+    """Solve K x = f for each load f.
 
     Where the vectors of the solver are n times as long as a load, n loads are solved at once:
-    divided by their norms, they stand one after another in a vector.
+    divided by their norms, they stand one after another in a vector. A load of zeros has the
+    solution zero.
 
     Args:
-        ksp: Solver of K, or of n times K.
-        loads: Right-hand sides f.
+        ksp: Solver of K, or of n times K. Its choice between a zero and another first guess is set.
+        loads: Right-hand sides f, at least one; their number is a multiple of n.
         guesses: First guess of each solution; zero if not given.
+
+    Returns:
+        A new vector for each load, the iterations for each load, and the largest |K x − f| over
+        |f|, which is computed anew from the solutions.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
@@ -176,6 +198,8 @@ def solve(
         ksp.solve(b, x)  # eq. 7: K U = F
         reason = ksp.getConvergedReason()
         count = ksp.getIterationNumber()
+        # PETSc's reasons are positive where the tolerance was reached. A direct solver of a
+        # singular matrix may report success with infinite values.
         if reason <= 0 or not np.isfinite(x.norm()):
             raise ConvergenceError(
                 f"{ksp.getType()} with {ksp.pc.getType()} stopped after {count}"
@@ -185,7 +209,8 @@ def solve(
         LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
         vectors += _split(x, loads[group], norms)
         iterations += together * [count]
-        # The residual of all loads together is at least that of each load, whose norm is 1.
+        # The residual of all loads together is at least that of each load, whose norm is 1. PETSc's
+        # own residual is a recursion, or one of the preconditioned system.
         residual = b.duplicate()
         matrix.mult(x, residual)
         residual.axpy(-1.0, b)
@@ -202,7 +227,13 @@ def _join(vectors: Sequence[PETSc.Vec], norms: Sequence[float], *, into: PETSc.V
 def _split(
     joined: PETSc.Vec, loads: Sequence[PETSc.Vec], norms: Sequence[float]
 ) -> list[PETSc.Vec]:
-    """Return the vectors that `_join` has joined, each in the layout of its load."""
+    """Return the vectors that stand one after another in a long vector, times their norms.
+
+    Args:
+        joined: Vector of n times the length of a load.
+        loads: n vectors, in whose layout over the ranks the new ones are made.
+        norms: Factor of each, shape (n,).
+    """
     vectors = [load.duplicate() for load in loads]
     parts = np.split(joined.array_r, len(vectors))
     for vector, part, norm in zip(vectors, parts, norms, strict=True):
@@ -212,13 +243,17 @@ def _split(
 
 @contextmanager
 def in_database(options: SolverOptions) -> Iterator[None]:
-    """Context with the options in PETSc's database, which is restored at its end.
+    """Put the options into PETSc's database for a `with` block, and restore it at the block's end.
 
-    What the environment gave stays there, unless an override has its place meanwhile.
+    Options that the environment gave stay there, unless an override has their place meanwhile.
+
+    Args:
+        options: The default solver, the options of the environment, and the overrides.
 
     Raises:
-        RefusedError: PETSc refuses an option, or has not used an override in the block.
-        ConvergenceError: PETSc fails though no option overrides the default.
+        RefusedError: PETSc raised an error in the block and there are overrides, or it has not used
+            one of the overrides in the block.
+        ConvergenceError: PETSc raised an error in the block though no option overrides the default.
     """
     database = PETSc.Options(PREFIX)
     environment = options.environment

@@ -54,13 +54,15 @@ class LayerConstraint:
         self.unknown = numbering.planar[plane_node]
 
     def displacements(self, unknowns: Array) -> Array:
-        """Return Q x_k of all layers.
+        """Return Q x_k of all layers k, where x_k are the unknowns that belong to the layer.
 
         Args:
-            unknowns: Unknowns of several fields, shape (fields, unknowns).
+            unknowns: Unknowns of several fields, shape (fields, unknowns), level by level: of level
+                0, of the mid-level above it, of level 1, and so on. At least one field.
 
         Returns:
-            Displacements of DOLFINx's nodes, shape (fields, layers, 2 nodes).
+            Displacements of DOLFINx's nodes on the slices, shape (fields, layers, 2 nodes), with
+            both components of a node after one another.
         """
         # The unknowns of a layer follow one another, and those of the level above it are also the
         # first ones of the next layer: x_k are overlapping windows of x.
@@ -70,18 +72,21 @@ class LayerConstraint:
         return np.array(products.getDenseArray().T).reshape(*windows.shape[:2], -1)
 
     def forces(self, on_slices: Array) -> Array:
-        """Return the sum of Qᵀ f_k over the layers.
+        """Return the sum of Qᵀ f_k over the layers k, the reduced forces.
 
         Args:
-            on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes).
+            on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes), with both
+                components of a node after one another.
 
         Returns:
-            Forces on the unknowns, shape (fields, unknowns).
+            Forces on the unknowns level by level, shape (fields, unknowns).
         """
         fields, layers, size = on_slices.shape
         products = self._transposed.matMult(columns(on_slices.reshape(-1, size)))
         by_layer = products.getDenseArray().T.reshape(fields, layers, -1)
         stride, level_size = self.numbering.stride, self.numbering.level_size
+        # A layer's forces are those on its lower level and its mid-level, one stride of unknowns,
+        # and then those on its upper level, which the next layer adds to.
         total = np.zeros((fields, layers + 1, stride))
         total[:, :-1] = by_layer[..., :stride]
         total[:, 1:, :level_size] += by_layer[..., stride:]
@@ -105,17 +110,23 @@ class BlockSum:
 
     @classmethod
     def of_parents(cls, pattern: sp.bsr_matrix, parents: Ints) -> BlockSum:
-        """Prepare the product with B, which is 1 from the parents of each node to that node.
+        """Prepare the product Bᵀ A B, for a matrix B of zeros and ones.
+
+        B has a one from each parent of a node to that node. A couples nodes, Bᵀ A B couples
+        parents. Each of its blocks is the sum of the blocks of A between all nodes with these two
+        parents.
 
         Args:
-            pattern: Pattern of A in blocks of 2 × 2.
-            parents: Numbers of pairs of unknowns, −1 for none, shape (nodes, parents).
+            pattern: Sparsity pattern of A in blocks of 2 × 2; its values are not used.
+            parents: Numbers of the pairs of unknowns that a node depends on, shape (nodes,
+                parents), −1 for none. At least one is not −1.
         """
         size = int(parents.max()) + 1
         node = _rows(pattern)
         row = parents[node][:, :, np.newaxis]
         column = parents[pattern.indices][:, np.newaxis, :]
         is_free = (row >= 0) & (column >= 0)
+        # Row and column as one number, so that sorted unique numbers are the CSR order.
         keys, place = np.unique((row * size + column)[is_free], return_inverse=True)
         num_blocks = len(pattern.indices)
         all_blocks = np.arange(num_blocks)[:, np.newaxis, np.newaxis]
@@ -183,10 +194,19 @@ class LayerPattern:
         return aij(sp.csr_matrix((values, self._indices, self._indptr), (size, size)))
 
     def level_blocks(self, blocks: Array) -> Iterator[sp.csr_matrix]:
-        """Yield the blocks of the hats of all levels, then of the bubbles of all mid-levels.
+        """Yield the diagonal blocks of the stiffness in the basis of the preconditioner.
+
+        First come the blocks of the piecewise linear hat functions of θ, one at each level, then
+        those of the quadratic bubble functions, one in each layer. A block is Bᵀ A B over the
+        layers where the function is not zero.
 
         Args:
-            blocks: Blocks of A_k of all layers, shape (layers, blocks, 4).
+            blocks: Blocks of 2 × 2 entries, row by row, of the matrices A_k of all layers, shape
+                (layers, blocks, 4).
+
+        Yields:
+            Matrix in CSR of all unknowns of a plane, or for bubbles of those of its vertices. The
+            arrays of indices are shared by all blocks of a kind.
         """
         # A level is the upper end of the layer below it and the lower end of the layer above it.
         lower = [self._lower_hats.entries(layer) for layer in blocks]
@@ -212,10 +232,14 @@ class LayerMatrix:
         self._layers = pattern.block_diagonal(blocks)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Set y to K x; called by PETSc.
+        """Set y to K x, with K = Σ Qᵀ A_k Q; called by PETSc.
 
         Several x may stand one after another in a vector. They are multiplied together, which takes
         little longer than one of them, since matrices are read once.
+
+        Args:
+            x: One or several vectors of unknowns, level by level.
+            y: Vector of the same length, which is overwritten.
         """
         constraint = self._pattern.constraint
         fields = x.array_r.reshape(-1, constraint.numbering.size)
@@ -230,14 +254,20 @@ class LayerMatrix:
 
 
 def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
-    """Return the matrix from nodal values of a layer of prisms to nodal values of its slices.
+    """Return the matrix from nodal values of a layer of prisms to nodal values on its slices.
 
-    Its rows are the nodes of one slice after another. Its columns are the nodes of the level below,
-    the vertices of the mid-level, and the nodes of the level above.
+    Along ζ a field is linear between the two levels, plus 4 ζ (1 − ζ) times what the value at the
+    mid-level differs from their mean. The mid-level has values at the vertices of the triangles
+    alone; at midpoints of edges they are the mean of the ends.
 
     Args:
-        plane: The plane mesh.
-        heights: Height ζ of each slice in the layer, from 0 to 1, shape (slices,).
+        plane: The plane mesh of six-node triangles, its vertices numbered first.
+        heights: Height ζ of each slice in the layer, from 0 at the level below to 1, shape
+            (slices,).
+
+    Returns:
+        Sparse matrix. Its rows are the nodes of one slice after another. Its columns are the nodes
+        of the level below, the vertices of the mid-level, and the nodes of the level above.
     """
     num_nodes, num_vertices = len(plane.points), plane.vertices
     midpoints = np.repeat(np.arange(num_nodes - num_vertices), 2)
@@ -252,7 +282,11 @@ def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
 
 
 def _periodicity(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Return the matrix from pairs of unknowns of a layer to its nodes, zero where one is held."""
+    """Return the matrix of ones from the pairs of unknowns of a layer to the nodes of its prisms.
+
+    Rows are the nodes of the level below, the vertices of the mid-level and the nodes of the level
+    above; a node that is held has no entry. Columns are the pairs of unknowns in the same order.
+    """
     planar = numbering.planar
     vertices = planar[: numbering.grid.plane.vertices]
     first_on_mid_level = numbering.level_size // 2
@@ -270,9 +304,10 @@ def _rows(pattern: sp.bsr_matrix) -> Ints:
 
 
 def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
-    """Return the CSR pattern of a block matrix.
+    """Return the CSR pattern of a matrix of blocks of 2 × 2.
 
-    Its values are the places of its entries in the array of the blocks, read in the order of C.
+    Its values are no entries but places: where each entry stands in the array of all blocks, of
+    shape (blocks, 2, 2), read in the order of C.
     """
     places = np.arange(pattern.data.size).reshape(-1, 2, 2)
     blocks = sp.bsr_matrix((places, pattern.indices, pattern.indptr), pattern.shape)

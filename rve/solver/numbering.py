@@ -55,7 +55,17 @@ class Elimination:
         self._scatter = PETSc.Scatter().create(vector, needed, self._values, None)
 
     def _zero_matrix(self, cells: Ints, rows: range) -> PETSc.Mat:
-        """Return zeros in this rank's rows of the pattern of all pairs that share a cell."""
+        """Return a PETSc matrix of zeros with entries for all pairs of unknowns that share a cell.
+
+        Args:
+            cells: Pairs of the nodes of all cells that touch this rank's rows, −1 where a node is
+                held, shape (cells, nodes of a cell).
+            rows: Unknowns of this rank, two for each pair.
+
+        Returns:
+            This rank's rows of the matrix, marked as symmetric positive definite. Entries at held
+            nodes are dropped when they are added by local numbers.
+        """
         num_pairs = self._sizes[1] // 2
         has_unknown = cells >= 0
         all_cells = np.arange(len(cells))[:, np.newaxis]
@@ -64,6 +74,7 @@ class Elimination:
         places = (cell, cells[has_unknown])
         cell_to_pair = sp.csr_matrix((ones, places), (len(cells), num_pairs))
         pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
+        # The product has an entry where two pairs share a cell. Its value is not used.
         neighbours = pair_to_cell @ cell_to_pair
         neighbours.sort_indices()
 
@@ -79,7 +90,12 @@ class Elimination:
         return matrix
 
     def forces(self, values: Array) -> PETSc.Vec:
-        """Return Pᵀ f of forces on this rank's nodes, shape (2 nodes,): partners are added."""
+        """Return the reduced forces Pᵀ f: forces on periodic partners and of ranks are added.
+
+        Args:
+            values: Forces on this rank's nodes, shape (2 nodes,), with both components of a node
+                after one another. Forces on held nodes are left out.
+        """
         vector = PETSc.Vec().createMPI(self._sizes, bsize=2, comm=self._map.comm)
         vector.setLGMap(self._map)
         nodes = np.arange(self._num_nodes, dtype=PETSc.IntType)
@@ -133,7 +149,11 @@ class LevelNumbering:
 
     @cached_property
     def pairs(self) -> Ints:
-        """Number p of each node's pair of displacements, −1 where it is held, shape (nodes,)."""
+        """Number of each node's pair of unknowns, −1 where it is held, shape (nodes,).
+
+        The pair p stands for the unknowns 2 p and 2 p + 1, the two displacements. Nodes are those
+        of the grid: of all levels, and then the vertices of all mid-levels.
+        """
         vertices = self.planar[: self.grid.plane.vertices]
         first_on_level = np.arange(self.grid.layers + 1)[:, np.newaxis] * (self.stride // 2)
         first_on_mid_level = first_on_level[:-1] + self.level_size // 2
@@ -142,14 +162,17 @@ class LevelNumbering:
         return np.concatenate([on_levels.ravel(), on_mid_levels.ravel()])
 
     def split(self, fields: NDArray[Number]) -> tuple[NDArray[Number], NDArray[Number]]:
-        """Return views of hats and bubbles of fields.
+        """Return the coefficients of hat and of bubble functions of θ as views of one array.
+
+        Hat functions are piecewise linear, one at each level; bubble functions are quadratic, one
+        in each layer, at the vertices of the triangles alone.
 
         Args:
             fields: Coefficients of the hats of all levels, then of the bubbles of all mid-levels,
                 shape (…, size).
 
         Returns:
-            Hats, shape (…, layers + 1, level_size), and bubbles, (…, layers, mid_level_size).
+            Hats, shape (…, layers + 1, level_size), and bubbles, shape (…, layers, mid_level_size).
         """
         layers = self.grid.layers
         first_bubble = (layers + 1) * self.level_size
@@ -158,15 +181,21 @@ class LevelNumbering:
         return hats, fields[..., first_bubble:].reshape(*shape, layers, -1)
 
     def nodal_values(self) -> sp.csr_matrix:
-        """Return the matrix from hats and bubbles, in the order of `split`, to nodal values.
+        """Return the matrix from coefficients of hats and bubbles along θ to nodal values.
 
-        The value on a level is its hat. That on a mid-level is its bubble and half of the hats
-        above and below.
+        The value on a level is its hat coefficient. That on a mid-level, half-way between two
+        levels, is its bubble coefficient and half of the hats above and below.
+
+        Returns:
+            Square sparse matrix. Its columns are the hats of all levels, then the bubbles of all
+            mid-levels. Its rows are the unknowns level by level: of level 0, of the mid-level above
+            it, of level 1, and so on.
         """
         layers = self.grid.layers
         vertices = np.arange(self.mid_level_size)
         hats, bubbles = self.split(np.arange(self.size))
         on_levels = np.arange(layers + 1)[:, np.newaxis] * self.stride + np.arange(self.level_size)
+        # The unknowns of vertices stand first on a level, so that hats at vertices are a slice.
         on_mid_levels = on_levels[:-1, :1] + self.level_size + vertices
         below = hats[:-1, : self.mid_level_size]
         above = hats[1:, : self.mid_level_size]

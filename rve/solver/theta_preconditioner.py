@@ -44,8 +44,6 @@ Fields = tuple[Array, Array]
 """Hats, shape (…, layers + 1, n), and bubbles, shape (…, layers, v), of n and v unknowns."""
 PREFIX = "rve_"
 """Prefix of PETSc options of the whole system."""
-LEVEL = "level_"
-"""Prefix, after `PREFIX`, of options of the levels' solvers."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +66,28 @@ class ThetaMass:
 
 
 def theta_mass(distribution: ThetaDistribution, levels: Array) -> ThetaMass:
-    """Return the masses along θ of hats at the levels and of bubbles between them.
+    """Return the masses along θ of hat functions at levels and of bubble functions between them.
+
+    A hat is linear in each layer, 1 at its level and 0 at all others. A bubble is 4 t (1 − t) in
+    its layer, with t from 0 to 1. A mass is the integral of the product of two of them times the
+    density of θ.
 
     Args:
-        distribution: Distribution of θ, whose density is the weight.
+        distribution: Distribution of θ, whose density is the weight; it must be positive at some
+            quadrature points of each layer, else the masses are singular.
         levels: θ of the levels, rising, shape (layers + 1,).
+
+    Returns:
+        Diagonals of the masses of hats and of bubbles, the symmetric M^-½ of the hats, G^-½ of the
+        bubbles made orthogonal to the hats, and the projection M⁻¹ M_hb of bubbles on hats.
+
+    Raises:
+        numpy.linalg.LinAlgError: The mass of the hats is singular.
     """
     layers = len(levels) - 1
-    points = 3  # of Gauss in a layer, exact for products of bubbles
+    # Three points of Gauss in a layer are exact for products of two bubbles, of degree 4, where the
+    # density is constant. They are those of the stiffness, so that both have the same error.
+    points = 3
     t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2
     shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat and bubble of a layer
     weights = level_rule(distribution, levels, points=points).weights.reshape(layers, points)
@@ -113,13 +125,26 @@ def precondition(
     residual: Fields,
     solve: Callable[[Array, Array], Fields],
 ) -> Fields:
-    """Return P⁻¹ r in hats and bubbles, by the formula at the head of this file.
+    """Apply the preconditioner to residuals in hat and bubble functions of θ.
+
+    With the masses M and G along θ, M⁻¹ M_hb = W, the injection J of linear into quadratic
+    triangles and the diagonal blocks K_k of the hats and K_b of the bubbles, over their masses, it
+    is
+
+        P⁻¹ = (M^-½ ⊗ 1) diag(K_k⁻¹) (M^-½ ⊗ 1) + Z J (G^-½ ⊗ 1) diag(K_b⁻¹) (G^-½ ⊗ 1) Jᵀ Zᵀ,
+
+    where Z = (−W; 1) makes bubbles orthogonal to the hats.
 
     Args:
         mass: Masses along θ.
-        injection: J from linear to quadratic triangles, shape (n, v).
-        residual: Hats and bubbles of r.
-        solve: Function that returns diag(K_k⁻¹) and diag(K_b⁻¹) times hats and bubbles.
+        injection: J, shape (n, v) for n unknowns of a plane and v of its vertices.
+        residual: Hats, shape (…, layers + 1, n), and bubbles, shape (…, layers, v), of the
+            residuals.
+        solve: Function that returns diag(K_k⁻¹) and diag(K_b⁻¹) times hats and bubbles of these
+            shapes. It is called once.
+
+    Returns:
+        Hats and bubbles of the corrections, in the shapes of `residual`.
     """
     hats, bubbles = residual
     hat_root = mass.inverse_root  # M^-½
@@ -154,16 +179,25 @@ class ThetaPreconditioner:
     def set_up(
         self, distribution: ThetaDistribution, blocks: Iterable[sp.csr_matrix]
     ) -> ThetaPreconditioner:
-        """Factorise the blocks of this rank's levels, then mid-levels; return the preconditioner.
+        """Factorise the blocks of this rank's levels, then of its mid-levels; return this object.
+
+        Factors of an earlier call are replaced; its symbolic factors are kept.
 
         Args:
-            distribution: Distribution of θ.
-            blocks: Diagonal blocks of the stiffness in hats and bubbles, with sorted indices. They
-                keep their pattern from one call to the next.
+            distribution: Distribution of the random number θ.
+            blocks: Diagonal blocks of the stiffness in hats (one at each level) and then in bubbles
+                (one in each layer) of θ, with sorted indices. They keep their pattern from one call
+                to the next.
+
+        Raises:
+            ValueError: There are more or fewer blocks than levels and mid-levels of this rank.
+            PETSc.Error: A block cannot be factorised.
         """
         numbering = self._numbering
         self._mass = theta_mass(distribution, numbering.grid.level_thetas(distribution))
-        masses = [*self._mass.hats[numbering.levels], *self._mass.bubbles[numbering.mid_levels]]
+        hat_masses = self._mass.hats[numbering.levels]
+        bubble_masses = self._mass.bubbles[numbering.mid_levels]
+        masses = np.concatenate([hat_masses, bubble_masses])
         for number, (block, mass) in enumerate(zip(blocks, masses, strict=True)):
             if number == len(self._solvers):
                 self._solvers.append(PlaneSolver(block))
@@ -171,9 +205,15 @@ class ThetaPreconditioner:
         return self
 
     def apply(self, _pc: PETSc.PC | None, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Set the result to P⁻¹ residual; called by PETSc.
+        """Set the result to P⁻¹ residual; called by PETSc, after `set_up`.
 
-        On one rank several residuals may stand one after another in a vector.
+        On one rank several residuals may stand one after another in a vector. On several ranks all
+        must call.
+
+        Args:
+            residual: Residuals in nodal values, level by level: unknowns of level 0, of the
+                mid-level above it, of level 1, and so on. This rank's part.
+            result: Vector of the same layout, which is overwritten.
         """
         numbering = self._numbering
         forces = self._gathered(residual.array_r).reshape(-1, numbering.size)
@@ -185,7 +225,16 @@ class ThetaPreconditioner:
         result.array[:] = values[numbering.rows.start : numbering.rows.stop].T.ravel()
 
     def _solve(self, hat_loads: Array, bubble_loads: Array) -> Fields:
-        """Return the solutions of all levels and mid-levels, of which each rank solves its own."""
+        """Solve the systems of all levels and mid-levels, of which each rank solves its own.
+
+        Args:
+            hat_loads: Right-hand sides of the hats, shape (loads, levels, unknowns of a plane).
+            bubble_loads: Right-hand sides of the bubbles, shape (loads, mid-levels, unknowns of
+                vertices).
+
+        Returns:
+            The solutions on all ranks, in the shapes of the right-hand sides.
+        """
         num_levels = len(self._numbering.levels)
         hats = self._solve_own(self._solvers[:num_levels], hat_loads, self._numbering.levels)
         bubbles = self._solve_own(
@@ -194,12 +243,15 @@ class ThetaPreconditioner:
         return hats, bubbles
 
     def _solve_own(self, solvers: Sequence[PlaneSolver], loads: Array, levels: range) -> Array:
-        """Return the solutions of all ranks, each by its solvers of its levels.
+        """Solve the systems of this rank's levels, and return the solutions of all ranks.
 
         Args:
             solvers: Solver of each of this rank's levels.
             loads: Right-hand sides, shape (fields, all levels, unknowns of a level).
-            levels: This rank's levels.
+            levels: This rank's levels, as many as solvers; the ranks have theirs one after another.
+
+        Returns:
+            Solutions on all levels, in the shape of `loads`.
         """
         solutions = np.empty((len(loads), len(levels), loads.shape[-1]))
         for k, (solver, level) in enumerate(zip(solvers, levels, strict=True)):
@@ -213,7 +265,11 @@ class ThetaPreconditioner:
         return np.concatenate(self._comm.allgather(part), axis=axis)
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        """Print the number of levels and the first one's solver, for ``-rve_ksp_view``."""
+        """Print the number of levels and the first one's solver, for ``-rve_ksp_view``.
+
+        Args:
+            viewer: PETSc's viewer of all ranks. Rank 0, which has level 0, prints its solver.
+        """
         levels = self._numbering.levels
         mid_levels = self._numbering.mid_levels
         count = f"{len(levels)} levels and {len(mid_levels)} mid-levels on the first rank"
@@ -236,7 +292,7 @@ class PlaneSolver:
         self._values = np.ones(pattern.nnz)  # PETSc's matrix has its values in this array
         csr = self._values, pattern.indices, pattern.indptr
         self._matrix = aij(sp.csr_matrix(csr, pattern.shape))
-        self.ksp = cholesky(self._matrix, PREFIX + LEVEL)
+        self.ksp = cholesky(self._matrix, PREFIX + "level_")
 
     def factorise(self, values: Array) -> None:
         """Factorise the matrix of the pattern with these values, in the order of CSR."""
@@ -254,16 +310,23 @@ class PlaneSolver:
 
 
 def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
-    """Yield the diagonal blocks of this rank's levels, then of its mid-levels, in hats and bubbles.
+    """Yield the diagonal blocks of a stiffness in hat and bubble functions of θ, for this rank.
 
-    Their indices are sorted.
+    First come the blocks of the hats at this rank's levels, then those of the bubbles at its
+    mid-levels. A block is Tᵀ K T for the nodal values T of one function at all nodes of a plane.
+    All ranks must take their first block together.
 
     Args:
-        matrix: Assembled reduced stiffness.
+        matrix: Assembled reduced stiffness K, with the unknowns level by level.
         numbering: Numbering of its unknowns.
+
+    Yields:
+        Sparse matrix with sorted indices, of the unknowns of a level or, for bubbles, of those of
+        its vertices.
     """
     # A hat has half of its value on the mid-level below too. Below the first level of this rank
     # that mid-level belongs to another rank, so that its unknowns are taken as well.
+    # The submatrix on this rank alone then has all entries of its products Tᵀ K T.
     rows = numbering.rows
     first = max(0, rows.start - numbering.mid_level_size)
     size = rows.stop - first
@@ -280,9 +343,14 @@ def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.cs
 
 
 def injection(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Return the matrix J from linear to quadratic triangles.
+    """Return the matrix J from displacements of vertices to those of all nodes of triangles.
 
-    A midpoint gets the mean of the vertices of its edge.
+    A vertex keeps its own displacement, a midpoint gets the mean of the vertices of its edge, where
+    a held vertex counts as zero.
+
+    Returns:
+        Sparse matrix from the unknowns of the vertices of a plane to those of all its nodes, two at
+        each.
     """
     ends = interpolated_vertices(numbering)
     node, end = np.nonzero(ends >= 0)  # not of fixed vertices
@@ -293,9 +361,11 @@ def injection(numbering: LevelNumbering) -> sp.csr_matrix:
 
 
 def interpolated_vertices(numbering: LevelNumbering) -> Ints:
-    """Return the two vertices whose mean each free node of a plane gets, −1 for a fixed one.
+    """Return the two vertices whose mean each free node of a plane gets, shape (free nodes, 2).
 
-    Shape (nodes, 2), in numbers of the unknown pairs. A vertex has itself twice.
+    Vertices and nodes are given by the numbers of their pairs of unknowns, under which vertices
+    come first. A vertex has itself twice, a midpoint of an edge the two ends of the edge, and −1
+    stands for an end that is held.
     """
     plane = numbering.grid.plane
     unknown = numbering.planar
