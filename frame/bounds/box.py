@@ -26,10 +26,6 @@ from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 
-MAX_ENTRIES = 400_000
-"""Entries of the matrices of all points whose exact responses are computed together, which limits
-the memory."""
-
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -129,9 +125,11 @@ class Box:
         """
         value = np.empty(len(unit))
         error = np.empty(len(unit))
-        # Equal points are computed together.
+        # Entries of the matrices of all points of a chunk: 3 MB, tuned to limit the memory.
+        max_entries = 400_000
+        # Equal points stand side by side, so that they come into one chunk.
         by_point = np.unique(unit, axis=0, return_inverse=True)[1].argsort()
-        points_at_once = max(MAX_ENTRIES // self.structure.unknowns**2, 1)
+        points_at_once = max(max_entries // self.structure.unknowns**2, 1)
         for rows in np.array_split(by_point, -(-len(unit) // points_at_once)):
             points, point = np.unique(unit[rows], axis=0, return_inverse=True)
             modes = self._modes(points)

@@ -214,10 +214,12 @@ class Hull:
             notes: Sentences for the reader of the envelope.
 
         Returns:
-            Lower and upper bounds of each output q at all levels and time nodes; their `error` is
-            the distance of a bound from the attained value, the larger one of both sides. The facts
-            "gap" and "gap_of_peaks" are the largest errors in comparison with the scale of
-            tolerances and with the peaks.
+            Lower and upper bounds of each output q at all levels and time nodes, `inner` bounds
+            that trajectories attain, bounds of how far outputs leave straight lines `between` the
+            nodes, and of the smallest max |q| over time (`least_peaks`). `error` is the distance of
+            a bound from the attained value, the larger one of both sides. The facts "gap" and
+            "gap_of_peaks" are the largest errors in comparison with the scale of tolerances and
+            with the peaks.
 
         Raises:
             FailedError: An attained value exceeds a guaranteed bound or is NaN, so the proof is

@@ -42,8 +42,6 @@ from alphacut.fuzzy.sets.boxes import chebyshev_points
 
 LOWER, UPPER = -1, -2
 """Positions along an axis of a sub-box that is confined to an end of the whole box."""
-MAX_ITEMS = 30_000
-"""Items that a thread examines together on average, which limits the memory."""
 
 
 def bound_problems(
@@ -80,6 +78,8 @@ def bound_problems(
         Guaranteed upper bounds, shape (N,), and the number of examined items, each a sub-box with a
         problem.
     """
+    # Items that a thread examines together on average, tuned to limit the memory.
+    max_items = 30_000
     n_problems = len(optima.value)
     remainder = remainder_bounds(model, lower, upper)
     frontier = Frontier.whole_box(lower, upper, n_problems)
@@ -91,7 +91,7 @@ def bound_problems(
             is_undivided = examined == 0
             examined += len(frontier)
             examine_piece = partial(examine_items, model, remainder, optima.value + gap, frontier)
-            pieces = pool.map(examine_piece, frontier.pieces(MAX_ITEMS))
+            pieces = pool.map(examine_piece, frontier.pieces(max_items))
             found = _joined(list(pieces))
             if is_undivided:
                 undivided = found.bound
@@ -101,7 +101,7 @@ def bound_problems(
                 progress(1 - len(np.unique(frontier.problem)) / n_problems)
     bound = np.minimum(optima.value + gap, undivided)
     # Sub-boxes that are still open keep their own bounds.
-    for piece in frontier.pieces(MAX_ITEMS):
+    for piece in frontier.pieces(max_items):
         found = examine_items(model, remainder, optima.value + gap, frontier, piece)
         np.maximum.at(bound, frontier.problem[piece.items], found.bound)
     return bound, examined

@@ -26,8 +26,6 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 
 MIN_DEGREE, MAX_DEGREE = 4, 10
 """Degrees of the series that are tried; boxes that are too wide for the highest are bisected."""
-MAX_KEPT = 8_000_000
-"""Most numbers in all enclosures that are kept: 64 MB; one of 12 inputs takes half a million."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +171,9 @@ def narrowest_block(
                 break  # sums of coefficients over all degrees are too large; more only add to them
             if found is not None and found.relative_error < tolerance:
                 break
-        while sum(x.size() for x in KEPT.values()) > MAX_KEPT:
+        # All together have 64 MB at most, tuned: an enclosure of 12 inputs takes a sixteenth of it.
+        max_kept = 8_000_000
+        while sum(x.size() for x in KEPT.values()) > max_kept:
             del KEPT[next(iter(KEPT))]
     return found if found is not None and found.relative_error < largest_error else None
 
@@ -511,12 +511,14 @@ class SolutionBounds:
     def solution_bounds(self, right: Array) -> Array:
         """Return bounds of |y| for all solutions of A y = r, over a box of symmetric matrices A.
 
+        One of the two prepared bounds of A⁻¹ must exist at least (`is_regular`); else entries of
+        the result are infinite or NaN.
+
         Args:
-            right: Bound of |r|, shape (n,), not negative.
+            right: Bound of |r|, shape (n,), finite and not negative.
 
         Returns:
-            Shape (n,); all infinite where neither prepared bound of A⁻¹ exists and a diagonal entry
-            of A may be zero.
+            Shape (n,), finite.
         """
         y: Array = np.full(len(right), np.inf)
         if self.min_eigenvalue > 0:

@@ -27,9 +27,6 @@ from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.records.history import SAME_TIME, History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 
-MAX_ENTRIES = 1_000_000
-"""Complex numbers that are held at once; more are computed in batches."""
-
 
 class Pieces(NamedTuple):
     """P segments of time in which a load is, but for a bound, a straight line.
@@ -112,6 +109,7 @@ class Response(NamedTuple):
         omega = self.sigma.imag
         deviations = line_deviations(self.sigma, self.load, time, (self.order,))
         of_modulus, of_imaginary = deviations[self.order]
+        # At least max |κ|, though the largest |Re κ| and |Im κ| may be at different points.
         modulus = np.hypot(real, np.abs(kappa.imag).max((1, 2)) + imag_error)
         omega_imag = np.abs(kappa.imag * omega).max((1, 2)) + omega.max() * imag_error
         by_parts = np.outer(of_modulus, real) + np.outer(of_imaginary, omega_imag)
@@ -153,6 +151,7 @@ class Response(NamedTuple):
         if self.sigma is None:
             assert self.load is not None
             return self._range_of_load(chords.deviations(self.load.values(nodes)[:, None]))
+        # All nodes of a step share its bound; the last node is the end of a chord, where G is 0.
         fourth = np.append(np.repeat(self._fourth_off_chords(nodes[::parts]), parts), 0.0)
         return self._range_off(chords, nodes, fourth=fourth)
 
@@ -176,6 +175,7 @@ class Response(NamedTuple):
             return low[0], high[0]
         decay = float(-self.sigma.real.max())
         fast = float(np.abs(self.sigma).max())
+        # The fourth derivative of a change is at most the sum of those at both times.
         fourth = fourth_derivative(self.order, fast, moments_of(decay, self.load, nodes))
         # chords of length zero at the first time, so that deviations from them are changes
         to_first = Chords(np.zeros(2, int), np.zeros(2, int), np.zeros(2))
@@ -249,7 +249,10 @@ class Response(NamedTuple):
         force = 0.0
         if self.load:
             force = self.load.extremes[0]
-        # moments at the beginnings of the steps, then bounds of them within the steps
+        # Moments ∫ τⁿ |f| at the beginnings of the steps, then bounds of them within the steps. A
+        # time h later each τ has become τ + h, of which the binomial theorem gives the powers, and
+        # the force in the step has added at most max |f| ∫₀ʰ τⁿ dτ. Higher moments are updated
+        # first, since they need the lower ones at the beginning.
         moments = moments_of(decay, self.load, time)[:, :-1]
         for n in reversed(range(5)):
             carried = sum(comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
@@ -335,6 +338,7 @@ def narrowed_deviation(
     at_added, between_added = _at_and_between_added(responses, time, substeps)
     # no step ends at the first node
     narrowed = np.vstack([np.zeros(at_added.shape[1]), at_added + between_added])
+    # Both bounds hold. An overflow may make the second one NaN, which `fmin` passes over.
     return np.fmin(bound, narrowed + unresolved)
 
 
@@ -399,6 +403,7 @@ def _at_and_between_added(
         high = high + upper
         size += np.maximum(np.abs(lower), np.abs(upper))
         deviation += response.line_deviation(nodes)
+    # A sum of n numbers is rounded by at most n u times the sum of their magnitudes.
     off = np.maximum(-low, high) + len(responses) * UNIT_ROUNDOFF * size
     by_step = (*inside.shape, -1)
     return off[:-1].reshape(by_step).max(1), deviation[1:].reshape(by_step).max(1)
@@ -421,6 +426,8 @@ def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array
     """
     if load is not None:
         return responses_at_nodes(sigma, load, time, 2)
+    # ∂ⁿ exp(σ t)/∂σⁿ = tⁿ exp(σ t). The rounding of σ t shifts exp(σ t) by |σ| t u, relative to
+    # its magnitude; the exponential and the product have 4 roundings of their own at most.
     rho = np.exp(sigma * time[:, None]) * time[:, None] ** np.arange(3)[:, None, None]
     return rho, UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(rho[0])
 
@@ -449,6 +456,8 @@ def fourth_derivative(order: int, fast: float, moments: Array) -> Array:
         fast: Bound of |σ|, in 1/s.
         moments: Bounds of the derivatives of ρ by σ of orders 0 to 4 at T times, shape (5, T).
     """
+    # Σ_j C(4, j) (σ^order)^(j) ρ^(4 − j), where the j-th derivative of the power is
+    # order!/(order − j)! σ^(order − j), and zero for j > order.
     total = 0.0
     for j in range(order + 1):
         of_power = comb(4, j) * perm(order, j) * fast ** (order - j)
@@ -466,6 +475,9 @@ def _between_points(sigma: Array) -> float:
         sigma: Points of the grid, shape (Q, W); row by row of q, with ω along each row, in any
             order. A grid of one point gives 0.
     """
+    # Linear interpolation along an axis of length h errs by h²/8 times the second derivative along
+    # it. Since σ = (−q + i) ω is linear in ω and in q, this is |F″| |dσ/dω|² = |F″| (1 + q²), and
+    # |F″| |dσ/dq|² = |F″| ω²; the error along both axes is at most the sum.
     omega = sigma[0].imag
     quotient = -sigma[:, 0].real / sigma[:, 0].imag
     h_omega = float(np.diff(np.sort(omega)).max(initial=0.0))
@@ -475,8 +487,11 @@ def _between_points(sigma: Array) -> float:
 
 
 def _batches(nodes: int, points: int) -> list[slice]:
-    """Return slices of points of σ whose responses at all nodes fit in `MAX_ENTRIES` numbers."""
-    size = max(MAX_ENTRIES // (3 * nodes), 1)
+    """Return slices of points of σ whose responses at all nodes fit in a million numbers."""
+    # A complex number takes 16 bytes, and a response has two derivatives: 16 MB, which is tuned to
+    # limit the memory.
+    max_entries = 1_000_000
+    size = max(max_entries // (3 * nodes), 1)
     return [slice(first, first + size) for first in range(0, points, size)]
 
 
@@ -667,6 +682,7 @@ def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
         first: a of P segments of time, shape (P,).
         slope: b of P segments, shape (P,).
     """
+    # (1/σ^m)′ = −m/σ^(m + 1)
     by_order = [
         [1 / sigma, 1 / sigma**2],
         [-1 * (1 / sigma**2), -2 * (1 / sigma**3)],
@@ -696,10 +712,12 @@ def with_power(sigma: Array, rho: Array, order: int) -> Array:
     Args:
         sigma: Exponents, shape (S,).
         rho: ρ and its first two derivatives by σ, shape (3, T, S). Returned itself if `order` is 0.
-        order: 0 or more.
+        order: 0, 1 or 2, a derivative by time; the second derivative is wrong for higher ones.
     """
     if order == 0:
         return rho
+    # The product rule, with the derivatives n σ^(n − 1) and n (n − 1) σ^(n − 2) of σ^n, of which
+    # the last one is 0 for n = 1 and 2 for n = 2.
     power = sigma**order
     first = order * sigma ** max(order - 1, 0)
     second = order * (order - 1) * rho[0] + 2 * first * rho[1] + power * rho[2]

@@ -40,14 +40,10 @@ from alphacut.frame.records.history import Accelerogram, History
 parallel = kernel(parallel=True)
 PARALLEL_LOOP = Lock()
 """Held by a thread inside a parallel loop: not all threading layers of Numba allow two at once."""
-SAME_TIME = 4 * UNIT_ROUNDOFF
-"""Distance of two times, as a fraction of the last node's time, that is rounding alone."""
 FROM_RECURRENCE = 2.0
 """|z| from which the recurrence is used. It amplifies rounding by 3!/2³ there, the series by e²."""
 MAX_PHASE = 1e8
 """Largest |σ h|: beyond, the rounding of the phase σ h alone passes 1e-8."""
-MAX_GROWTH = 700.0
-"""Largest Re σ t: exp(709.8) is the largest floating-point number."""
 ERROR_OF_INTEGRALS = 12.0
 """Bound of the error of φ_n at small |z| and Re z ≤ 0, in units of u / (n + 1); tests reach 6."""
 
@@ -102,7 +98,8 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
     # so many intervals without load are set in front, up to the load's start
     before = ceil(history.start / step)
     time = time + (before * step - history.start)
-    same = SAME_TIME * float(time[-1])
+    # Two times that are sums and products of given ones differ by a few roundings of the last one.
+    same = 4 * UNIT_ROUNDOFF * float(time[-1])
     interval = ((time + same) / step).astype(np.int64)
     count = int(interval[-1]) + 1
     tail = 0.0
@@ -122,6 +119,7 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
     offset[order] = np.cumsum(is_new) - 1
     offsets = since[order][is_new]
     offsets[offsets <= same] = 0.0
+    # A node is moved to the offset that it shares with others, by what they differ by.
     time_rounding = np.abs(since - offsets[offset]) + UNIT_ROUNDOFF * time
     return LinearPieces(first[:count], last[:count], step, interval, offsets, offset, time_rounding)
 
@@ -180,7 +178,7 @@ def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Arra
             largest = max(abs(a), abs(b))
             growth = max(decay_factor, 1.0)
             area = x * (abs(a) + abs(b)) / 2
-            if a * b < 0:  # two triangles
+            if a * b < 0:  # a line through zero encloses two triangles, a²/2 and b²/2 over |slope|
                 area = x * (a * a + b * b) / (2 * (abs(a) + abs(b)))
             is_long = decay * x > 1
             tail = largest / decay
@@ -285,17 +283,18 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
     Args:
         sigma: Exponents σ in 1/s, of any shape; none of them passes.
         step: Length of the intervals of the load, in s: |σ| step may be at most `MAX_PHASE` = 1e8.
-        duration: Time over which ρ may grow, in s: Re σ duration may be at most `MAX_GROWTH` = 700.
+        duration: Time over which ρ may grow, in s: Re σ duration may be at most 700.
 
     Raises:
         UnprovedError: An exponent exceeds one of both limits, or is NaN.
     """
     phase = float(np.abs(sigma).max(initial=0.0)) * step
     growth = float(sigma.real.max(initial=-np.inf)) * duration
-    if not (phase <= MAX_PHASE and growth <= MAX_GROWTH):
+    max_growth = 700.0  # exp(709.8) is the largest floating-point number
+    if not (phase <= MAX_PHASE and growth <= max_growth):
         raise UnprovedError(
             f"a motion turns by {phase:.3g} rad within {step:g} s and grows by exp({growth:.3g})"
-            f" within {duration:g} s; allowed: {MAX_PHASE:g} rad, exp({MAX_GROWTH:g})",
+            f" within {duration:g} s; allowed: {MAX_PHASE:g} rad, exp({max_growth:g})",
             "take a shorter step of the record, or less stiff members",
         )
 
@@ -509,6 +508,7 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
     if abs(z) < FROM_RECURRENCE:
         # 26 terms of the power series: for |z| ≤ 2 the remainder is below 2²⁶/26! = 2e-19
         for n in range(4):
+            # Σ_k z^k / (k! (n + 1 + k)), without the division by |z| of the recurrence
             term = 1.0 + 0.0j
             total = term / (n + 1)
             for k in range(1, 26):

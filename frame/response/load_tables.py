@@ -232,7 +232,8 @@ def _responses(
                 h = h * x + g
                 g = g * x + f
                 f = f * x + moment[end, i]
-            # what earlier windows left goes on freely: exp(λ τ) R, and its derivatives by λ
+            # What earlier windows left goes on freely: exp(λ τ) R, and its derivatives by λ. The
+            # series is one in x = (λ − middle)/scale, so that each derivative divides it by scale.
             propagator = np.exp(rate[p] * tau)
             f += propagator * R
             g = g / scale + propagator * (slope + tau * R)

@@ -194,7 +194,9 @@ class Oscillators:
         value = read_response(source, sigma, G[0])
         if direct.any():
             value += direct[:, None]
-        # rounding of σ^ν ρ, then of the part of it that is the response; the largest over the grid
+        # Rounding of σ^ν ρ, then of the part of it that is the response; the largest over the grid.
+        # |Im G/ω| errs by at most the error of G over the smallest ω, and Re G + q Im G by 1 + q
+        # times the error of G.
         magnitudes = np.abs(G).max(-1)
         rounding = float(np.abs(sigma).max()) ** order * table.rounding.max(-1)
         rounding += 2 * (order + 3) * UNIT_ROUNDOFF * magnitudes[0]
@@ -285,6 +287,9 @@ class Oscillators:
         Args:
             source: Name of a load or force, "velocity" or "start" (initial displacements).
             order: Order of the derivative by time, among those given at the construction.
+
+        Raises:
+            KeyError: `order` is none of these.
         """
         deviation = self._line_deviation(source, order)
         if not is_fed_through(source, order):
@@ -355,16 +360,18 @@ def response_ranges(
 ) -> dict[int, Ranges]:
     """Return ranges of λ^κ e over all oscillators with ω and g/ω in given ranges, at time nodes.
 
-    e is the response of an oscillator with σ = −g + iω and λ = |σ|² to a unit of a source.
-    Frequencies are divided into pieces, and each piece into a table if that is not too large.
+    e is the response of an oscillator with σ = −g + iω and λ = |σ|² to a unit of a source,
+    differentiated ν times by time. With G = σ^ν ρ, ρ the Duhamel integral of the source's load or
+    exp(σ t), e is −Im G/ω for "load" (the ground), Im G/ω for "force1", …, (plus the force itself
+    if ν = 2) and for "velocity", and Re G + (g/ω) Im G for "start" (initial displacements).
 
     Args:
         omega: Smallest and largest frequency ω > 0, in rad/s.
         quotient: Smallest and largest g/ω ≥ 0.
         loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
-        sources: "load" (the ground), "force1", …, "velocity", "start" (initial displacements).
-        orders: Orders of the derivatives of e by time.
+        sources: Names of the sources.
+        orders: Orders ν of the derivatives of e by time, from 0 to 2.
 
     Returns:
         For each order `low` and `high`, bounds of λ^κ e for κ = 0, ½, 1, and `line_deviation`,
@@ -430,7 +437,7 @@ def _widen_by_piece(
         if source in loads:
             rho_in_step = np.maximum(rho_in_step + step * loads[source].extremes[0], rho)
         for order, ranges in found.items():
-            # |e| ≤ factor |ρ|
+            # |e| ≤ factor |ρ|, as e is Im(σ^ν ρ)/ω, or Re(σ^ν ρ) + q Im(σ^ν ρ) of a start
             if source == "start":
                 factor = largest_sigma**order * (1 + quotient[1])
             else:
@@ -438,6 +445,7 @@ def _widen_by_piece(
             direct = np.abs(feedthrough(source, loads, order, time))
             high = scale * (factor * rho + direct)
             low = -high
+            # A response of at most r in the step is no farther than 2 r from its chord.
             deviation = 2 * scale * factor * rho_in_step
             if tables and source in loads:
                 table = tables.responses(source, order)
@@ -505,6 +513,8 @@ def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array
     high = np.maximum(high[:, 1:], high[:, :-1])
     min_factor = factor.min(0)[:-1]
     max_factor = factor.max(0)[1:]
+    # A product with a positive factor is smallest at one end of the factor's range, which end
+    # depends on the sign of `low`.
     bottom = np.minimum(low * min_factor, low * max_factor)
     top = np.maximum(high * min_factor, high * max_factor)
     return bottom.min(1), top.max(1)
