@@ -21,21 +21,25 @@ from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 from alphacut.frame.records.units import acceleration_factor
 
+# A FORTRAN format such as (8f10.6). Its groups are the numbers in a line (8; empty for one) and the
+# characters of each (10). The decimals do not matter, since samples are written with their points.
 FORTRAN = r"\(\s*(\d*)\s*[A-Za-z](\d+)(?:\.\d+\w*)?\s*\)"
-"""Numbers in a line and characters of one, as in (8f10.6)."""
+# The line of COSMOS above the samples. Its groups are 1 the count of samples, 2 the duration in s,
+# 3 the unit, 4 the numbers in a line, and 5 the characters of a number. Only accelerations match:
+# the same file repeats the channel as velocity and as displacement.
 DATA = re.compile(
     r"\s*(\d+)\s+acc\w*\s+(?:pts|points),?\s+approx\s+(\d+)\s+secs?,\s*units\s*=\s*([^,(]+?)\s*"
     rf"(?:\(\s*\d+\s*\))?\s*,?\s*Format\s*=\s*{FORTRAN}.*",
     re.IGNORECASE,
 )
-"""Line of COSMOS above samples: their count, duration in s, unit, and format."""
+# The line of COSMOS above the real header. Its groups are 1 the count of numbers, 2 the count of
+# lines, 3 the numbers in a line, and 4 the characters of a number.
 REALS = re.compile(
     rf"\s*(\d+)\s+Real-header values follow on\s+(\d+)\s+lines\s*,?\s*Format\s*=\s*{FORTRAN}.*",
     re.IGNORECASE,
 )
-"""Line of COSMOS above the real header: its count of numbers and lines, and their format."""
+# The first line of a channel of CSMIP; the group is "UN" or None.
 TITLE = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*", re.IGNORECASE)
-"""First line of a channel of CSMIP."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +67,25 @@ def is_cosmos(file: TextFile) -> bool:
 def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:
     """Return the recording of one channel of a file of COSMOS or CSMIP.
 
+    A file is one of COSMOS if any of its lines announces samples as COSMOS does ("4000 acceleration
+    pts, approx 20 secs, units=cm/sec2, Format=(8f10.6)"). Otherwise it must be one of CSMIP, whose
+    first line is the title "CORRECTED ACCELEROGRAM" or "UNCORRECTED ACCELEROGRAM"; the caller has
+    checked this with `is_cosmos`.
+
     Args:
         file: The file.
-        channel: Number, orientation or code of the channel, as "1", "90 deg" or "HNE"; of several
-            one must be named.
-        unit: Unit that the case states, for a file that states none.
+        channel: Number, orientation or code of the channel, as "1", "90 deg" or "HNE", in any
+            capitals. It may be empty if the file has one channel of acceleration.
+        unit: Unit of acceleration that the case states, as "g". It counts only for a file of CSMIP
+            that states none.
+
+    Returns:
+        The recording, with samples in m/s².
 
     Raises:
-        RefusedError: There is no such channel, its head is not understood, or it does not agree
-            with the samples.
+        RefusedError: There is no such channel, or the channel is not named and there are several;
+            the head of the channel is not understood, or it does not agree with the samples; or no
+            unit of acceleration is stated.
     """
     channels = [*_cosmos_channels(file)]
     read = _read_cosmos
@@ -84,7 +98,19 @@ def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:
 
 
 def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
-    """Yield channels of acceleration, not of velocity and displacement, in the file's order."""
+    """Yield the channels of acceleration of a file of COSMOS, in its order.
+
+    The series of velocities and displacements of the same channels are passed over. A file without
+    a line that announces accelerations yields nothing.
+
+    Yields:
+        For each series: `names` in small letters without repetition, of number ("1") and
+        orientation ("90 deg") in the last line "Sta Chan 1: 90 deg" above it, and of the code
+        ("hne") in the first line "End-of-data for Chan HNE acceleration" below it; those that the
+        file does not state are missing. `line`, the line that announces the samples, and `reals`,
+        the last line above it that announces a real header, both counted from 0; `reals` is -1 if
+        there is none.
+    """
     reals = -1
     names: list[str] = []
     channel = r".*\bSta\s+Chan\s*(\w+)\s*:\s*(.*?)\s*(?:\(|Location|$).*"
@@ -97,16 +123,29 @@ def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
         elif DATA.match(line):
             below = [text for text in file.lines[row:] if "acc" in text.lower()]
             codes = [match[1].lower() for x in below if (match := re.match(code_line, x, re.I))]
+            # A dictionary keeps the order, in which a message lists the names, and leaves repeated
+            # ones out.
             unique = dict.fromkeys(name for name in (*names, *codes[:1]) if name)
             yield _Channel(tuple(unique), row, reals=reals)
 
 
 def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
-    """Return the recording of a channel of COSMOS; `unit` is not needed, for each states its own.
+    """Return the recording of one channel of a file of COSMOS.
+
+    Args:
+        file: The file.
+        channel: The channel. Its `line` is the index of the line that announces the samples, with
+            their count, duration, unit and format; its `reals` is the index of the line above the
+            real header.
+        unit: Not used, since each channel states its own unit.
+
+    Returns:
+        The recording, with samples in m/s² and the step in s.
 
     Raises:
-        RefusedError: The real header is missing or its steps do not agree with the duration, or
-            samples are missing.
+        RefusedError: The real header is missing or its steps do not agree with the duration;
+            samples are missing or are no numbers; the unit is none of accelerations; or the peak of
+            the samples is not the peak that the header states.
     """
     match = DATA.fullmatch(file.lines[channel.line])
     assert match is not None
@@ -116,13 +155,15 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     unit = match[3].rstrip(".")
     header = _real_header(file, channel.reals)
     first = channel.line + 1
+    # The first line tells how many samples stand in a line: files exist whose format says another
+    # number of them. A count of 0 is taken as 1 by `fixed_columns`.
     line_of_samples = file.lines[first].rstrip() if first < len(file.lines) else ""
     per_line = len(line_of_samples) // max(width, 1)
     samples = file.fixed_columns(
         first, count=count, per_line=per_line, width=width, head=channel.line
     )
     stated = []
-    peak = float(header[63])
+    peak = float(header[63])  # entry 64 of the format's description, which counts from 1
     to_si = acceleration_factor(unit)
     if peak != -999 and to_si is not None:  # -999 stands for an entry that is not known
         stated.append(StatedPeak(to_si * abs(peak)))
@@ -138,14 +179,26 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     )
 
 
+# The allowed value in messages on the header; its entries are counted from 1.
 HEADER_WORDS = "a real header whose entry 62 or 34 agrees with the duration"
 
 
 def _real_header(file: TextFile, line: int) -> Array:
-    """Return the entries of the real header below a line, followed by 64 zeros.
+    """Return the numbers of the real header of a channel of COSMOS, followed by 64 zeros.
+
+    The zeros stand for entries that a short header does not have, so that each of its first 64
+    entries can be taken.
+
+    Args:
+        file: The file.
+        line: Index of the line above the header, "100 Real-header values follow on 20 lines,
+            Format= (5F15.6)"; -1 if the file has none.
+
+    Returns:
+        Array of shape (numbers + 64,), in the units of the format.
 
     Raises:
-        RefusedError: The line announces no real header, or the header has other words.
+        RefusedError: `line` is -1 or is no such line, or a word of the header is no finite number.
     """
     match = REALS.fullmatch(file.lines[line]) if line >= 0 else None
     if match is None:
@@ -157,15 +210,29 @@ def _real_header(file: TextFile, line: int) -> Array:
 
 
 def _cosmos_step(file: TextFile, line: int, header: Array, *, count: int, duration: float) -> float:
-    """Return the step in s from the real header: the first entry that fits the duration in s.
+    """Return the step in s from a real header of COSMOS.
+
+    Candidates are, in this order, entry 62, the step of the processed series in ms; entry 34, the
+    step of the raw series in s; and entry 34 in ms, as older files have it. The first that is
+    positive and agrees with the duration is returned.
+
+    Args:
+        file: The file, for the message.
+        line: Index of the line above the header, for the message.
+        header: Entries of the header, from the first on; at least 62.
+        count: Number of samples.
+        duration: Duration of the series in s, as the file rounds it.
 
     Raises:
-        RefusedError: None does.
+        RefusedError: No candidate agrees with the duration.
     """
+    # The format's description counts entries from 1.
     processed = float(header[61])
     raw = float(header[33])
     for step in (processed / 1000, raw, raw / 1000):
-        # The stated duration is rounded or cut to seconds.
+        # The stated duration is rounded or cut to whole seconds, and may be that of count or of
+        # count - 1 steps. The two errors are below 1.5 s; 1 % is for rounded steps (tuned). A step
+        # in the wrong unit misses the duration by a factor of 1000.
         if step > 0 and abs(count * step - duration) <= 1.5 + 0.01 * duration:
             return step
     value = f"a step of {raw:g} for {count} samples in {duration:g} s"
@@ -173,9 +240,23 @@ def _cosmos_step(file: TextFile, line: int, header: Array, *, count: int, durati
 
 
 def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
-    """Yield the channels of a file of CSMIP, each of which begins with a title."""
+    """Yield the channels of a file of CSMIP, in its order.
+
+    A channel begins with a title, "CORRECTED ACCELEROGRAM" or "UNCORRECTED ACCELEROGRAM", and ends
+    before the next one. The first line of the file must be a title.
+
+    Yields:
+        For each channel: `names`, its number and its orientation in small letters, as ("1", "90
+        deg"), from the first line with "Chan 1: 90 deg" among the first 13 lines; empty without
+        such a line. `line` and `end`, the indices of its first line and of the line behind its
+        last.
+
+    Raises:
+        KeyError: There are titles, and the first line is none.
+    """
     titles = {k: match for k, line in enumerate(file.lines) if (match := TITLE.match(line))}
-    # Volume 2 repeats the title of volume 1 in its second line.
+    # Volume 2 (corrected) repeats the title of volume 1 (UNCORRECTED …) in its second line, which
+    # begins no channel. So a title with UN counts only in files that begin with one.
     starts = [k for k, match in titles.items() if match[1] == titles[0][1] or match[1] is None]
     pattern = r".*\bChan(?:nel)?\s*(\w+)\s*:\s*(.*?)\s*(?:\(|from|$).*"
     for start, end in zip(starts, [*starts[1:], len(file.lines)], strict=True):
@@ -188,10 +269,30 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
 
 
 def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
-    """Return the recording of a channel of CSMIP, by the line that announces its series.
+    """Return the recording of one channel of a file of CSMIP.
 
-    A channel without such a line is read by its headers. `unit` is for one that states none.
+    The samples are read behind the line that announces the series, as "1200 points of accel data
+    equally spaced at .010 sec, in cm/sec2. (8f10.6)". Without a format there, a line has 8 samples
+    of 10 characters. A channel without such a line is read by the counts in its headers, as
+    `_read_unannounced` does.
+
+    Args:
+        file: The file.
+        channel: The channel; its `line` and `end` are the indices of its first line and of the line
+            behind its last.
+        unit: Unit of acceleration that the case states, for a channel that states none.
+
+    Returns:
+        The recording, with samples in m/s². Peaks that the lines above the samples state are
+        compared with them.
+
+    Raises:
+        RefusedError: The headers do not tell the series; samples are missing or are no numbers; no
+            unit of acceleration is stated; no record has this step; or the samples have another
+            peak than the head.
     """
+    # Groups: 1 the count of samples, 2 the step in s, 3 or 4 the unit behind "in" or "units", 5 the
+    # numbers in a line, 6 the characters of a number. All from the unit on may be missing.
     series = re.compile(
         r"\s*(\d+)\s+(?:raw\s+)?points\s+of\s+(?:raw\s+)?acc\w*\s+data\s+equally\s+spaced\s+at\s+"
         r"([0-9]*\.?[0-9]+)\s*sec\w*\W*"
@@ -221,12 +322,28 @@ def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
 
 
 def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording:
-    """Return the recording of volume 1 in its old form, with counts and duration in the headers.
+    """Return the recording of a channel of CSMIP's volume 1 in its old form.
 
-    Below the headers stand times and samples in pairs, or a line of text and then samples alone.
+    A channel has 13 lines of text, 7 lines of integers in columns of 5 characters, and 7 lines of
+    reals in columns of 10 characters. Below stand either times and samples in pairs, 10 numbers of
+    7 characters in a line, or a line of text and then the samples alone, 8 numbers of 9 characters
+    in a line.
+
+    Args:
+        file: The file.
+        channel: The channel; its `line` and `end` are the indices of its first line and of the line
+            behind its last.
+        unit: Unit of acceleration that the case states. It counts if no line of the text states one
+            behind the word UNIT or UNITS.
+
+    Returns:
+        The recording, with samples in m/s². The step is the mean difference of the times, or else
+        the duration over the count of samples less one.
 
     Raises:
-        RefusedError: The headers are missing or do not tell the series, or the times are uneven.
+        RefusedError: The headers are missing or do not tell the series; the times are uneven;
+            samples are missing or are no numbers; no unit is stated; no record has this step; or
+            the samples have another peak than the head.
     """
     integers_line = channel.line + 13
     reals_line = integers_line + 7
@@ -243,7 +360,8 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
         value = f"{count} samples in {duration:g} s"
         raise file.refusal(reals_line, value, "a count and a duration above 0", "load it anew")
     head = file.lines[channel.line : integers_line]
-    # Only a line that states units counts: other lines name units of the sensor.
+    # Only a line with the word UNIT counts: other lines name units of the sensor, whose sensitivity
+    # may be in cm/g. The look-arounds keep "g" from being found inside words and in such quotients.
     stated_unit = r"(?<![\w/*])(g/10|g\*10|10\*?g|cm/s(?:ec)?/s(?:ec)?|g)(?![\w/*])"
     for text in head:
         if match := re.search(rf"\bUNITS?\b.*?{stated_unit}", text, re.I):
@@ -257,6 +375,8 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
         samples = pairs[1::2]
         steps = np.diff(pairs[::2])
         step = float(steps.mean())
+        # The times have few digits: 0.1 of a step is more than their rounding, and less than a
+        # missing sample (tuned).
         if np.ptp(steps) > 0.1 * step or not step > 0:
             raise file.refusal(line, "uneven times", "even steps", "resample to even steps")
     return recording_in_si(

@@ -11,18 +11,15 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
+from typing import ClassVar
 
 from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 
+# The first line of a component; the group is "UN" or None.
 MARK = re.compile(r"\s*(UN)?CORRECTED ACCELEROGRAM\b.*\bGNS\b", re.IGNORECASE)
-"""First line of a component."""
-TEXT_LINES = 16
-PER_LINE = 10
-WIDTH = 8
-"""Numbers in a line, and characters of each."""
 
 
 def is_geonet(file: TextFile) -> bool:
@@ -47,16 +44,31 @@ class _Component:
     end: int
     count: int
     name: str
+    # The format GeoNet V2A fixes these three: lines of text, numbers in a line, and characters of a
+    # number.
+    text_lines: ClassVar[int] = 16
+    per_line: ClassVar[int] = 10
+    width: ClassVar[int] = 8
 
     @classmethod
     def of(cls, file: TextFile, start: int) -> _Component:
-        """Return the component that begins in a line.
+        """Return the component that begins in a line, counted from 0.
+
+        A component has 16 lines of text, 4 lines of integers and 6 of reals, all in columns of 8
+        characters, and then its accelerations, velocities and displacements, 10 in a line, each
+        from a new line on. Integers 34, 35 and 36, counted from 1, count these three.
+
+        Returns:
+            The component: `start`, `samples` and `end`, the indices of its first line, of the line
+            of its first acceleration, and of the line behind its last displacement; `count`, the
+            number of its accelerations; and `name`, the orientation in small letters behind the
+            word Component in its text, or empty.
 
         Raises:
-            RefusedError: Its head does not count the samples.
+            RefusedError: The integers do not count two accelerations or more, or are no numbers.
         """
-        first = start + TEXT_LINES
-        integers = file.numbers(first, first + 4, width=WIDTH)
+        first = start + cls.text_lines
+        integers = file.numbers(first, first + 4, width=cls.width)
         counts = [int(number) for number in integers[33:36]]
         if len(counts) < 3 or counts[0] < 2 or min(counts) < 0:
             allowed = "40 integers, of which 34 to 36 count samples"
@@ -64,22 +76,35 @@ class _Component:
         text = " ".join(file.lines[start:first])
         names = [*re.findall(r"Component\s+(\S+)", text), ""]
         samples = first + 10  # behind 4 lines of integers and 6 of reals
-        end = samples + sum(ceil(count / PER_LINE) for count in counts)
+        end = samples + sum(ceil(count / cls.per_line) for count in counts)
         return cls(start, samples, end, counts[0], names[0].lower())
 
 
 def read_geonet(file: TextFile, channel: str = "") -> Recording:
-    """Return the recording of one component, named by its number or orientation, as "1" or "S90E".
+    """Return the recording of one component of a corrected file of GeoNet, format V2A.
+
+    Such a file states its accelerations in mm/s², so no unit is needed.
+
+    Args:
+        file: The file, whose first line is the title of GeoNet's accelerograms; the caller has
+            checked this with `is_geonet`.
+        channel: Number or orientation of the component, as "1" or "S90E", in any capitals. It may
+            be empty only if the file has one component.
+
+    Returns:
+        The recording, with samples in m/s². Its peak is compared with the one in the head.
 
     Raises:
-        RefusedError: The file is not corrected, a head does not tell counts and step, or samples
-            are missing.
+        RefusedError: The file is not corrected; there is no such component; a head does not tell
+            counts and step; samples are missing or are no numbers; no record has this step; or the
+            samples have another peak than the head.
     """
     match = MARK.match(file.lines[0])
     if match is not None and match[1]:
         cure = "take the corrected file of the same record, .V2A"
         raise file.refusal(0, file.lines[0].strip(), "a corrected accelerogram", cure)
     components = [*_components(file)]
+    # A component can be named by its place in the file, from 1 on, since some have no orientation.
     names = []
     for number, component in enumerate(components, 1):
         names.append(tuple(filter(None, (str(number), component.name))))
@@ -89,17 +114,18 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
     samples = file.fixed_columns(
         component.samples,
         count=component.count,
-        per_line=PER_LINE,
-        width=WIDTH,
-        head=component.start + TEXT_LINES,
+        per_line=component.per_line,
+        width=component.width,
+        head=component.start + component.text_lines,
     )
     return recording_in_si(
         file.location(component.samples - 6),
         "GeoNet V2A",
         "mm/s/s",
-        float(reals[25]),
+        float(reals[25]),  # number 26 of the reals: the step in s
         samples,
         " ".join(names[chosen]),
+        # Number 36 of the reals is the peak in mm/s².
         stated=[StatedPeak(1e-3 * abs(float(reals[35])))],
     )
 
@@ -115,7 +141,7 @@ def _components(file: TextFile) -> Iterator[_Component]:
 
 def _reals(file: TextFile, first: int) -> Array:
     """Return the reals of a head, shape (60,), from their first line on."""
-    reals = file.numbers(first, first + 6, width=WIDTH)
+    reals = file.numbers(first, first + 6, width=_Component.width)
     if len(reals) != 60:
         allowed = "60 reals, of which 26 is the step"
         raise file.refusal(first, f"{len(reals)} reals", allowed, "load the file anew")

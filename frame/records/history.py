@@ -10,8 +10,10 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require
 
+# Distance of a time and a sample, as a fraction of the step of the samples, that is taken as
+# rounding. Times k h of a million steps have rounding errors of some 1e-10 steps; a real distance
+# of 1e-9 steps changes g by no more than 1e-9 of the difference of two samples.
 SAME_TIME = 1e-9
-"""Distance of a time and a sample, as a fraction of the step of samples, that is rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,13 @@ class History:
     key: ClassVar[str] = "history"
 
     def __post_init__(self) -> None:
-        """Store step and samples as numbers; refuse values that are not allowed."""
+        """Store `step` and `samples` as numbers, and check all fields.
+
+        Raises:
+            RefusedError: `samples` is not a sequence of two or more finite numbers; `step` is not a
+                positive, finite number of seconds; `start` or `frequency` is not a finite number
+                from 0 on; or `phase` is not a finite number.
+        """
         allowed = "two or more finite samples, a positive step"
         try:
             samples = np.asarray(self.samples, float)
@@ -73,12 +81,17 @@ class History:
 
     @classmethod
     def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
-        """Return a sine of unit amplitude from the time `start` on, in s, where it has the phase.
+        """Return the history sin(2π hertz (t - start) + phase) from the time `start` on.
+
+        Before `start` it is 0.
 
         Args:
             hertz: Frequency in Hz, greater than 0.
             phase: Phase at `start`, in rad.
-            start: Time at which it begins, in s.
+            start: Time at which it begins, in s, not below 0.
+
+        Raises:
+            RefusedError: An argument is not such a number.
         """
         checked_number("frequency", hertz, positive=True)
         omega = 2 * np.pi * float(hertz)
@@ -93,9 +106,12 @@ class History:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Upper bounds of |f| and, between jumps, of |f′|.
+        """Upper bounds of |f| over all times, and of |f′| at all times where f does not jump.
 
-        With |g| ≤ G and |g′| ≤ S, |f| ≤ G and |f′| ≤ |g′| |sin| + |g| Ω |cos| ≤ S + G Ω.
+        The history is f(t) = g(t) sin(Ω (t - start) + phase), where g is linear between its
+        samples, or f = g where Ω = 0. The first bound has the unit of the samples, the second one
+        that unit over s. The samples give the largest |g| = G and the largest |g′| = S. Then |f| ≤
+        G, and |f′| ≤ |g′| |sin| + |g| Ω |cos| ≤ S + G Ω.
         """
         magnitude = float(np.abs(self.samples).max())
         slope = float(np.abs(np.diff(self.samples)).max()) / self.step
@@ -107,12 +123,22 @@ class History:
         return self.envelope(times) * self.wave(times)
 
     def largest_in_steps(self, time: Array) -> Array:
-        """Return an upper bound of |f| in the step before each of rising times in s, shape (T,).
+        """Return an upper bound of |f| in the step before each of rising times.
 
-        The first entry, before which there is no step, is 0.
+        The history is f(t) = g(t) sin(Ω (t - start) + phase), where g is linear between its samples
+        and zero outside them, or f = g where Ω = 0. At a jump both its values count.
+
+        Args:
+            time: Times in s in strictly rising order, shape (T,), with T ≥ 1.
+
+        Returns:
+            Bounds in the unit of the samples, shape (T,). Entry k bounds |f| from time k - 1 to
+            time k. The first one, which has no step, is 0.
         """
-        # In a step |g| is largest at an end or at a sample inside, and the sine is at most 1. The
-        # interval behind each of these times is left by the value before a jump.
+        # |f| ≤ |g|, since the sine is at most 1. As g is piecewise linear, |g| is largest at an end
+        # of the step or at a sample inside. A step is divided at these samples; within each
+        # interval g runs from its value after a jump at the start to its value before one at the
+        # end, which is what the side -1 of the envelope gives.
         samples = self.start + np.arange(len(self.samples)) * self.step
         inside = samples[(samples > time[0]) & (samples < time[-1])]
         times = np.union1d(time, inside)
@@ -132,14 +158,20 @@ class History:
         return np.asarray(self.envelope(time, -1.0) != self.envelope(time))
 
     def jumps_in_steps(self, time: Array) -> Mask:
-        """Return whether f may jump in the step before each of rising times, or at its end.
+        """Return whether the history f may jump in the step before each of rising times.
+
+        The end of a step counts as part of it. f can jump where its samples begin, and, unless the
+        last sample is held, where they end; both only if the sample there is not zero.
 
         Args:
-            time: Times in s, shape (T,).
+            time: Times in s in rising order, shape (T,).
 
         Returns:
-            Mask of shape (T,), whose first entry is False.
+            Mask of shape (T,). Entry k is for jumps after time k - 1 and up to, and including, time
+            k. The first entry is always False: a jump at or before the first time falls into no
+            step.
         """
+        # One entry more takes the jumps behind the last time; it is left out of the result.
         jumps = np.zeros(len(time) + 1, bool)
         ends = [(self.start, self.samples[0])]
         if not self.is_held:
@@ -158,14 +190,22 @@ class History:
         return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
-        """Return g at times in s, in the same shape.
+        """Return the factor g of the history f(t) = g(t) sin(Ω (t - start) + phase).
+
+        g is linear between the samples. It is 0 before the first one, and 0 behind the last one,
+        unless this one is held (`is_held`): then it stays for ever.
 
         Args:
-            time: The times.
-            side: 1 for values after jumps, -1 for values before them.
+            time: Times in s, in any order and shape.
+            side: Where g jumps, at its first or its last sample: a positive number for the value
+                after the jump, any other for the value before it.
+
+        Returns:
+            Values in the unit of the samples, in the shape of `time`.
         """
         n = len(self.samples)
         position = (time - self.start) / self.step  # in steps
+        # A time that is a sample but for rounding is moved onto it, lest it fall before a jump.
         is_sample = np.abs(position - np.round(position)) < SAME_TIME
         position = np.where(is_sample, np.round(position), position)
         inside: Array = np.interp(position, np.arange(n), self.samples)

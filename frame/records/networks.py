@@ -28,8 +28,9 @@ from alphacut.frame.records.text_file import (
     require_step,
 )
 
+# The marks of PEER are looked for in so many first lines. Most heads have four; a larger number
+# would find the marks in other formats' text.
 PEER_HEAD_LINES = 12
-"""Lines in which a head of PEER ends; most have four."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,18 @@ class _PeerHead:
 
     @classmethod
     def of(cls, file: TextFile) -> _PeerHead:
-        """Return count and step of a file of type AT2.
+        """Return count and step of the samples in a file of type AT2 of PEER.
+
+        They are looked for in the first 12 lines. A line may say "NPTS= 4000, DT= .0050 SEC", "4000
+        .0050 NPTS, DT", or "DT= .0050 SEC" alone; the first such line counts.
+
+        Returns:
+            The head: `count`, the number of samples, 0 if it is not stated; `step`, in s; and
+            `line`, the index of their line, counted from 0.
 
         Raises:
-            RefusedError: No line of the head states the step, or a number is not as PEER writes it.
+            RefusedError: No line states the step, the step has another unit than seconds or a
+                decimal comma, or the count is 0 or no whole number.
         """
         real = r"(?P<step>[0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
         names_last = rf"(?P<count>[0-9]+)[\s,]+{real}[\s,]+NPTS\s*,?\s*DT\b"
@@ -73,7 +82,28 @@ class _PeerHead:
 
 
 def read_peer(file: TextFile, unit: str) -> Recording:
-    """Return the recording in a file of type AT2."""
+    """Return the recording in a file of type AT2 of PEER.
+
+    The head names the unit and, in one of its first 12 lines, the count of samples and their step,
+    as "NPTS= 4000, DT= .0050 SEC". Samples follow the line with the step, separated by spaces. If
+    the count is stated, text behind the samples, as "*** End Data ***", is passed over.
+
+    Args:
+        file: The file.
+        unit: Unit of acceleration that the case states. It counts only if the head names none,
+            neither as "UNITS OF G" nor as "ACCELERATION TIME HISTORY IN G"; it may be empty if the
+            head does.
+
+    Returns:
+        The recording, with samples in m/s². Its channel is the last word of the second line behind
+        a comma, as "090"; empty without one.
+
+    Raises:
+        RefusedError: The head does not state the step in s; no unit of acceleration is stated, or
+            the head names velocities or displacements; a sample is no finite number, or there are
+            more or fewer than stated; no record has this step; or the samples have another peak
+            than the head.
+    """
     head = _PeerHead.of(file)
     cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
     require_step(file.location(head.line), head.step, cure)
@@ -83,6 +113,8 @@ def read_peer(file: TextFile, unit: str) -> Recording:
         r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)",
         r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b",
     ):
+        # The words "UNITS OF" are looked for in all lines of the head before "ACCELERATION … IN": a
+        # title may contain the latter.
         matches = [re.search(pattern, text, re.I) for text in file.lines[: head.line + 1]]
         stating = [(row, match) for row, match in enumerate(matches) if match]
         if stating:
@@ -112,10 +144,24 @@ def read_peer(file: TextFile, unit: str) -> Recording:
 
 
 def read_knet(file: TextFile, unit: str) -> Recording:
-    """Return the recording in a K-NET or KiK-net file: a head of 17 lines, then counts.
+    """Return the recording in a K-NET or KiK-net file: 17 lines of head, then counts of the sensor.
 
-    One count is the scale factor ``7845(gal)/8223790``. Counts keep the sensor's offset, so that
-    such a record wants ``baseline = "mean"``.
+    A line of the head has a label of 18 characters and a value. The last one is "Memo.". One count
+    is the scale factor, as "7845(gal)/8223790". The counts keep the sensor's offset, so that such a
+    record wants ``baseline = "mean"``.
+
+    Args:
+        file: The file.
+        unit: Not used, since the format states gal (cm/s²).
+
+    Returns:
+        The recording, with samples in m/s². Its channel is the text of the field "Dir.", as "N-S".
+
+    Raises:
+        RefusedError: The line Memo. is missing; the sampling frequency, the duration or the scale
+            factor is missing or is not above 0; a count is no number, or their number is not the
+            duration times the frequency; no record has this step; or the samples have another peak
+            than the head.
     """
     memo_lines = [k for k, line in enumerate(file.lines) if line.startswith("Memo")]
     if not memo_lines:
@@ -176,12 +222,32 @@ def _knet_numbers(
 
 
 class _EsmField(NamedTuple):
+    """Value of a key in the head of a file of ESM, and its line, counted from 0."""
+
     text: str
     line: int
 
 
 def read_esm(file: TextFile, unit: str) -> Recording:
-    """Return the recording in a file of ESM or ITACA: lines ``KEY: value``, then samples."""
+    """Return the recording in a file of ESM or ITACA: lines ``KEY: value``, then one sample a line.
+
+    SAMPLING_INTERVAL_S, the step in s, and NDATA, the count of samples, must be there. UNITS,
+    DATA_TYPE (an acceleration if it is missing), STREAM (the channel) and PGA_CM/S^2 (the peak) may
+    be missing.
+
+    Args:
+        file: The file.
+        unit: Unit of acceleration that the case states. It counts only if the key UNITS is missing.
+
+    Returns:
+        The recording, with samples in m/s².
+
+    Raises:
+        RefusedError: The step or the count is missing or not above 0; the data are no
+            accelerations, or no unit is stated; a sample is no finite number, or there are more or
+            fewer than stated; no record has this step; or the samples have another peak than the
+            head.
+    """
     head = dict[str, _EsmField]()
     for row, line in enumerate(file.lines):
         pattern = r"([A-Z][A-Z0-9_/.^]*(?: [A-Z0-9_/.]+)*)\s*:\s*(.*)"
@@ -190,6 +256,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
         elif NUMBER.fullmatch(line.strip()):
             break
     numbers = []
+    # An empty text matches no number, so a missing key is refused like a wrong one.
     for key, example in (("SAMPLING_INTERVAL_S", "0.005"), ("NDATA", "4000")):
         text, row = head.get(key, _EsmField("", 0))
         if not NUMBER.fullmatch(text) or float(text) <= 0:
@@ -202,6 +269,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
         cure = "take the file of the acceleration"
         allowed = f"accelerations in {ACCELERATION_UNITS}"
         raise file.refusal(kind.line, kind.text, allowed, cure)
+    # Comments without a colon may stand among the keys: samples begin behind the last key.
     samples = file.numbers(1 + max(field.line for field in head.values()), len(file.lines))
     file.require_count(samples, int(count), head["NDATA"].line)
     own_unit = head.get("UNITS", _EsmField(unit, head["SAMPLING_INTERVAL_S"].line))
@@ -218,9 +286,26 @@ def read_esm(file: TextFile, unit: str) -> Recording:
 
 
 def read_smc(file: TextFile, unit: str) -> Recording:
-    """Return the recording in an SMC file of the USGS, in cm/s².
+    """Return the recording in an SMC file of the USGS, which states accelerations in cm/s².
 
-    Heads of text, integers and reals are followed by comments, and by eight samples a line.
+    The head has 11 lines of text, 6 lines of 48 integers in columns of 10 characters, and 10 lines
+    of 50 reals in columns of 15 characters. Behind it stand as many lines of comments as the head
+    says, and then the samples, 8 in a line of columns of 10 characters. Integer 13 is the angle of
+    the sensor from the vertical in degrees, 16 counts the comments and 17 the samples; real 2 is
+    the count of samples in a second, and reals 30 and 32 are the extremes. All are counted from 1.
+
+    Args:
+        file: The file, whose first line is not empty.
+        unit: Not used.
+
+    Returns:
+        The recording, with samples in m/s². Its channel is "vertical" or empty.
+
+    Raises:
+        RefusedError: The first line does not begin with 1 or 2, the numbers of accelerograms; the
+            head has more or fewer numbers, or counts fewer than two samples or a rate that is not
+            above 0; samples are missing or are no numbers; no record has this step; or the samples
+            have another peak than the head.
     """
     if file.lines[0].split()[0] not in ("1", "2"):
         allowed = "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM"
@@ -266,12 +351,23 @@ def _smc_peak(reals: Array) -> StatedPeak:
     return StatedPeak(0.01 * float(extremes[is_stated].max(initial=0.0)))
 
 
-PEER_MARKS = r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)"
-SMC_MARKS = r"\s*[1-4]\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"
+# How a line of a file of each format begins, in how many first lines, and its reader. The formats
+# are tried in this order. PEER's is the last, since its words are the most common ones; its heads
+# are long only with NPTS or DT in them, or with the name of the database.
 FORMATS = (
     (re.compile("Origin Time"), 1, read_knet),
-    (re.compile(SMC_MARKS), 1, read_smc),
+    (
+        re.compile(r"\s*[1-4]\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"),
+        1,
+        read_smc,
+    ),
     (re.compile("SAMPLING_INTERVAL_S"), 80, read_esm),
-    (re.compile(PEER_MARKS, re.IGNORECASE), PEER_HEAD_LINES, read_peer),
+    (
+        re.compile(
+            r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
+            re.IGNORECASE,
+        ),
+        PEER_HEAD_LINES,
+        read_peer,
+    ),
 )
-"""How a line of a file of each format begins, in how many first lines, and its reader."""

@@ -21,23 +21,33 @@ from alphacut.frame.records.text_file import TextFile, choose_channel, read_byte
 from alphacut.frame.records.uff import is_universal, read_uff_record
 from alphacut.frame.records.units import acceleration_factor
 
+# The formats in messages about files of none of them.
 READ = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
 
 
 def read_recording(
     path: Path, channel: str = "", step: float | None = None, unit: str = ""
 ) -> Recording:
-    """Read a recording, or one channel of several, from a file of one of the formats in `READ`.
+    """Read a recording of the ground's acceleration, or one channel of several, from a file.
+
+    Formats are PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58 and CSV.
+    The content says which it is; the name of the file does not matter.
 
     Args:
         path: The file.
         channel: Name of the channel; empty where there is only one.
-        step: Time between samples in s, for files that do not state it.
-        unit: Unit of the samples, for files that state none.
+        step: Time between samples in s, for files that do not state it. A step in the file goes
+            before it.
+        unit: Unit of the samples, as "g", for files that state none. A unit in the file goes before
+            it.
+
+    Returns:
+        The recording: two or more finite samples in m/s², its step in s, and what the file says of
+        it. Its `name` is empty.
 
     Raises:
-        RefusedError: The file cannot be read, is of another format, or its head and its samples
-            do not fit; the message names the line.
+        RefusedError: The file cannot be read, is of another format, has no such channel, or its
+            head and its samples do not fit; the message names the line.
     """
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged numbers, which are refused
@@ -54,7 +64,27 @@ def read_recording(
 
 
 def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -> Recording:
-    """Read a file by the format whose marks it has; arguments and errors as of `read_recording`."""
+    """Read a recording from a file of the format whose marks its content has.
+
+    Marks that are sure go first: those of universal files (UFF) and of miniSEED and SAC, which are
+    binary, then those of text formats, and at last a table of numbers, which has no mark.
+
+    Args:
+        path: The file.
+        channel: Name of the channel; empty where there is only one. Formats with one channel a file
+            (PEER, K-NET, ESM, SMC) ignore it.
+        step: Time between samples in s, for a table without times; None if the case states none.
+            Other formats ignore it.
+        unit: Unit of the samples, for files that state none; empty if the case states none.
+
+    Returns:
+        The recording, with samples in m/s². They may be too few or not finite.
+
+    Raises:
+        RefusedError: The file cannot be read, is empty or of another format, has no such channel,
+            or its head and its samples do not fit.
+        ValueError, OverflowError: A whole number in a head has thousands of digits.
+    """
     content = read_bytes(path)
     require(bool(content.strip()), path.name, "empty", "a file with a record", "load it anew")
     if is_universal(content):
@@ -86,7 +116,13 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
 
 
 def _waveform_format(content: bytes) -> str:
-    """Return ObsPy's name of the format of a content in bytes, SAC or MSEED; empty of others."""
+    """Return "SAC" or "MSEED" if a content is of the format that ObsPy calls so, or else "".
+
+    A content of at most 632 bytes, which is the size of the head of SAC, is not taken for SAC.
+    """
+    # The head of SAC has 158 words of 4 bytes, in either order of bytes. It has no mark: word 76 is
+    # the version of the head, 6 or 7, and word 79 the count of samples, each of 4 bytes. Words are
+    # counted from 0. That samples of this count follow makes a chance hit unlikely.
     head_bytes = 632
     if len(content) > head_bytes:
         for order in ("<i4", ">i4"):
@@ -95,6 +131,8 @@ def _waveform_format(content: bytes) -> str:
             count = int(words[79])
             if version in (6, 7) and 0 < 4 * count <= len(content) - head_bytes:
                 return "SAC"
+    # miniSEED 2 begins with six digits, which number the record, and its quality D, R, Q or M;
+    # miniSEED 3 begins with MS and the byte 3.
     if re.match(rb"[0-9 ]{6}[DRQM][ \0]|MS\x03", content):
         return "MSEED"
     return ""

@@ -49,7 +49,12 @@ class Recording:
         return float(self.samples.mean()) / max(self.peak, np.finfo(float).tiny)
 
     def doubts(self) -> Iterator[str]:
-        """Yield clauses on what a user should look at: unusual values, a vertical channel."""
+        """Yield clauses on what a user should look at, as "its step is 0.2 s: check it".
+
+        First come the remarks that reading the file has left. Then follow clauses on a peak above 5
+        g, on a step that is not from 1e-4 to 0.1 s, and on a channel whose name says that it is
+        vertical. Nothing is yielded if all is as usual.
+        """
         yield from self.remarks
         peak_in_g = self.peak / STANDARD_GRAVITY
         if peak_in_g > 5:  # the largest that instruments have recorded on the ground is about 4
@@ -58,21 +63,28 @@ class Recording:
         if not 1e-4 <= self.step <= 0.1:
             yield f"its step is {self.step:g} s: check it"
         # Vertical channels have one of these words, or a SEED code such as HNZ.
+        # The words must stand alone: "v" is vertical in "090 V", and not in "HNV1".
         words = "up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z"
         if re.fullmatch(rf"(?:.*\W)?(?:{words})(?:\W.*)?", self.channel, re.IGNORECASE):
             yield f"its channel {self.channel} is vertical"
 
     def accelerogram(self, baseline: Baseline = "none") -> Accelerogram:
-        """Return the record of these samples, without their baseline.
+        """Return the accelerogram of these samples, in m/s², with their baseline subtracted.
 
         Args:
-            baseline: What is subtracted: "none", the "mean" of the samples, or their straight line
-                of least squares ("linear").
+            baseline: What is subtracted: nothing ("none"), the "mean" of the samples, or their
+                straight line of least squares ("linear").
+
+        Returns:
+            An accelerogram with the same step and name. Its remarks are the clauses on what is
+            unusual in the recording before the correction, as "its step is 0.2 s: check it". The
+            recording is not changed.
         """
         samples = self.samples
         if baseline != "none":
             samples = samples - samples.mean()
         if baseline == "linear":
+            # The maximum keeps a single sample from a division by zero.
             # With times of mean 0 the slope is Σ t a / Σ t², and the line passes through the mean.
             time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps
             samples = samples - time * (time @ samples) / max(float(time @ time), 1.0)
@@ -83,11 +95,13 @@ def arias_fractions(samples: Array, step: float) -> Array:
     """Return the Arias intensity up to each sample over that of the whole record, shape (n,).
 
     The Arias intensity is proportional to ∫ a² dt. For a piecewise linear acceleration the integral
-    over a step h from a to b is exactly h (a² + a b + b²) / 3.
+    over a step h from a to b is exactly h (a² + a b + b²) / 3. The fractions rise from 0 at the
+    first sample to 1 at the last one. If all samples are zeros, or there is one sample or none,
+    there is no intensity: then n zeros, at least one, are returned.
 
     Args:
-        samples: Accelerations at even times, shape (n,). Of zeros the fractions are zeros.
-        step: Time between samples.
+        samples: Accelerations at even times, in any unit, shape (n,).
+        step: Time between samples, in any unit, above 0.
     """
     left = samples[:-1]
     right = samples[1:]

@@ -30,7 +30,12 @@ def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
 
     Args:
         lines: Lines of the head.
-        unit: Unit of peaks that are stated without one.
+        unit: Unit of peaks that are stated without one. If it is empty or unknown, these are left
+            out.
+
+    Yields:
+        The magnitude of each peak in m/s², in the order of the text, and half a unit of its last
+        digit in m/s², by which it may be rounded.
     """
     name = r"(?:PGA|(?:peak|pk|max(?:imum)?)\b\.?(?:\s*(?:ground\s+)?acc\w*\.?)?(?:\s*value)?)"
     unit_before = r"(?:[(\[](?P<before>[^)\]]+)[)\]]\s*[=:]?|[=:])"
@@ -45,6 +50,7 @@ def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
             magnitude = abs(float(match["number"]))
             if to_si is None or magnitude == 0:
                 continue
+            # The number is rounded to half a unit of its last decimal: 0.030 to 0.0005, 1.2e2 to 5.
             mantissa, _, exponent = match["number"].lower().partition("e")
             decimals = len(mantissa.partition(".")[2])
             rounding = 0.5 * 10.0 ** (int(exponent or 0) - decimals)
@@ -80,11 +86,14 @@ def remarks_on_peak(
         for magnitude in (with_mean, without_mean):
             if abs(magnitude - peak.magnitude) <= peak.rounding + 0.05 * peak.magnitude:
                 return ()
+            # The floor keeps the logarithm of a record of zeros finite; it is refused below.
             differences.append(abs(np.log(max(magnitude, 1e-300) / peak.magnitude)))
     in_g = f"{with_mean / STANDARD_GRAVITY:.3g} g"
     stated_in_g = f"{peaks[-1].magnitude / STANDARD_GRAVITY:.3g} g"
     what = f"a peak of {in_g}, where its head states {stated_in_g}"
     cure = f"look at the unit, {unit}, and mend the head"
     allowed = "samples whose peak is that of the head"
+    # Units are mistaken by factors of 9.8 (g) and 100 (gal), and filters change a peak by less than
+    # a factor of 2 (tuned): beyond it the record is refused, and not only remarked.
     require(min(differences) <= np.log(2), location, what, allowed, cure)
     return (f"its peak is {in_g}, and its head states {stated_in_g}: check the unit {unit}",)

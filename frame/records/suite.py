@@ -19,8 +19,9 @@ from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.text_file import ACCELERATION_UNITS
 from alphacut.frame.records.units import acceleration_factor
 
+# Files of a suite: fragility analyses use 20 to 100 records, and more than 500 files are a mistake
+# in the pattern.
 MAX_RECORDS = 500
-"""Files of a suite; more are a mistake in the pattern."""
 
 
 def read_record(
@@ -71,18 +72,26 @@ def read_suite(
     unit: str = "",
     baseline: Baseline = "none",
 ) -> tuple[Accelerogram, ...]:
-    """Read a suite of records: all files that the patterns match, each pattern's by their names.
+    """Read a suite of ground motion records from all files that some patterns match.
 
     Args:
-        files: A file or a pattern, as ``records/*.AT2``, or several of them.
-        channel: Channel of every file, as of `read_record`.
+        files: A file, or a pattern of names such as ``records/*.AT2``, or a sequence of them. A
+            name that is a file is never taken as a pattern.
+        channel: Number, orientation or code of the channel of every file, as "1", "90 deg" or
+            "HNE"; empty where each has only one.
         step: Time between samples, in s, of files that do not state it.
-        unit: Unit of files that state none.
-        baseline: What is subtracted from each record, as of `read_record`.
+        unit: Unit of files that state none, as "g", "gal" or "cm/s^2".
+        baseline: What is subtracted from each record: "none", its "mean", or its straight line of
+            least squares ("linear").
+
+    Returns:
+        One record for each file, with samples in m/s²: in the order of `files`, and those of one
+        pattern sorted by their paths. A pattern that matches nothing adds none.
 
     Raises:
-        RefusedError: There is no file, or two have the same name; else as `read_record`, with
-            every file that cannot be read named at once.
+        RefusedError: An argument is of another type or is unknown; there is no file, or there are
+            more than 500, or two have the same name; or files cannot be read, are of other formats,
+            or do not fit their own heads, of which all are named at once.
 
     Example:
         >>> suite = read_suite("cases/suite/*.AT2", baseline="mean")
@@ -116,18 +125,25 @@ def read_recordings(
     unit: str = "",
     shown: object = None,
 ) -> tuple[Recording, ...]:
-    """Read a channel of each file, in their order.
+    """Read one channel of each file, in the order of the files.
 
     Args:
         paths: The files.
-        channel: Channel of every file, as of `read_record`.
+        channel: Number, orientation or code of the channel of every file, as "1", "90 deg" or
+            "HNE"; empty where each has only one.
         step: Time between samples, in s, of files that do not state it.
-        unit: Unit of files that state none.
+        unit: Unit of files that state none, as "g".
         shown: The files as the caller gave them, for the message that there is none.
 
+    Returns:
+        Recordings with samples in m/s². The name of each is that of its file without ending, and of
+        the channel if one was named, joined by "_"; other characters than letters, digits, "_", "+"
+        and "-" in the file's name become "_". Remarks tell where a file states another step or unit
+        than the arguments do; the file's is taken.
+
     Raises:
-        RefusedError: There is no file, or more than `MAX_RECORDS`; or some cannot be read: all of
-            them at once, the first with its reason.
+        RefusedError: There is no file, or there are more than 500; or some cannot be read: the
+            message has the reason of the first, and the names of all others.
     """
     is_suite = 0 < len(paths) <= MAX_RECORDS
     require(is_suite, "files", shown, allowed=f"1 to {MAX_RECORDS} files, and {len(paths)} match")
@@ -163,7 +179,13 @@ def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
 
 
 def _require_arguments(channel: str, step: float | None, *, unit: str, baseline: str) -> None:
-    """Refuse arguments of `read_record` of another type, or unknown units and baselines."""
+    """Check the arguments that all readers of records have.
+
+    Raises:
+        RefusedError: `channel` is no text; `step` is neither None nor a finite number above 0;
+            `unit` is neither empty nor a unit of acceleration; or `baseline` is not "none", "mean"
+            or "linear".
+    """
     require(isinstance(channel, str), "channel", repr(channel), 'a name in quotes, as "2"')
     if step is not None:
         checked_number("step", step, positive=True)

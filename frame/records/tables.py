@@ -37,9 +37,12 @@ from alphacut.frame.records.units import (
 )
 from alphacut.stochastic.particles.csv_columns import NUMBER
 
+# The allowed value in messages on the head of a table.
 EXPECTED_HEAD = "time [s],acceleration [m/s^2], [g] or [gal]"
+# Fraction of a step by which a time may miss its place, as times that are rounded do. It is tuned:
+# published records with three decimals and steps of 0.005 s or 0.01 s stay below it, and a missing
+# or repeated sample misses its place by a whole step.
 MAX_UNEVENNESS = 0.05
-"""Fraction of a step by which a time may miss its place, as times that are rounded do (tuned)."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +54,22 @@ class _Column:
 
     @classmethod
     def of(cls, cell: str) -> _Column:
-        """Return the column with a head such as "Accel. [g]", "acc (g)", "acc, g" or "acc g"."""
+        """Return name and unit of a column from its cell in the head of a table.
+
+        A unit stands in brackets, "Accel. [g]" or "acc (g)", and may then be anything; or it is the
+        last word, "acc, g" or "acc g", and then must be a unit of acceleration, time or force.
+        Blanks and quotes around the cell are left out.
+
+        Returns:
+            The column: its `name` in small letters, and its `unit` as it is written; the unit is
+            empty if the cell states none.
+        """
         text = cell.strip(' "')
         if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
             return cls(match[1].lower(), match[2])
         match = re.fullmatch(r"(.*?)[\s,]+(\S+)", text)
+        # Without brackets the last word is a unit only if it is known: "ground acceleration" has
+        # none.
         if match and (acceleration_factor(match[2]) or seconds_of(match[2]) or match[2] in NEWTONS):
             return cls(match[1].lower(), match[2])
         return cls(text.lower())
@@ -93,7 +107,20 @@ class _Table:
 
     @classmethod
     def of(cls, file: TextFile) -> _Table:
-        """Return the table in a file; lines above the first that begins with a number are heads."""
+        """Return the table of numbers in a file.
+
+        Empty lines and lines that begin with "#" are passed over. The first other line that begins
+        with a number is the first row, and all below are rows as well; lines above are heads. Cells
+        are separated by commas, semicolons, tabs or blanks, unless the commas of all rows are
+        decimal commas: these are then written as points. Cells are not checked; a file without such
+        a line gives a table without rows.
+
+        Returns:
+            The table: `start`, the index of the first line passed neither as empty nor as a
+            comment, 0 without one; `head`, the last line above the rows that is no comment, or
+            empty; `above`, all lines above the rows, comments among them without their "#"; and
+            `rows`, the cells of each row by the index of its line.
+        """
         lines = {k: x for k, x in enumerate(file.lines) if x.strip() and not x.startswith("#")}
         first = len(file.lines)
         for line, text in lines.items():
@@ -104,6 +131,7 @@ class _Table:
         has_decimal_commas = _have_decimal_commas([*texts.values()])
         rows = {}
         for line, text in texts.items():
+            # A cell may be a lone comma where quoted numbers stand between commas: "0,01","0,2".
             if has_decimal_commas:
                 cells = re.findall(r'[^;\s"]+', text)
                 rows[line] = [cell.replace(",", ".") for cell in cells if cell != ","]
@@ -121,7 +149,12 @@ class _Table:
 
     @property
     def columns(self) -> list[_Column]:
-        """Heads of the columns; nameless ones where the head has another number of cells."""
+        """Heads of the columns, as many as numbers in the first row.
+
+        The last line above the numbers is divided at commas as a CSV file, then at commas,
+        semicolons and tabs, then at blanks. The first division into the right number of cells
+        counts; if none is, the columns have no names and no units.
+        """
         words = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", self.head)
         for cells in (next(csv.reader([self.head])), re.split("[,;\t]", self.head), words):
             if self.head and len(cells) == self.width:
@@ -139,22 +172,33 @@ class _Table:
 
     @property
     def has_times(self) -> bool:
-        """Whether the head begins with times, or the numbers of the first column never fall."""
+        """Whether the first column has times.
+
+        It does if the last line above the numbers begins with "time" or "t", or if its cells are
+        numbers that never fall.
+        """
         if _Column.of(self.head).is_time:
             return True
+        # Accelerations swing about zero, so that a column of them falls somewhere.
         first = [cells[0] for cells in self.rows.values()]
         return _are_numbers(first) and bool((np.diff(np.array(first, float)) >= 0).all())
 
     def refusal(self, cure: str) -> RefusedError:
-        """Return the error about the head."""
+        """Return the error that the head of the table is not understood; `cure` says what to do."""
         value = self.head[:80] or f"{self.width} columns without a head"
         return self.file.refusal(self.start, value, EXPECTED_HEAD, cure)
 
     def numbers(self, *, rows: Sequence[int] = ()) -> Array:
-        """Return the numbers, shape (rows, columns), of all rows or of those at some lines.
+        """Return the numbers of all rows, or of some, shape (rows, columns).
+
+        Args:
+            rows: Indices of the lines of the file whose rows are wanted, in this order, each of
+                which must be the line of a row. If it is empty, all rows are meant; a table without
+                rows gives shape (0,).
 
         Raises:
-            RefusedError: A row has another text, or another count of numbers than the first.
+            RefusedError: A cell is no finite number, or a row has another count of cells than the
+                first row of the table.
         """
         lines = rows or [*self.rows]
         for line in lines:
@@ -163,13 +207,15 @@ class _Table:
         return np.array([[float(cell) for cell in self.rows[line]] for line in lines])
 
     def series(self) -> Array:
-        """Return the numbers of all rows one after another, shape (n,).
+        """Return the numbers of all rows one after another, shape (numbers,).
 
-        The last row alone may have fewer numbers than the others.
+        This is for a series that was written in several columns, row by row. The table has at least
+        one row. The last row alone may have fewer numbers than the others.
 
         Raises:
-            RefusedError: A row is wrong, or the columns are smoother than the rows, as those of
-                several components are: then the numbers are not one series.
+            RefusedError: A cell is no finite number; a row has another count of cells than the
+                first; or the numbers change less from row to row within a column than along the
+                rows, on average. Then the columns are several components, and not one series.
         """
         *full, last = self.rows
         numbers = self.numbers(rows=full)
@@ -177,6 +223,8 @@ class _Table:
         if len(last_cells) > self.width or not _are_numbers(last_cells):
             raise _wrong_row(self.file, last, self.width)
         if self.width > 1 and len(full) > 1:
+            # Neighbours in time differ little. In one series these are neighbours in a row, and
+            # numbers one below another are as many samples apart as there are columns.
             change_along_rows = np.abs(np.diff(numbers.ravel())).mean()
             change_along_columns = np.abs(np.diff(numbers, axis=0)).mean()
             if change_along_columns < change_along_rows:
@@ -188,10 +236,14 @@ class _Table:
         return np.append(numbers.ravel(), [float(cell) for cell in last_cells])
 
     def resolution(self) -> float:
-        """Return the last digit of the times in the first column, in their unit, as .001 of 1.023.
+        """Return the unit of the last digit of the times, such as 0.001 for 1.023.
 
-        Formats have a fixed number of decimals, or of digits. Zeros at the end may be left out, so
-        that the cells with most of them tell.
+        It is in the unit of the times. The times are the first column; all its cells must be
+        numbers, and there must be one at least. Programs write them with a fixed number of
+        decimals, or with a fixed number of digits. The coarser of both is returned: the last
+        decimal of the cell with most decimals, or, for the largest time, the last of as many digits
+        as the cell with most digits has. Zeros at the end may be missing, so that the cells with
+        most of them tell.
         """
         times = [Decimal(cells[0]) for cells in self.rows.values()]
         finest = min(int(time.as_tuple().exponent) for time in times)
@@ -218,11 +270,25 @@ def _with_units(heads: Sequence[str]) -> str:
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
+    """Return whether all cells are finite numbers in plain digits, as 1.25 or 1e-3."""
     return all(NUMBER.fullmatch(cell) and np.isfinite(float(cell)) for cell in cells)
 
 
 def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
-    """Return the error about a row that is not of `width` numbers, with a cure from its text."""
+    """Return, without raising it, the error about a row of a table that is not `width` numbers.
+
+    Args:
+        file: The file.
+        line: Index of the line of the row, counted from 0.
+        width: The count of numbers that the row should have.
+
+    Returns:
+        The error. Its hint is chosen by what stands in the row: clock times, dates, separators of
+        thousands, missing values, empty cells, units, words, decimal commas or a number that is cut
+        off; without any of these it has no hint.
+    """
+    # The order counts, since the first pattern that is found gives the hint: those of clock times
+    # and dates stand before those of single characters that both contain.
     cures = {
         r"\d:\d\d": "write seconds in place of clock times, or leave times out and say"
         " records.step",
@@ -242,11 +308,18 @@ def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
 
 
 def _have_decimal_commas(rows: Sequence[str]) -> bool:
-    """Return whether the commas of all rows are decimal commas.
+    """Return whether the commas of all rows of a table are decimal commas.
 
     Semicolons, tabs, blanks or quotes then separate the cells. A row such as 0,03097 may also be
-    two numbers. It is one if the numbers before the commas do not rise, as times or counts of
-    samples would.
+    two numbers, with the comma between them. The comma is a decimal comma if in some row the number
+    before it is not above that of the row before, since times or counts of samples rise.
+
+    Args:
+        rows: The texts of all rows.
+
+    Returns:
+        False if there are no rows, no commas, or a row that is no list of numbers with decimal
+        commas.
     """
     number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
     further = rf'\s*[;\t]\s*{number}|\s+{number}|(?<="),(?="){number}'
@@ -260,10 +333,16 @@ def _have_decimal_commas(rows: Sequence[str]) -> bool:
 
 
 def is_table(file: TextFile, *, is_described: bool = False) -> bool:
-    """Return whether a file is a table of numbers.
+    """Return whether a file is a table of numbers, such as one in CSV.
 
-    Its head begins with times or dates, or its last row has one or two numbers. More numbers a row
-    are a table if there is no head, or if the case describes them (`is_described`).
+    It is one if the last line above the numbers begins with "time", "t", "date" or "timestamp".
+    Otherwise the last row must be numbers, and there must be one or two of them, or no line above
+    the numbers, or a description by the case. A file without numbers is none, unless it has such a
+    line.
+
+    Args:
+        file: The file. Lines that begin with "#" do not count.
+        is_described: Whether the case says how to read the numbers: a channel, or step and unit.
     """
     table = _Table.of(file)
     if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
@@ -276,18 +355,30 @@ def is_table(file: TextFile, *, is_described: bool = False) -> bool:
 def read_table(
     file: TextFile, step: float | None = None, unit: str = "", channel: str = ""
 ) -> Recording:
-    """Return the recording in a table with even steps: times and accelerations, or these alone.
+    """Return the recording in a table: times and accelerations, or accelerations alone.
+
+    The times are the first column if the last line above the numbers begins with "time" or "t"; if
+    the numbers of the first column never fall; or if there are two columns and no `step`.
+    Accelerations without times are a column, or, if `step` and `unit` are given and `channel` is
+    not, all numbers row by row.
 
     Args:
         file: The file.
-        step: Step in s that the case states, for numbers without times.
-        unit: Unit that the case states, for a head without one. Times without a unit are in s.
+        step: Step in s that the case states, for numbers without times; beside times it counts only
+            where these do not tell the step.
+        unit: Unit of acceleration that the case states, for a head without one. Times without a
+            unit are in s.
         channel: Column of the accelerations: its number, counted from 1 with the times, or its name
             in the head; empty where there is only one.
 
+    Returns:
+        The recording, with samples in m/s².
+
     Raises:
-        RefusedError: A row or the head is not understood, the times are uneven, or the column is
-            not one of accelerations.
+        RefusedError: There are fewer than two rows; a row or the head is not understood; step or
+            unit is stated by neither the file nor the case; the times are uneven; no record has
+            this step; the column is not one of accelerations; or the samples have another peak than
+            a line above them states.
     """
     table = _Table.of(file)
     allowed = "a header with units, and rows of numbers below it"
@@ -308,17 +399,28 @@ def read_table(
 def _read_columns(
     table: _Table, step: float | None, unit: str, *, channel: str, has_times: bool
 ) -> Recording:
-    """Return the recording in one column of a table.
+    """Return the recording in one column of a table of two rows or more.
 
     Args:
-        table: The table, of two rows or more.
-        step: Step in s that the case states.
-        unit: Unit that the case states.
-        channel: Number or name of the column; empty if there is only one beside the times.
-        has_times: Whether the first column has times.
+        table: The table.
+        step: Step in s that the case states; None if it states none. Beside times it counts only
+            where these do not tell the step.
+        unit: Unit that the case states, or empty. The unit in the head of the column goes before
+            it, if there are more than two columns or the head begins with times.
+        channel: Number of the column, counted from 1 with the times, or its name in the head; empty
+            if there is only one beside the times.
+        has_times: Whether the first column has the times. Without a unit in their head they are in
+            s.
+
+    Returns:
+        The recording, with samples in m/s². Its channel is number and name of the column, as "2
+        ns"; empty for the second of two columns that was not named.
 
     Raises:
-        RefusedError: As of `read_table`.
+        RefusedError: A row or the head is not understood; there is no such column, or it is not one
+            of accelerations; step or unit is stated by neither the file nor the case; the times are
+            uneven; no record has this step; or the samples have another peak than a line above them
+            states.
     """
     if table.head:  # without one, the last row of a series of numbers may be a short one
         table.numbers()
@@ -333,6 +435,7 @@ def _read_columns(
     _require_acceleration(table, heads)
 
     # Of two columns without a head that begins with times only the case's unit counts.
+    # A head of another kind, "acc g" above two columns, may mean either column.
     is_understood = table.width > 2 or table.columns[0].is_time
     if is_understood and table.columns[index].unit:
         unit = table.columns[index].unit
@@ -362,8 +465,16 @@ def _read_columns(
 
 
 def _require_cell_of_each_head(table: _Table) -> None:
-    """Refuse rows with more cells than the head has, as of decimal commas between commas."""
+    """Raise an error if rows seem to have decimal commas between commas.
+
+    This is so if the head has two cells or more and begins with times, each row has a comma, and
+    the first row has more cells than the head, up to twice as many. A table without rows passes.
+
+    Raises:
+        RefusedError: The rows are such rows.
+    """
     heads = len(re.split("[,;\t]", table.head))
+    # The row 0,01,0,25 below the head time,acc has four cells. Its commas cannot be told apart.
     has_commas = all("," in table.file.lines[line] for line in table.rows)
     if has_commas and 1 < heads < table.width <= 2 * heads and _Column.of(table.head).is_time:
         value = f"{table.width} numbers in a row below {heads} heads"
@@ -374,11 +485,19 @@ def _require_cell_of_each_head(table: _Table) -> None:
 
 
 def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
-    """Return the index of the column that a channel names by its number or by its head.
+    """Return the index, from 0 on, of the column that a channel names.
+
+    Args:
+        table: The table.
+        channel: Number of the column, counted from 1 on with the column of the times, or its name
+            in the head, in any capitals. It may be empty if there are times and one column beside
+            them.
+        has_times: Whether the first column has the times, and so is not to be chosen.
 
     Raises:
-        RefusedError: No column or several have the name; or there are no times and no name, so that
-            the numbers may as well be one series.
+        RefusedError: No column or several have the name, or the name is missing though there are
+            several; or there are no times and no name, so that the numbers may as well be one
+            series.
     """
     if not channel and not has_times:
         name = table.file.name
@@ -395,7 +514,18 @@ def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
 
 
 def _require_acceleration(table: _Table, heads: Sequence[str]) -> None:
-    """Refuse a column whose heads name another quantity than an acceleration, or its unit."""
+    """Raise an error if a head names another quantity than an acceleration.
+
+    It does so by a word such as velocity, force or counts, unless the head also has a word for an
+    acceleration, or by a unit in brackets, such as [mm]. A head that names no quantity passes.
+
+    Args:
+        table: The table, for the message.
+        heads: Texts above the numbers of a column, such as "time [s],vel [cm/s]".
+
+    Raises:
+        RefusedError: Such a word or unit is found; the message names the first one.
+    """
     words_of_quantities = {
         "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
         "a velocity": r"vel(?:oc\w*)?|speed",
@@ -421,14 +551,18 @@ def _require_acceleration(table: _Table, heads: Sequence[str]) -> None:
 
 
 def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
-    """Return what to mend in the head of times and accelerations; empty if it is complete.
+    """Return what is to be mended in the head of times and accelerations; empty if it is complete.
+
+    Complete means: times, if the head names them, in a known unit; accelerations in the second
+    place, not a spectrum; and a known unit of acceleration, from the head or the case.
 
     Args:
-        table: The table.
-        column: Head of the accelerations.
-        unit: Unit of the accelerations, of the head or of the case.
+        table: The table, with one column at least.
+        column: Name and unit of the accelerations in the head, both possibly empty.
+        unit: Unit of acceleration that is taken, of the head or of the case; empty without one.
     """
     first = table.columns[0]
+    # Times without a unit are in s, as most files have them.
     if first.is_time and not seconds_of(first.unit or "s"):
         return f"{first.unit} is no unit of times: {', '.join(SECONDS)}"
     if column.is_time:
@@ -445,14 +579,19 @@ def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
 
 
 def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[float, list[str]]:
-    """Return the step in s of a record's times, and clauses on what is unusual about them.
+    """Return the step of a record's times in s, and clauses on what is unusual about them.
+
+    Times that rise by 1 from 0 or 1 on count the samples. They are then no times in s, and
+    `stated_step` is returned.
 
     Args:
-        table: The table, whose first column has the times.
-        stated_step: Step that the case states, in s.
+        table: The table of two rows or more, whose first column has the times.
+        stated_step: Step that the case states, in s; None if it states none. It is returned where
+            the times do not tell their step: if they count the samples, are all equal, or are
+            rounded too coarsely. Else it is ignored.
 
     Raises:
-        RefusedError: The times are uneven, or their step is one that records do not have.
+        RefusedError: The times are uneven, or their step is not from 4e-5 s to below 0.5 s.
     """
     steps = _even_steps(table, stated_step=stated_step)
     is_count = steps.step == 1 and steps.first in (0, 1)
@@ -493,15 +632,21 @@ def _even_steps(
 
     A step that the case states is taken where the times do not tell it: if all are equal, or if
     they were rounded so coarsely that even steps look uneven. In the latter case it must agree with
-    them.
+    the duration to the last digit of the times.
 
     Args:
-        table: The table.
-        stated_step: Step that the case states, in s.
-        or_step: What a cure says of the key that states the step; empty where there is none.
+        table: The table. Its times are numbers, in the unit in the head of their column, or in s.
+        stated_step: Step that the case states, in s; None if it states none.
+        or_step: What a hint says of the key that states the step; "{:.9g}" in it is replaced by a
+            step. It is empty where there is no such key.
+
+    Returns:
+        `step` and `first`, the step and the first time in s, where `first` is 0 if all times are
+        equal; and `remark`, a clause on how the step was found, empty if it follows from the times.
 
     Raises:
-        RefusedError: The times do not rise in even steps.
+        RefusedError: The times do not rise in even steps, and `stated_step` is missing or does not
+            agree with them.
     """
     file = table.file
     lines = [*table.rows]
@@ -520,7 +665,8 @@ def _even_steps(
         raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
 
     even: Array = np.asarray(np.linspace(first, time[-1], len(time)), float)
-    # Differences of two times as 1.7e9 s, from 1970 on, have lost the digits of the step.
+    # The step is the mean, and times are compared with even ones. Differences of neighbours would
+    # not do: those of times such as 1.7e9 s, from 1970 on, have lost the digits of the step.
     step = duration / n_steps
     if step > 0 and np.abs(time - even).max() <= MAX_UNEVENNESS * step:
         return _EvenSteps(step, first)
@@ -540,31 +686,39 @@ def _even_steps(
 def _are_rounded(time: Array, even: Array, last_digit: float) -> bool:
     """Return whether times are even ones that were rounded or cut to a last digit.
 
-    Then two steps or more differ from the usual one. A single odd step is a time that stands twice,
-    or a gap.
+    This needs three things: no time falls, and the last is above the first; each time lies within
+    the last digit of its even place; and two steps or more differ from the median step by 10 % or
+    more. A single odd step is not rounding, but a time that stands twice, or a gap.
 
     Args:
-        time: The times in s, shape (n,).
+        time: The times in s, shape (n,) with n ≥ 2.
         even: Even times from the first to the last of them, shape (n,).
         last_digit: Unit of the last digit of the times, in s.
     """
     steps = np.diff(time)
     usual = np.median(steps)
     is_odd = np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual
-    # A rounded time lies within half of the last digit, and so does the line through both ends. The
-    # factor leaves room for binary round-off.
+    # A rounded time lies within half of the last digit from its place, and so do both ends of the
+    # line of even times: together at most one last digit. A time that was cut lies below its place
+    # by at most one digit, and so does the line. The factor leaves room for binary round-off.
     is_near = np.abs(time - even).max() <= last_digit * (1 + 1e-6)
     rises = time[-1] > time[0] and bool((steps >= 0).all())
     return rises and bool(is_near) and int(is_odd.sum()) > 1
 
 
 def _likely_step(n_steps: int, duration: float, last_digit: float) -> float:
-    """Return the step of a usual sampling rate that fits a duration to its last digit, in s.
+    """Return the step in s of a usual sampling rate that fits a duration to its last digit.
 
-    Rates are multiples of 100, 128, 50, 64, 25 or 10 samples in a second, in this order. If none
-    fits, the step is the mean.
+    Rates are multiples of 100, 128, 50, 64, 25 or 10 samples in a second, tried in this order. If
+    none fits, the mean step `duration / n_steps` is returned.
+
+    Args:
+        n_steps: Number of steps, above 0.
+        duration: Difference of the last and the first time in s, above 0.
+        last_digit: Unit of the last digit of the times, in s.
     """
     lowest = n_steps / (duration + last_digit)
+    # A duration of a few last digits alone keeps the rate finite.
     highest = n_steps / max(duration - last_digit, duration / 2)
     for multiple in (100, 128, 50, 64, 25, 10):
         rate = multiple * round(n_steps / duration / multiple)
@@ -574,12 +728,15 @@ def _likely_step(n_steps: int, duration: float, last_digit: float) -> float:
 
 
 def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
-    """Return the error about times whose steps differ: the first odd one, and its cure.
+    """Return, without raising it, the error about times that do not rise in even steps.
+
+    The error names the first odd time. Its hint depends on the pattern: a single wrong time, rows
+    in falling order or out of order, two records in one file, a time that stands twice, or a gap.
 
     Args:
         file: The file.
-        lines: Line of each time, counted from 0.
-        time: The times in s, shape (n,).
+        lines: Index of the line of each time, counted from 0.
+        time: The times in s, shape (n,) with n ≥ 2; not all are equal.
     """
     steps = np.diff(time)
     rising = steps[steps > 0]
@@ -587,6 +744,7 @@ def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
     odd = np.flatnonzero(np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual)
     wrong = 1 + int(odd[0]) if odd.size else int(np.abs(time - time[0]).argmax())
     falls = np.flatnonzero(steps < 0)
+    # One wrong time makes two odd steps, one after the other, whose sum is right.
     is_one_time = odd.size == 2 and odd[1] == odd[0] + 1
     if is_one_time and abs(steps[odd].sum() - 2 * usual) <= 2 * MAX_UNEVENNESS * usual:
         cure = f"this time alone is wrong: {time[wrong - 1] + usual:.9g} s fits"
@@ -624,11 +782,22 @@ class ForceHistory:
 
 
 def read_force_history(path: Path) -> ForceHistory:
-    """Read a force over time from a table with even steps from t = 0.
+    """Read a force over time from a table with the head "time [s],force [kN]" or alike.
+
+    The times rise in even steps from 0 on.
+
+    Args:
+        path: The file. The unit of the times is needed. Without a unit of the force the samples are
+            a factor that has no unit.
+
+    Returns:
+        `step` in s; `samples` in N, or without a unit, shape (n,); and `has_unit`, whether the head
+        states the unit of the force.
 
     Raises:
         RefusedError: The file cannot be read, its head does not name times and a force in known
-            units, a row is wrong, the times are uneven or begin elsewhere, or the force is 0.
+            units, there are fewer than two rows, a row is wrong, the times are uneven or begin
+            elsewhere, or all forces are 0.
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _Table.of(file)
@@ -650,7 +819,11 @@ def read_force_history(path: Path) -> ForceHistory:
 
 
 def _cure_of_force_head(table: _Table) -> str:
-    """Return what to mend in the head of times and forces; empty if it is complete."""
+    """Return what is to be mended in a table of times and forces; empty if it is complete.
+
+    Complete means: two rows or more; two columns, named time and force (or load, or f); a known
+    unit of the times; and a known unit of the force, or none.
+    """
     if len(table.rows) < 2:
         return "write two rows of numbers or more below the head"
     if table.width != 2:

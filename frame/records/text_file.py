@@ -19,22 +19,13 @@ from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
 from alphacut.frame.records.units import acceleration_factor, other_quantity
 
+# A number as C, Python or FORTRAN writes it; D stands for E.
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
-"""A number as C, Python or FORTRAN writes it; D stands for E."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
+# Smallest step of a record, and the one that all are below, in s. Instruments take 10 to 20,000
+# samples in a second; another step is a mistake in its unit, or a count of samples.
 MIN_STEP = 4e-5
 MAX_STEP = 0.5
-"""Smallest step of a record, and the one that all are below, in s. Instruments take 10 to 20,000
-samples in a second; another step is a mistake in its unit, or a count of samples."""
-
-NO_TEXT_CURES = {
-    r"^PK(?s:.*)(?:\[Content_Types\]|xl/)|^\xd0\xcf\x11\xe0": "this is a workbook of a"
-    " spreadsheet: save its sheet as CSV",
-    r"^PK|^\x1f\x8b": "this is an archive: unpack it, and name the file inside",
-    r"^(?:\xff\xfe|\xfe\xff|(?:[ -~]\0){4}|(?:\0[ -~]){4})": "this is text in UTF-16: save it"
-    " in UTF-8",
-}
-"""Cure by the first bytes of a file, decoded as Latin-1, that holds zero bytes."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +37,32 @@ class TextFile:
 
     @classmethod
     def from_bytes(cls, name: str, content: bytes) -> Self:
-        """Return the lines of a content in UTF-8 or Latin-1.
+        """Return the lines of a text file in UTF-8 or Latin-1.
+
+        Args:
+            name: Name of the file, for messages.
+            content: The bytes of the file. Lines may end as on any system (CR LF, LF or CR).
+
+        Returns:
+            The file with its lines, without their ends; there is always one at least, which may be
+            empty.
 
         Raises:
-            RefusedError: The content has zero bytes, or a line of more than 10,000 letters.
+            RefusedError: The content has zero bytes, as binary files do, with a hint for workbooks,
+                archives and UTF-16; or a line has more than 10,000 characters.
         """
+        # A text has no zero bytes, but in UTF-16. What a file is instead is told by its first
+        # bytes, decoded as Latin-1: PK for archives and workbooks, D0 CF 11 E0 for older workbooks,
+        # 1F 8B for gzip; the mark FF FE or FE FF, or every second byte a zero, for UTF-16.
+        cures = {
+            r"^PK(?s:.*)(?:\[Content_Types\]|xl/)|^\xd0\xcf\x11\xe0": "this is a workbook of a"
+            " spreadsheet: save its sheet as CSV",
+            r"^PK|^\x1f\x8b": "this is an archive: unpack it, and name the file inside",
+            r"^(?:\xff\xfe|\xfe\xff|(?:[ -~]\0){4}|(?:\0[ -~]){4})": "this is text in UTF-16:"
+            " save it in UTF-8",
+        }
         start = content[:100].decode("latin-1")
-        cure = cure_of(start, NO_TEXT_CURES, "load it anew, or export its record as text")
+        cure = cure_of(start, cures, "load it anew, or export its record as text")
         require(b"\0" not in content, name, "no text", "a text file with a record", cure)
         file = cls(name, tuple(re.split(r"\r\n|\r|\n", decoded(content))))
         # Searches in a line take the square of its length; formats have about 80 letters a line.
@@ -70,17 +80,23 @@ class TextFile:
         return RefusedError(self.location(line), str(value)[:80], allowed, cure)
 
     def numbers(self, first: int, last: int, *, width: int = 0, count: int = 0) -> Array:
-        """Return all numbers from line `first` up to, but not with, line `last`, counted from 0.
+        """Return all numbers in some lines, one after another, shape (numbers,).
 
         Args:
-            first: First line.
-            last: Line behind the last one.
-            width: Characters of a number in files of fixed columns; 0 where spaces separate them.
-            count: Numbers behind which a line of text ends the reading; 0 for none.
+            first: Index of the first line, counted from 0.
+            last: Index of the line behind the last one; lines behind the end of the file are passed
+                over.
+            width: Characters of a number in files of fixed columns, where empty columns are passed
+                over; 0 where blanks separate the numbers.
+            count: If it is above 0: number of values from which on a line with a word that is no
+                number ends the reading, as text behind the samples does. If it is 0, no such line
+                is allowed.
 
         Raises:
             RefusedError: A word is no finite number.
         """
+        # The loop goes over words, and not over whole lines by NumPy, since a message names the
+        # line and the word that is wrong.
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
             line = self.lines[row].rstrip()
@@ -106,17 +122,18 @@ class TextFile:
     def fixed_columns(
         self, first: int, *, count: int, per_line: int, width: int, head: int
     ) -> Array:
-        """Return samples in fixed columns, shape (count,).
+        """Return samples that stand in fixed columns, shape (count,).
 
         Args:
-            first: Line of the first sample.
+            first: Index of the line of the first sample, counted from 0.
             count: Number of samples that the head states.
-            per_line: Samples in a line.
-            width: Characters of a sample.
-            head: Line that states the count, for the message.
+            per_line: Samples in a line; 0 counts as 1.
+            width: Characters of a sample, above 0.
+            head: Index of the line that states the count, for the message.
 
         Raises:
-            RefusedError: A sample is no finite number, or there are more or fewer than stated.
+            RefusedError: A sample is no finite number, or the lines that `count` samples fill have
+                more or fewer of them.
         """
         last = first + ceil(count / max(per_line, 1))
         samples = self.numbers(first, last, width=width)
@@ -124,7 +141,7 @@ class TextFile:
         return samples
 
     def require_count(self, samples: Array, count: int, line: int) -> None:
-        """Refuse another number of samples than the head states in a line."""
+        """Raise RefusedError unless there are `count` samples, as the line `line` states."""
         if len(samples) != count:
             what = f"{count} samples, and {len(samples)} follow"
             cure = "load the file anew, or mend the number in the head"
@@ -217,10 +234,11 @@ def decoded(content: bytes) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file.
+    """Return the content of a file that should be a text with a record.
 
     Raises:
-        RefusedError: The file cannot be read.
+        RefusedError: The file is missing, is a folder or no regular file, cannot be read, or is too
+            large for the memory.
     """
     try:
         require_text(path)

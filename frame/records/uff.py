@@ -19,8 +19,9 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
 
+# Codes of the type of values: complex single and complex double.
 COMPLEX = (5, 6)
-"""Codes of complex values, single and double."""
+# Names of the codes 1 … 6 of a direction: translations, and rotations about the axes.
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -84,7 +85,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
 
 
 def _response(data_set: DataSet) -> str:
-    """Return NODE.DIRECTION of the response of a data set 58, as "7.x"."""
+    """Return NODE.DIRECTION of the response of a data set 58, as "7.x", or "7.9" for the code 9."""
     columns = data_set.head[5]
     direction = abs(int(columns[51:55]))
     names = dict(enumerate(DIRECTIONS, start=1))
@@ -94,9 +95,18 @@ def _response(data_set: DataSet) -> str:
 def _choose_data_set(
     name: str, channel: str, found: Sequence[DataSet], responses: Sequence[str]
 ) -> int:
-    """Return the index of the data set of a channel; errors and arguments as of `choose_channel`.
+    """Return the index of the data set 58 that a channel names.
 
-    Data sets of one response are told apart by the first lines of their heads as well.
+    Args:
+        name: Name of the file, for the message.
+        channel: NODE.DIRECTION of the response, as "7.x", in any capitals. If several data sets
+            have this response it is "7.x#1", "7.x#2" …, in their order, or the first line of the
+            head of the data set. It may be empty if there is one data set.
+        found: The data sets.
+        responses: NODE.DIRECTION of each, as "7.x".
+
+    Raises:
+        RefusedError: No data set or several have the name, or none is named and there are several.
     """
     counts = Counter(responses)
     names: list[tuple[str, ...]] = []
@@ -109,12 +119,22 @@ def _choose_data_set(
 
 
 def _require_acceleration(key: str, data_set: DataSet) -> None:
-    """Refuse a data set 58 that is no time history, or whose type of data is no acceleration.
+    """Check that a data set 58 is a time history, and that it is none of another quantity.
+
+    A data set that states no quantity, or one other than displacement, velocity and force, passes:
+    the unit tells then.
 
     Args:
         key: What the data set is of, for messages.
-        data_set: The data set.
+        data_set: The data set, with the 11 lines of its head.
+
+    Raises:
+        RefusedError: It is no time history, or its response is a displacement, a velocity or a
+            force.
+        ValueError: A code of the head is no whole number.
     """
+    # Columns of the format: the function in line 6, the quantities of abscissa and ordinate at the
+    # beginning of lines 8 and 9.
     function = int(data_set.head[5][:5])
     axis = int(data_set.head[7][:10])
     # A function of the general type 0 over times (17) is a time history (1) as well.
@@ -147,10 +167,24 @@ class DataSet:
 
 
 def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
-    """Yield the data sets of a number, 55 or 58, in the order of a universal file.
+    """Yield the data sets of one number, in the order of a universal file.
+
+    A data set stands between two lines "-1". Its first line is its number; "58b" marks a data set
+    58 whose values are bytes. Data sets of other numbers are passed over.
+
+    Args:
+        content: The file.
+        number: 55 (modes and other data at nodes) or 58 (functions, such as time histories).
+
+    Yields:
+        The data set: `head`, the 8 (55) or 11 (58) lines of its head; `lines`, the lines of its
+        values, and `content`, None; or, of a binary one, no lines, the bytes of its values, and
+        `byte_order`, "<" or ">". If the file is cut off, values are missing.
 
     Raises:
-        ValueError: A data set of the number ends inside its head.
+        ValueError: A data set of the number ends inside its head, or the line of a binary one does
+            not count its bytes.
+        KeyError: `number` is another one.
     """
     head_lines = {55: 8, 58: 11}[number]
     file = BytesIO(content)
@@ -159,6 +193,8 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
             continue
         first = file.readline()
         if first[:7].strip() == b"58b" and number == 58:
+            # Numbers behind 58b: order of the bytes (1 or 2), their floating-point format, the
+            # count of lines of the head, and the count of bytes.
             byte_order, _, _, size = (int(word) for word in first[7:].split()[:4])
             head = [decoded(file.readline()).rstrip("\r\n") for _ in range(head_lines)]
             start = file.tell()
@@ -200,7 +236,18 @@ class _History:
 
 
 def _parse_history(data_set: DataSet) -> _History:
-    """Return the samples in a data set 58.
+    """Return the samples in a data set 58, and what its head says of them.
+
+    Line 7 of the head has, in columns of 10 characters, the type of the values, their count, and
+    whether their abscissas are even (1) or stand beside them (0); columns 44 to 56 have the step.
+    Of complex values the real parts are returned.
+
+    Args:
+        data_set: The data set, in text or in bytes.
+
+    Returns:
+        `count`, the count in the head; `step`, in s; `samples`, shape (n,), where n is smaller than
+        `count` if values are missing; and `times` in s, shape (n,), or None if they are even.
 
     Raises:
         ValueError, IndexError: A line of the head is no such line.
@@ -219,6 +266,7 @@ def _parse_history(data_set: DataSet) -> _History:
         values = rows[:, width - numbers_of_value]
         return _History(count, step, values, rows[:, 0] if has_times else None)
     order = data_set.byte_order
+    # Types of values: 2 and 4 are real, 5 and 6 complex; 2 and 5 are single, 4 and 6 double.
     value = "f8" if value_type in (4, 6) else "f4"
     fields: list[tuple[str, str, tuple[int, ...]]] = [("value", order + value, (numbers_of_value,))]
     if has_times:  # a time is single, beside doubles as well
@@ -235,13 +283,20 @@ def _even_step(key: str, times: Array) -> float:
 
     Args:
         key: What the times are of, for messages.
-        times: The times in s, shape (n,).
+        times: The times in s, shape (n,), with n ≥ 2.
+
+    Returns:
+        One over a whole number of samples in a second, if the times agree with it to all digits;
+        otherwise the mean step.
 
     Raises:
-        RefusedError: They are uneven.
+        RefusedError: A time misses its even place by more than a unit of its sixth digit and a
+            thousandth of a step, or the times do not rise.
     """
     even = np.linspace(times[0], times[-1], len(times))
     step = float(even[1] - even[0])
+    # The first digit of a time t has the unit 10^floor(log10 |t|), and the sixth one 1e-5 of it.
+    # The floor of the magnitudes keeps the logarithm of t = 0 finite.
     magnitudes = np.maximum(np.abs(times), np.finfo(float).tiny)
     last_digits = 10 ** (np.floor(np.log10(magnitudes)) - 5)
     # Besides, a time may miss its place by a thousandth of a step (tuned).

@@ -6,15 +6,18 @@ import re
 
 from alphacut.base.number_text import STANDARD_GRAVITY
 
+# Metres in a unit of length, in small letters.
 METRES = {
     "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0,
     "km": 1e3, "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048,
     "feet": 0.3048,
 }  # fmt: skip
+# Seconds in a unit of time.
 SECONDS = {
     "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "msec": 1e-3, "s": 1.0, "sec": 1.0,
     "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
 }  # fmt: skip
+# Newtons in a unit of force. Capitals count, since mN and MN differ by 1e9.
 NEWTONS = {
     "N": 1.0, "kN": 1e3, "MN": 1e6, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
     "kip": 4448.2216152605,
@@ -30,7 +33,8 @@ def acceleration_factor(unit: str) -> float | None:
     """Return the factor to m/s² of a unit of acceleration as files of records write it.
 
     Multiples of g are "mg", "%g", "g/10" and "10*g"; a length over a second squared may be
-    "cm/s^2", "CM/SEC**2", "cm/s/s" or "cm s-2". Other units give None.
+    "cm/s^2", "CM/SEC**2", "cm/s/s" or "cm s-2". Capitals and brackets around the unit do not
+    matter. Other units, and an empty one, give None.
     """
     text = _without_brackets(unit)
     multiple = r"(10\s*\*?|milli|m|%|‰)?\s*g(?:'s|s)?\s*(/\s*10|\*\s*10)?"
@@ -70,4 +74,5 @@ def other_quantity(unit: str) -> str:
 
 
 def _without_brackets(unit: str) -> str:
+    """Return a unit without brackets and blanks around it, and without points at its end."""
     return unit.strip().strip("()[]").strip().rstrip(".")
