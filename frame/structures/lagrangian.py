@@ -60,7 +60,16 @@ class LagrangianSystem(StructureModel):
     force: Function | None = None
 
     def __post_init__(self) -> None:
-        """Refuse functions and numbers that give no smooth equations of motion."""
+        """Check numbers and functions, calling each function once with symbols.
+
+        Raises:
+            RefusedError: `coordinates` is no whole number from 1 on; `parameters` or `observed` is
+                empty, has a name out of alphabet, or a parameter is no finite number; the
+                Lagrangian is not quadratic in the velocities v; a coordinate has no inertia at the
+                initial state of the nominal parameters; or a function asks for a name, a coordinate
+                or an operation that is not there, or gives another count of expressions than it
+                must.
+        """
         checked_number("coordinates", self.coordinates, whole=True, least=1)
         for name in ("parameters", "observed"):
             mapping = getattr(self, name)
@@ -78,7 +87,9 @@ class LagrangianSystem(StructureModel):
         require(is_quadratic, "lagrangian", value=eq.mass.tolist(), allowed=allowed)
         for name in self.observed:
             self.output(name, eq.v)
-        # without inertia a momentum does not tell the velocity; 1e-300 is 0 but for underflow
+        # Without inertia a momentum does not tell the velocity: the matrix ∂²L/∂v² is singular. It
+        # is checked at one point, since symbols do not tell whether a determinant can vanish.
+        # 1e-300 is 0 but for underflow.
         q0, v0 = self.start()
         at_start = dict(zip(list(eq.q) + list(eq.v), q0 + v0, strict=True))
         nominal = {eq.p[name]: value for name, value in self.parameters.items()}
@@ -94,7 +105,15 @@ class LagrangianSystem(StructureModel):
         return q0, v0
 
     def output(self, name: str, velocity: Symbols) -> Expr:
-        """Return an output as an expression in coordinates, the given velocities and parameters."""
+        """Return an output as a SymPy expression in coordinates, velocities and parameters.
+
+        Args:
+            name: Name of the output.
+            velocity: The n expressions or symbols that stand for the velocities.
+
+        Raises:
+            RefusedError: The function of the output does not give one expression.
+        """
         q, p = list(self.symbols.q), self.symbols.p
         function = self.observed[name]
         values = _expressions(f"observed: {name}", lambda: [function(q, list(velocity), p)], p)
@@ -157,16 +176,22 @@ class Equations:
 def _expressions(
     name: str, values: Callable[[], Any], parameters: Named, count: int = 1
 ) -> list[Expr]:
-    """Return the SymPy expressions that a function of the user gives.
+    """Return the SymPy expressions that a function of the user gives for symbols.
 
     Args:
         name: What the function is of, for the message.
-        values: Calls the function with symbols.
-        parameters: Symbols of the parameters by name.
+        values: Calls the function with symbols of coordinates, velocities and parameters, and
+            returns a sequence of expressions or numbers.
+        parameters: Symbols of the parameters by name, for the message.
         count: Number of expressions that it must give.
 
+    Returns:
+        List of `count` expressions; numbers have become expressions.
+
     Raises:
-        RefusedError: It gives others, or asks for a name or an operation that is not there.
+        RefusedError: It gives another number of them, or something that is no expression; or it
+            raises KeyError, IndexError, TypeError or AttributeError, as for a name or an operation
+            that is not there. Other errors of the function leave as they are.
     """
     import sympy
 
@@ -192,10 +217,22 @@ def pendulum(
     phi0: float = 1.5,
     omega0: float = 0.0,
 ) -> LagrangianSystem:
-    """Return a damped pendulum, L = m l² φ̇²/2 + m g l cos φ, with the moment −d φ̇.
+    """Return a damped pendulum, L = m l² φ̇²/2 + m g l cos φ, under the moment -d φ̇.
 
-    Parameters: "m", "l", "d", "g", "phi_0", "omega_0". Outputs: "force" in the bar, m l φ̇² + m g
-    cos φ, and the angle "phi". Mass, length and gravity must be positive, damping not negative.
+    Its parameters are named "m", "l", "d", "g", "phi_0" and "omega_0". Its outputs are "force", the
+    tension m l φ̇² + m g cos φ of the bar in N, and "phi", the angle φ in rad from the lowest
+    position.
+
+    Args:
+        mass: m in kg, above 0.
+        length: l in m, above 0.
+        damping: d in N m s/rad, not below 0.
+        gravity: g in m/s², above 0.
+        phi0: Initial angle in rad.
+        omega0: Initial angular velocity in rad/s.
+
+    Raises:
+        RefusedError: An argument is no such number.
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         checked_number(name, value, positive=True)

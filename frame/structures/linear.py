@@ -77,10 +77,18 @@ class Assembly(Generic[Number]):
 
     @property
     def forces(self) -> Number | None:
-        """Force under a unit of each distinct history, shape (…, n, H), in N; None without one."""
+        """Force on the unknowns under a unit of each load history, shape (…, n, histories), in N.
+
+        The histories are those of the loads, each once, in the order of their first use; loads with
+        equal histories are added at their amplitudes. None if no load has a history, so also if all
+        are impulses. The … stands for the parameter sets of a jet, and for nothing for a Taylor
+        model.
+        """
         histories = distinct_histories(self.loads)
         belongs = np.zeros((len(self.loads), len(histories)))
         for row, force in zip(belongs, self.loads, strict=True):
+            # Histories are compared by their values, since equal ones are often made twice. One
+            # column for both halves the work of a response.
             if force.history is not None:
                 row[:] = [force.history.identity == history.identity for history in histories]
         return self._summed(belongs)
@@ -100,9 +108,15 @@ class Assembly(Generic[Number]):
         return self._summed(np.array([[float(force.history is None)] for force in self.loads]))
 
     def _summed(self, weights: Array) -> Number | None:
-        """Return the sums of the forces with weights (forces, k), shape (…, n, k).
+        """Return weighted sums of the vectors of the loads, shape (…, n, k).
 
-        None where all weights are zero.
+        Args:
+            weights: One row for each load, in their order, and k columns, shape (loads, k).
+
+        Returns:
+            Jet or Taylor model. Column j is the sum of the loads, each at its amplitude, times
+            weights[:, j]; … stands for the parameter sets of a jet, and for nothing for a Taylor
+            model. None if there are no loads, or all weights are 0.
         """
         if self.columns is None or not weights.any():
             return None
@@ -137,7 +151,11 @@ class LinearSystem(StructureModel):
         raise NotImplementedError
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Return the structure with its parameters as jets or as Taylor models."""
+        """Return the structure with its parameters as jets or as Taylor models.
+
+        Args:
+            p: All parameters by name, of one type and shape.
+        """
         raise NotImplementedError
 
     @property
@@ -156,16 +174,18 @@ class LinearSystem(StructureModel):
         return cast("Self", moved)
 
     def require_dissipation(self, lowest: Mapping[str, float]) -> None:
-        """Refuse a structure that is not known to lose energy everywhere in a box of parameters.
+        """Raise an error if it is not known that the structure loses energy everywhere in a box.
 
-        It follows from how the structure is written, not from samples of it.
+        Knowledge comes from how the structure is written, not from samples of it. Of a structure in
+        general nothing is known, so that this method always raises; kinds of structures that know
+        more override it, and return None where damping is dissipative.
 
         Args:
-            lowest: Least value of each parameter in the box; all are within their ranges.
+            lowest: Smallest value of each parameter in the box, in SI units, by name; all are
+                within their ranges.
 
         Raises:
-            UnprovedError: Unknowns have no mass, or a term of the damping may feed energy into the
-                structure.
+            UnprovedError: Dissipation is not known.
         """
         raise UnprovedError(f"nothing is known about the parameters of a {type(self).__name__}")
 
@@ -176,9 +196,11 @@ def has_matrices(model: object) -> TypeGuard[LinearSystem]:
 
 
 def histories(system: LinearSystem) -> dict[str, History]:
-    """Return the histories of all loads by name, as "load" of the ground and "force1" of a force.
+    """Return the histories of all loads by name.
 
-    Their order is that of the columns of `Matrices.pushes`.
+    The base acceleration comes first and is named "load". The histories of the forces follow as
+    "force1", "force2" …, each distinct one once, in the order of their first use. Impulses have no
+    history. A structure without loads gives an empty dictionary.
     """
     named: dict[str, History] = {}
     if system.ground is not None:
@@ -226,8 +248,17 @@ class Matrices:
 
     @property
     def start(self) -> Jet:
-        """Initial state [q; v], shape (S, 2n, 1), under the static force and after the impulse."""
+        """Initial state [q; v] in m and m/s, shape (S, 2n, 1): n displacements, then n velocities.
+
+        The given displacements are increased by those under the static force, K⁻¹ f, and the given
+        velocities by those that the impulse J at t = 0 adds, M⁻¹ J. S counts the parameter sets.
+
+        Raises:
+            numpy.linalg.LinAlgError: There is a static force and K is singular.
+        """
         q0, v0 = self.q0, self.v0
+        # A static force has acted for ever, so that the structure rests under it, K q = f. An
+        # impulse changes momenta M v at once.
         if self.static is not None:
             q0 = q0 + inverse(self.stiffness) @ self.static
         if self.impulse is not None:
@@ -235,10 +266,19 @@ class Matrices:
         return concatenate([q0, v0], -2)
 
     def pushes(self, *, ground: bool) -> Jet:
-        """Return the accelerations by a unit of each load, shape (S, n, loads).
+        """Return the accelerations of the unknowns, at rest, under a unit of each load.
 
-        With `ground` the first column is that of the base excitation, −ι.
+        Args:
+            ground: Whether the first column is that of the base acceleration: -ι, where ι are the
+                displacements of the unknowns under a unit displacement of the ground.
+
+        Returns:
+            Jet of shape (S, n, loads) over S parameter sets. Behind the base's column, if any,
+            there is one for each history of the forces, M⁻¹ b with the force vector b in N, in m/s²
+            for one unit of the history. There are none without forces.
         """
+        # The slice of the one column of ι is empty without a ground, so that one concatenation
+        # serves both cases.
         shape = (*self.mass.value.shape[:-1], int(ground))
         of_ground = np.broadcast_to(self.rigid[:, : int(ground)], shape)
         columns = [self.mass.like(-of_ground)]
@@ -248,9 +288,11 @@ class Matrices:
 
     @property
     def feeds(self) -> Jet | None:
-        """Feedthrough: what a unit of each force adds to outputs at once, shape (S, m, H).
+        """Feedthrough: what a unit of each force history adds to the outputs at once.
 
-        None where forces add nothing at once.
+        A force adds M⁻¹ b to accelerations at the moment at which it acts, and so to outputs that
+        observe these. The jet has the shape (S, outputs, histories) over S parameter sets. It is
+        None if no output observes an acceleration, or no force has a history.
         """
         if self.forces is None or not self.accelerated.any():
             return None
@@ -287,12 +329,16 @@ def evaluate(
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     fixed_columns = np.tile(list(fixed.values()), (len(points), 1))
     values = np.hstack([points, fixed_columns])
+    # All parameters are jets of the same type, and only the named ones have derivatives.
     p = variables(values, [*names, *fixed], names if derivatives else ())
     full = system.assembly(p)
 
     damping = full.dashpots
+    # Rayleigh damping a M + b K is of the springs alone: weights on the storeys (P-Delta) reduce
+    # the stiffness, and dissipate nothing.
     for factor, matrix in zip(full.rayleigh, (full.mass, full.springs), strict=True):
-        # what is zero with its derivative adds nothing, and no rounding
+        # What is zero with its derivative adds nothing, and no rounding. A factor that is zero at
+        # the nominal parameters may still be uncertain.
         if factor.value.any() or factor.first.any():
             damping = damping + factor[:, None, None] * matrix
     mass, stiffness = full.mass, full.stiffness
@@ -354,7 +400,8 @@ def undamped_modes(mass: Array, stiffness: Array) -> tuple[Array, Array]:
     Raises:
         numpy.linalg.LinAlgError: A mass matrix is not positive definite.
     """
-    # With M = L Lᵀ the problem is L⁻¹ K L⁻ᵀ y = λ y, φ = L⁻ᵀ y.
+    # With M = L Lᵀ the problem is L⁻¹ K L⁻ᵀ y = λ y, φ = L⁻ᵀ y. NumPy solves this symmetric problem
+    # for a stack of matrices at once; SciPy's solver of the generalised one takes one at a time.
     inverse_factor = np.linalg.inv(np.linalg.cholesky(mass))
     transposed = inverse_factor.swapaxes(-1, -2)
     squared, vectors = np.linalg.eigh(inverse_factor @ stiffness @ transposed)
@@ -364,19 +411,23 @@ def undamped_modes(mass: Array, stiffness: Array) -> tuple[Array, Array]:
 def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     """Return the damping matrix D = M Φ diag(2 ζ_k ω_k) Φᵀ M with its derivatives.
 
-    D follows the parameters through the modes Φ, and is not frozen at their nominal values. Modes
-    of the same ratio may have equal frequencies.
+    Arguments and result are jets: values at S parameter sets with their first and second
+    derivatives by d inputs. D follows the parameters through the modes Φ, and is not frozen at
+    their nominal values. Modes with the same ratio may have equal frequencies; modes with different
+    ratios must have different ones, or the derivatives are infinite.
 
     Args:
-        mass: Symmetric positive definite matrices M, shape (S, n, n).
-        stiffness: Symmetric positive definite matrices K, the same shape.
+        mass: Symmetric positive definite matrices M, shape (S, n, n), in kg.
+        stiffness: Symmetric positive definite matrices K, the same shape, in N/m.
         ratios: One ratio ζ, shape (S,), of all modes, or one of each mode by rising frequency.
 
     Returns:
         D, shape (S, n, n), in N s/m.
 
     Raises:
-        RefusedError: A stiffness is not positive definite, but for rounding.
+        RefusedError: At a parameter set, the smallest eigenvalue ω² is not above 1e-12 of the
+            largest.
+        numpy.linalg.LinAlgError: A mass is not positive definite.
     """
     squared, shapes = undamped_modes(mass.value, stiffness.value)
     largest = np.maximum(abs(squared).max(-1, keepdims=True), 1e-300)
@@ -420,7 +471,7 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
-    """Refuse modes of unequal damping ratio that change places between parameter sets.
+    """Raise an error if modes of unequal damping ratio change places between parameter sets.
 
     Args:
         mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
@@ -428,7 +479,9 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
         ratios: Damping ratios of the modes by rising frequency, shape (n,).
 
     Raises:
-        RefusedError: A mode is most similar to a nominal mode of another place and ratio.
+        RefusedError: At some set a mode is most similar to a nominal mode of another place, and the
+            ratios of the two places differ.
+        numpy.linalg.LinAlgError: A mass is not positive definite.
     """
     shapes = undamped_modes(mass, stiffness)[1]
     # Modal assurance by the mass: |φ_iᵀ M φ_k| is 1 of the same mode and 0 of another one at the
@@ -450,18 +503,27 @@ class _DividedDifferences(NamedTuple):
 
 
 def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
-    """Return f[λ_i, λ_j] by [i, j] and f[λ_i, λ_k, λ_j] by [i, k, j], of f = 2 √λ at some modes.
+    """Return the divided differences of f, where f is 2 √λ at some modes and 0 at the others.
+
+    They are f[x, y] = (f(x) - f(y)) / (x - y) and f[x, y, z] = (f[x, y] - f[y, z]) / (x - z), or
+    their limits where arguments are equal.
 
     Args:
-        omega: ω = √λ of n modes at S parameter sets, shape (S, n). Modes inside may have equal
-            frequencies, but not one inside and one outside.
-        inside: Modes where f is 2 √λ, shape (n,); it is 0 at the others.
+        omega: ω = √λ > 0 of n modes at S parameter sets, shape (S, n). Two modes inside may have
+            equal frequencies, and two outside as well. One inside and one outside must not: the
+            differences are then infinite.
+        inside: Modes where f is 2 √λ, shape (n,).
+
+    Returns:
+        `first`, f[λ_i, λ_j] by [set, i, j], shape (S, n, n); and `second`, f[λ_i, λ_k, λ_j] by
+        [set, i, k, j], shape (S, n, n, n).
     """
     both_inside = inside[:, None] & inside
     one_inside = inside[:, None] != inside
     f = np.where(inside, 2 * omega, 0.0)
     sums = omega[:, :, None] + omega[:, None]
     gaps = omega[:, :, None] ** 2 - omega[:, None] ** 2
+    # Quotients by gaps are used only for one mode inside and one outside; elsewhere a gap may be 0.
     safe_gaps = np.where(one_inside, gaps, 1.0)
 
     # 2 (√x − √y) / (x − y) = 2 / (√x + √y) has no cancellation where both modes are inside.
@@ -469,7 +531,9 @@ def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
     first = np.where(both_inside, 2 / sums, np.where(one_inside, quotients, 0.0))
 
     # Inside, f[x, y, z] = −2 / ((√x + √y) (√y + √z) (√z + √x)). Else it is the quotient
-    # (f[x, y] − f[y, z]) / (x − z) by a pair of which one mode is inside and one outside.
+    # (f[x, y] − f[y, z]) / (x − z) by a pair of which one mode is inside and one outside. Divided
+    # differences do not depend on the order of their arguments, so any such pair may be x and z:
+    # i and k here, else i and j, else none, and all are 0, since i, k and j are all outside.
     closed = -2 / (sums[..., None] * sums[:, None] * sums[:, :, None])
     by_i_k = (first[:, :, None] - first[:, None]) / safe_gaps[..., None]
     by_i_j = (first[..., None] - first[:, None]) / safe_gaps[:, :, None]
@@ -502,16 +566,33 @@ class NominalModes:
 
 
 def nominal_modes(system: LinearSystem) -> NominalModes:
-    """Return the undamped modes at the nominal parameters."""
+    """Return the undamped modes φ of a structure at its nominal parameters, by rising frequency.
+
+    They are K φ = ω² M φ with φᵀ M φ = 1, of the unknowns that have mass.
+
+    Returns:
+        Arrays of shape (modes,): `frequencies`, ω in rad/s, 0 of a mode with ω² ≤ 0;
+        `damping_ratios`, φᵀ D φ / (2 ω); and `effective_masses`, (φᵀ M ι)² in kg, where ι are the
+        displacements under a unit displacement of the ground. And the number `moved_mass`, ιᵀ M ι
+        in kg, to which the effective masses add up.
+
+    Raises:
+        RefusedError: Damping is given by ratios of the modes, and the stiffness is not positive
+            definite.
+        numpy.linalg.LinAlgError: The mass, or the stiffness of unknowns without mass, is singular.
+    """
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
     mass, damping = matrices.mass.value[0], matrices.damping.value[0]
     squared, shapes = undamped_modes(mass, matrices.stiffness.value[0])
     omega = np.sqrt(np.maximum(squared, 0.0))
+    # The damping matrix need not be diagonal in the modes. Its diagonal φᵀ D φ = 2 ζ ω is what
+    # a mode dissipates to first order in D.
     modal_damping_constants = np.einsum("ik,ij,jk->k", shapes, damping, shapes)
     influence = matrices.rigid[:, 0]
     participation = shapes.T @ mass @ influence
     return NominalModes(
         frequencies=omega,
+        # The floor gives a rigid mode, whose ratio has no meaning, a finite or infinite number.
         damping_ratios=modal_damping_constants / np.maximum(2 * omega, 1e-300),
         effective_masses=participation**2,
         moved_mass=float(influence @ mass @ influence),

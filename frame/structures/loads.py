@@ -37,7 +37,16 @@ def distinct_histories(forces: Sequence[Force]) -> list[History]:
 
 
 def require_loads(ground: object, forces: Sequence[object]) -> None:
-    """Refuse a base excitation that is no `Accelerogram`, and forces that are no `Force`."""
+    """Check the types of a base excitation and of the forces on a structure.
+
+    Args:
+        ground: An `Accelerogram`, or None for a base at rest.
+        forces: A sequence of `Force`, which may be empty. The history of each must be a `History`,
+            or None for an impulse.
+
+    Raises:
+        RefusedError: One of them is of another type.
+    """
     is_record = isinstance(ground, Accelerogram | None)
     require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
     allowed = "a sequence of Force, each with a History or None"

@@ -14,12 +14,13 @@ def damping_from_loss(
     """Return the damping ratio ζ = sin(½ arctan(w η)) of a mode in free oscillation, plus joints.
 
     Args:
-        loss: Loss factor η of the material's Young's modulus.
+        loss: Loss factor η of the material's Young's modulus, not negative.
         joints: Damping ratio of the joints, which is added.
         energy_fraction: Fraction w of the mode's strain energy that is in the material.
 
     Returns:
-        ζ as a fuzzy number, piecewise linear between the levels of both numbers.
+        ζ as a fuzzy number, whose α-cuts are exact at the levels of both numbers and linear between
+        them; a crisp number if neither argument has a width.
 
     Raises:
         RefusedError: `energy_fraction` is not within [0, 1].

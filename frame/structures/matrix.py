@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
+from math import inf, isfinite
 from typing import Any, Self
 
 import numpy as np
@@ -34,6 +35,7 @@ from alphacut.frame.structures.loads import Factor, Force, require_loads
 from alphacut.frame.structures.model import PlacedForce
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter, require_names
 
+# The matrices M, D and K by the names of their fields.
 KINDS = ("mass", "damping", "stiffness")
 Terms = Sequence[tuple[Factor | str | float, Array]]
 
@@ -93,7 +95,19 @@ class MatrixStructure(LinearSystem):
     loads: Sequence[Force] = ()
 
     def __post_init__(self) -> None:
-        """Store terms and loads as tuples; refuse values that are not allowed."""
+        """Check all fields, and store arrays as dense, exactly symmetric ones.
+
+        Terms and loads become tuples.
+
+        Raises:
+            RefusedError: A field is no mapping or sequence where it must be one, or is empty (mass,
+                stiffness, observed); a name or unit is out of alphabet; a number is not finite; a
+                vector or an array has a wrong shape, or an array is not symmetric; a factor names
+                no parameter or gives no number; the mass of the unknowns that have mass is not
+                positive definite; an unknown without mass has a damper, a force or no stiffness; a
+                damping ratio is outside [0, 1), or there are neither none, one, nor one for each
+                mode.
+        """
         for name in ("parameters", "observed"):
             value = getattr(self, name)
             is_table = isinstance(value, Mapping)
@@ -121,6 +135,7 @@ class MatrixStructure(LinearSystem):
         self._require_ratios()
 
     def _require_forces_on_masses(self) -> None:
+        """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude."""
         for force in self.loads:
             self._require_factor("a force", force.amplitude)
             missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
@@ -128,7 +143,15 @@ class MatrixStructure(LinearSystem):
             require(not len(missing), "force", value, allowed="on unknowns that have mass")
 
     def _require_ratios(self) -> None:
-        """Refuse damping ratios outside [0, 1), and a number of them that is not that of modes."""
+        """Check the damping ratios of the modes.
+
+        There may be none, one for all modes, or as many as there are unknowns with mass. Each is a
+        number, or the name of a parameter, whose nominal value is then meant.
+
+        Raises:
+            RefusedError: Their number is another one, a value is outside [0, 1), or no parameter
+                has the name.
+        """
         is_allowed = len(self.ratios) in (0, 1, len(self.massive))
         for ratio in self.ratios:
             if isinstance(ratio, str):
@@ -151,33 +174,45 @@ class MatrixStructure(LinearSystem):
 
     @cached_property
     def massive(self) -> Ints:
-        """Unknowns that have mass, rising."""
+        """Indices of the unknowns that have mass, in rising order."""
         return np.flatnonzero(np.any([array.any(1) for _, array in self.mass], axis=0))
 
     @cached_property
     def massless(self) -> Ints:
-        """Unknowns that have none."""
+        """Indices of the unknowns that have no mass, in rising order."""
         return np.setdiff1d(np.arange(self.size), self.massive)
 
     def nominal_terms(self, kind: str) -> Array:
-        """Return the terms of M, D or K at nominal parameters, shape (terms, n, n).
+        """Return the terms f_i M_i of a matrix Σ f_i M_i at the nominal parameters.
 
         Args:
-            kind: "mass", "damping" or "stiffness".
+            kind: Which matrix: "mass", "damping" or "stiffness".
+
+        Returns:
+            Array of shape (terms, n, n) in SI units; (0, n, n) of a damping without terms.
         """
         factors = [float(_value_of(factor, self.parameters)) for factor, _ in getattr(self, kind)]
         return np.array(factors)[:, None, None] * self._arrays[kind]
 
     def _require_definite(self) -> None:
-        """Refuse a mass or stiffness that is not positive definite where it has to be.
+        """Check that M and K are positive definite where they must be, at the nominal parameters.
 
-        That is M over the unknowns that have mass, and K over the others, which have no dampers.
+        The unknowns are divided into those that have mass, `self.massive`, and the others,
+        `self.massless`. M must be positive definite over the former. K must be so over the latter,
+        which follow the former without inertia; they must have no dampers. Over all unknowns K may
+        be indefinite, unless a term of negative trace makes it so.
+
+        Raises:
+            RefusedError: One of these does not hold. The hint names a term with a negative trace,
+                whose sign is probably wrong.
         """
         mass = self.nominal_terms("mass").sum(axis=0)
         a, b = self.massive, self.massless
         is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
         cure = "all rows and columns of unknowns that move have mass, coupled by a positive matrix"
+        # An element's matrix is semidefinite, with a positive trace: a negative one tells which
+        # term has the wrong sign.
         traces = np.trace(self.nominal_terms("mass"), axis1=1, axis2=2)
         if (traces < 0).any():
             cure = f"turn the sign of term {int(traces.argmin()) + 1}: it seems to be −M"
@@ -196,18 +231,24 @@ class MatrixStructure(LinearSystem):
         require(not damped, "damping", value, "dampers between those with mass")
 
     def _require_stable(self, stiffness: Array) -> None:
-        """Refuse a stiffness with a negative eigenvalue to which a term of negative sign adds.
+        """Check that no term of negative sign makes the stiffness indefinite.
+
+        A term with a negative trace, as of weights (P-Delta), is allowed if the sum has no negative
+        eigenvalue, none below -1e-9 of the sum's largest entry. A sum without such a term is not
+        checked.
 
         Args:
             stiffness: Sum of all terms at the nominal parameters, shape (n, n).
 
         Raises:
-            RefusedError: The structure is unstable because of such a term, whose place it names.
+            RefusedError: There is a negative eigenvalue and a term of negative trace, whose place
+                among the terms, from 1 on, the message names.
         """
         traces = np.trace(self.nominal_terms("stiffness"), axis1=1, axis2=2)
         negative = np.flatnonzero(traces < 0)
         if not len(negative):
             return
+        # An unsupported structure has eigenvalues of 0, which rounding makes slightly negative.
         is_stable = np.linalg.eigvalsh(stiffness).min() >= -1e-9 * np.abs(stiffness).max()
         what = f"unstable, with a negative diagonal in term {negative[0] + 1}"
         cure = "turn the sign of that matrix or of its factor: it seems to be −K"
@@ -232,7 +273,22 @@ class MatrixStructure(LinearSystem):
         return replace(self, observed=observed, row_factors=factors)
 
     def with_forces(self, forces: Sequence[PlacedForce]) -> tuple[Self, tuple[str, ...]]:
-        """Return the structure under forces, with the amplitudes "F1", "F2" … in their order."""
+        """Return the structure under other forces, and the names of their amplitudes.
+
+        Args:
+            forces: For each force its `place`, the index of the unknown on which it acts; its
+                nominal `amplitude` in N, or in N s of an impulse; and its `history`, None for an
+                impulse at t = 0. They replace the loads that the structure has.
+
+        Returns:
+            The structure, whose parameters "F1", "F2" … are the amplitudes; parameters of these
+            names are overwritten. And these names, in the order of the forces.
+
+        Raises:
+            RefusedError: A force acts on an unknown without mass, or its amplitude is not a finite
+                number.
+            IndexError: There is no such unknown.
+        """
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
         unit_vectors: Array = np.eye(self.size)
         loads: list[Force] = []
@@ -243,9 +299,19 @@ class MatrixStructure(LinearSystem):
         return replace(self, loads=loads, parameters=parameters), names
 
     def require_dissipation(self, lowest: Mapping[str, float]) -> None:
-        """Refuse functions as factors, and damping that is not known to be dissipative.
+        """Raise an error if it is not known that the structure loses energy everywhere in a box.
 
-        D = Σ_i f_i D_i loses energy if all factors f_i and all arrays D_i are nonnegative.
+        The damping matrix D = Σ_i f_i D_i is dissipative if no factor f_i is negative and no array
+        D_i has a negative eigenvalue. Both are checked. A factor must be a number or a parameter,
+        which is smallest at its lower end; of functions nothing is known.
+
+        Args:
+            lowest: Smallest value of each parameter in the box, in SI units, by name.
+
+        Raises:
+            UnprovedError: The structure has unknowns without mass, a factor of M, D or K that is a
+                function (products of powers are functions), or a damping term with a negative
+                factor or eigenvalue.
         """
         if len(self.massless):
             raise UnprovedError("unknowns without mass are condensed", "take the method dual")
@@ -253,7 +319,8 @@ class MatrixStructure(LinearSystem):
             if any(callable(factor) for factor, _ in getattr(self, kind)):
                 raise UnprovedError(f"{kind} has a factor that is a function")
         for factor, array in self.damping:
-            # the array is nonnegative but for the rounding of its eigenvalues
+            # The array is nonnegative but for the rounding of its eigenvalues, a few units of 1e-16
+            # of the largest one.
             eigenvalues = np.linalg.eigvalsh(array)
             is_definite = eigenvalues[0] >= -1e-14 * np.abs(eigenvalues).max()
             if _value_of(factor, lowest) < 0 or not is_definite:
@@ -263,17 +330,21 @@ class MatrixStructure(LinearSystem):
                 )
 
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
-        """Return the factor and the array of a term of a matrix.
+        """Return the factor and the array of one term of a matrix, checked and simplified.
 
         Args:
             kind: "mass", "damping" or "stiffness".
-            term: Pair (factor, array), dense or sparse, of the user's.
+            term: What the user gave: a pair of a factor (a number, the name of a parameter, or a
+                function of all parameters) and an array, dense or sparse.
 
         Returns:
-            The factor, as simple as it is, and the dense array, which is made exactly symmetric.
+            The factor, in which a product of powers of parameters has become a number or a name
+            where it is one; and the dense array, shape (n, n), made exactly symmetric.
 
         Raises:
-            RefusedError: The term is no such pair, or the array is not symmetric.
+            RefusedError: The term is no such pair, the factor gives no number, or the array is not
+                square with n rows, not finite, or not symmetric to 1e-9 of its largest entry. n is
+                the number of rows of the first mass array.
         """
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         value = type(term).__name__
@@ -297,13 +368,20 @@ class MatrixStructure(LinearSystem):
         return factor, np.asarray((array + array.T) / 2, float)
 
     def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
-        """Refuse a factor that gives no number, or one whose derivatives are not known.
+        """Check that a factor gives a number that can be differentiated.
 
         Args:
             kind: What the factor is of, for the message.
-            factor: A number, the name of a parameter, or a function, which is called once with
-                jets.
+            factor: A number, the name of a parameter, or a function of all parameters by name. A
+                function is called once with jets, numbers that carry their derivatives, at the
+                nominal values.
+
+        Raises:
+            RefusedError: The factor is no number and gives none, names no parameter, or uses an
+                operation that jets do not have. Errors of a function other than KeyError,
+                TypeError, AttributeError and ValueError leave as they are.
         """
+        # One parameter is differentiated: that is enough to find operations that jets do not have.
         names = list(self.parameters)
         nominal = np.array([list(self.parameters.values())], float)
         try:
@@ -315,7 +393,14 @@ class MatrixStructure(LinearSystem):
         require(is_number, f"factor of {kind}", value=repr(value), allowed=allowed)
 
     def _require_vectors(self) -> None:
-        """Refuse initial values, rows of outputs and forces that do not fit the unknowns."""
+        """Check initial values, pattern, rows of outputs and forces, vectors over the n unknowns.
+
+        Initial values and the pattern may be None. Each vector has n finite numbers; the row of an
+        output may have 2n, for displacements and velocities.
+
+        Raises:
+            RefusedError: A vector has another shape, or an entry that is no finite number.
+        """
         n = self.size
         vectors: list[tuple[str, Any]]
         vectors = [(name, getattr(self, name)) for name in ("q0", "v0", "pattern")]
@@ -333,7 +418,20 @@ class MatrixStructure(LinearSystem):
             require(shape in shapes, name, f"of shape {shape}", allowed)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Return matrices, rows and loads at parameters `p`, jets or Taylor models."""
+        """Return matrices, output rows and loads of the structure at given parameters.
+
+        Args:
+            p: All parameters by name: jets at S parameter sets (values with derivatives), or Taylor
+                models over a box (polynomials with error bounds).
+
+        Returns:
+            Assembly of numbers of the type of `p`: mass, stiffness of the springs and damping
+            matrix, shape (…, n, n); initial displacements and velocities, shape (…, n); constant
+            rows of the m outputs on [q; v], shape (m, 2n), and their factors, shape (…, m); the
+            force vector of each load at its amplitude, shape (…, n, loads), None without loads.
+            Here … stands for S with jets and for nothing with Taylor models. There is no Rayleigh
+            damping, no P-Delta, and no output on accelerations.
+        """
         n = self.size
         zero: Number = lifted(0.0, p)
         # Σ_i f_i(p) M_i as one contraction of the factors with the stacked arrays
@@ -341,7 +439,7 @@ class MatrixStructure(LinearSystem):
             kind: values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
             for kind, arrays in self._arrays.items()
         }
-        # a row of n entries acts on displacements alone
+        # A row of n entries acts on displacements alone; its other half stays zero.
         rows = np.zeros((len(self.observed), 2 * n))
         for row, observed in zip(rows, self.observed.values(), strict=True):
             row[: len(observed)] = observed
@@ -435,10 +533,18 @@ def require_symmetric(key: str, array: Array, names: Sequence[object]) -> None:
 def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints) -> Array:
     """Return the fraction of the strain energy of each mode in some terms of K, shape (modes,).
 
-    With K = Σ K_i it is Σ φᵀK_i φ / φᵀK φ over the terms K_i of these indices, for the modes φ by
+    With K = Σ K_i it is Σ φᵀK_i φ / φᵀK φ over the chosen terms K_i, for the undamped modes φ by
     rising frequency. To first order the loss factor of a mode is the mean of those of its parts
     with these weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982). The modes are those at
-    nominal values.
+    nominal values; there are as many as unknowns with mass.
+
+    Args:
+        system: The structure.
+        terms: Indices of the terms among those of the stiffness, from 0 on; one index counts as
+            often as it is given.
+
+    Raises:
+        IndexError: There is no such term.
     """
     # Every unknown is observed, so that the rows give the modes also at the unknowns without mass,
     # which `evaluate` condenses. Damping by ratios would need the modes that are sought.
@@ -451,13 +557,6 @@ def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints)
     springs = system.nominal_terms("stiffness")
     energies = np.einsum("ik,tij,jk->tk", shapes, springs, shapes)
     return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))
-
-
-FACTOR = re.compile(
-    r"\s*(?:(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<number>[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?))"
-    r"\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]+))?\s*"
-)
-"""A name or a number with a whole exponent, as l^3 or 12."""
 
 
 @dataclass(frozen=True)
@@ -478,11 +577,23 @@ class Monomial:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the monomial of a text such as "12*E*I/l^3", of ``*``, ``/`` and ``^`` or ``**``.
+        """Return the monomial of a text such as "12*E*I/l^3".
+
+        The text is a product or quotient of factors, by ``*`` and ``/``. A factor is the name of a
+        parameter or a number in plain digits, and may have a whole exponent of up to three digits
+        behind ``^`` or ``**``. Each ``/`` divides by the one factor behind it. Names are not
+        checked against parameters here; those whose exponents add up to 0 are left out.
 
         Raises:
-            RefusedError: The text is another kind of expression.
+            RefusedError: The text is another kind of expression, or its number is not finite, as in
+                "1/0".
         """
+        # A name or a number with a whole exponent, as l^3 or 12.
+        one_factor = re.compile(
+            r"\s*(?:(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
+            r"|(?P<number>[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?))"
+            r"\s*(?:(?:\^|\*\*)\s*(?P<power>-?[0-9]{1,3}))?\s*"
+        )
         coefficient = 1.0
         powers: dict[str, int] = {}
         # A single * or / is an operator, and ** is part of a factor: the texts between the
@@ -490,7 +601,7 @@ class Monomial:
         tokens = re.split(r"(?<!\*)([*/])(?!\*)", text)
         operators = ["*", *tokens[1::2]]
         for operator, token in zip(operators, tokens[::2], strict=True):
-            match = FACTOR.fullmatch(token)
+            match = one_factor.fullmatch(token)
             if match is None:
                 allowed = 'a product of powers of parameters, as "1", "Ec" or "2*E*I*l^-2"'
                 raise RefusedError("factor", repr(text[:60]), allowed)
@@ -500,7 +611,12 @@ class Monomial:
             if name := match["name"]:
                 powers[name] = powers.get(name, 0) + power
             else:
-                coefficient *= float(match["number"]) ** power
+                try:
+                    coefficient *= float(match["number"]) ** power
+                except ArithmeticError:  # 1/0, or 10^1000
+                    coefficient = inf
+        allowed = "a finite number beside the parameters"
+        require(isfinite(coefficient), "factor", repr(text[:60]), allowed)
         return cls(coefficient, tuple((name, k) for name, k in powers.items() if k))
 
     def __str__(self) -> str:
@@ -512,9 +628,15 @@ class Monomial:
 
     @property
     def simplest(self) -> Monomial | str | float:
-        """The number or the name of a parameter if it is one, of which proofs know more."""
+        """The monomial in its simplest form.
+
+        This is the coefficient, a float, if there are no powers; the name of the parameter if it is
+        a single one with the coefficient 1 and the exponent 1; else the monomial itself. Proofs
+        know more of numbers and of parameters than of functions.
+        """
         if not self.powers:
             return self.coefficient
+        # The text of a monomial is the name of a parameter only if it has no other factor.
         is_name = self.powers == ((str(self), 1),)
         if is_name:
             return str(self)

@@ -13,18 +13,13 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 
-EXPECTED = "%%MatrixMarket matrix coordinate or array, real or integer, general or symmetric"
-HEAD = re.compile(
-    rb"%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
-    rb"(general|symmetric)\s*",
-    re.IGNORECASE,
-)
-
 
 def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     """Return the matrix in the text of a Matrix Market file, dense, shape (rows, columns).
 
-    Patterns and skew-symmetric matrices are refused: no mass, damping or stiffness is of these.
+    Of a symmetric matrix the file has one triangle, and both are returned. Entries of one place are
+    added. Patterns and skew-symmetric matrices are refused: no mass, damping or stiffness is of
+    these.
 
     Args:
         name: Name of the file, for messages.
@@ -32,20 +27,28 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         max_rows: Largest number of rows and of columns.
 
     Raises:
-        RefusedError: The text is not of the format, of complex numbers, has an index outside the
-            matrix, another number of entries than it states, or more rows or columns than allowed.
+        RefusedError: The text is not of the format, or of complex numbers; it has words that are no
+            numbers, an index outside the matrix, or another number of entries than it states; a
+            matrix that it calls symmetric is not square, or has entries on both sides of the
+            diagonal; or there are no rows, or more rows or columns than allowed.
     """
     # SciPy's reader is compiled code that a damaged file can end the process in, so the text is
     # parsed here; every number goes through `float`.
     lines = [line for line in content.splitlines() if line.strip()]
-    match = HEAD.fullmatch(lines[0]) if lines else None
+    head = re.compile(
+        rb"%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
+        rb"(general|symmetric)\s*",
+        re.IGNORECASE,
+    )
+    match = head.fullmatch(lines[0]) if lines else None
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
         cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
         if re.match(r"\s*\d+\s*,", first):  # of Abaqus, in its own order of nodes and directions
             cure = "write ROW COLUMN VALUE without commas, below the line %%MatrixMarket matrix"
             cure += " coordinate real symmetric and one of sizes, as 18 18 42"
-        raise RefusedError(name, first, EXPECTED, cure)
+        allowed = "%%MatrixMarket matrix coordinate or array, real or integer, general or symmetric"
+        raise RefusedError(name, first, allowed, cure)
     is_sparse = match[1].lower() == b"coordinate"
     is_symmetric = match[2].lower() == b"symmetric"
     body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
@@ -57,7 +60,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
         n_sizes, cure = 3, "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
-    # a size beyond 64 bits stays one that is too large
+    # A size beyond 64 bits stays one that is too large. Numbers were read as floats, and NumPy's
+    # integers would wrap around.
     shape = int(min(sizes[0], 1e18)), int(min(sizes[1], 1e18))
     require_size(name, shape, max_rows)
     value = f"symmetric, {shape[0]} × {shape[1]}"
@@ -85,7 +89,11 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
 
 
 def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
-    """Refuse lines with a letter that numbers and blanks do not have."""
+    """Check that lines have no characters but those of numbers, signs, points, e, E and blanks.
+
+    Raises:
+        RefusedError: A line has another character; the hint is for commas and for FORTRAN's D.
+    """
     for line in lines:
         if found := re.search(rb"[^-+.0-9eE\s]", line):
             value = f"with {line[:40].decode('latin-1')!r}"
@@ -95,7 +103,7 @@ def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
 
 
 def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:
-    """Refuse a matrix with a side of 0 or of more than `max_rows`."""
+    """Raise RefusedError if a side of an array is 0 or above `max_rows`."""
     fits = all(0 < n <= max_rows for n in shape)
     allowed = f"up to {max_rows} rows and columns"
     cure = "a matrix has a row and a column for each unknown, without heads or numbers of rows"
@@ -126,6 +134,8 @@ def dense_of_entries(
             if wrong == -1:
                 cure = "indices that count from 0 need 1 added to each"
             raise RefusedError(name, value, f"whole numbers from 1 to {shape[axis]}", cure)
+    # An assignment by indices would keep the last of several entries of one place; finite-element
+    # programs write one entry for each element there.
     matrix = np.zeros(shape)
     np.add.at(matrix, (rows.astype(int), columns.astype(int)), values)
     return matrix
@@ -144,9 +154,14 @@ def _numbers(name: str, text: bytes) -> Array:
 
 
 def _by_columns(name: str, entries: Array, shape: tuple[int, int], *, is_symmetric: bool) -> Array:
-    """Return the matrix of entries that follow one another column by column.
+    """Return a dense matrix whose entries follow one another column by column, from the top.
 
-    Those of a symmetric matrix are of its lower triangle alone.
+    Args:
+        name: Name of the file, for the message.
+        entries: The entries, shape (entries,); of a symmetric matrix those of its lower triangle
+            with the diagonal, whose column k begins in row k.
+        shape: Rows and columns; equal ones of a symmetric matrix.
+        is_symmetric: Whether it is symmetric; both triangles are then returned.
 
     Raises:
         RefusedError: There are more or fewer entries than the shape has.
@@ -158,7 +173,8 @@ def _by_columns(name: str, entries: Array, shape: tuple[int, int], *, is_symmetr
     require(len(entries) == expected, name, f"{len(entries)} numbers", f"{expected}")
     if not is_symmetric:
         return entries.reshape(n_columns, n_rows).T.copy()
-    # the lower triangle by columns is the upper one by rows
+    # The lower triangle by columns is the upper one by rows, whose indices NumPy gives in this
+    # order.
     columns, rows = np.triu_indices(n_rows)
     matrix = np.zeros(shape)
     matrix[columns, rows] = entries

@@ -79,7 +79,10 @@ class StructureModel:
         return Parameter(name)
 
     def group(self, name: str) -> tuple[str, ...]:
-        """Return the names of the parameters that a short name stands for.
+        """Return the names of the parameters that a short name stands for, as "m" for all masses.
+
+        Structures in general have no short names, so that this is the name itself, alone. Kinds of
+        structures with short names override it.
 
         Raises:
             RefusedError: There is no such parameter.
@@ -88,11 +91,17 @@ class StructureModel:
         return (name,)
 
     def require_quantity(self, name: str) -> None:
-        """Refuse an output that the structure cannot have, observed or not."""
+        """Raise RefusedError if the structure cannot have such an output, observed or not."""
         require_choice("output", name, self.outputs)
 
     def with_outputs(self, names: Sequence[str]) -> Self:
-        """Return the structure, observed at some outputs alone where it can leave out others.
+        """Return the structure for an analysis of some of its outputs.
+
+        Structures in general cannot leave out the other outputs, so that this is the structure
+        itself, unchanged. Kinds that can override it.
+
+        Args:
+            names: Names of the outputs that are needed.
 
         Raises:
             RefusedError: The structure has no such output.
@@ -106,9 +115,10 @@ class StructureModel:
         return Output(next((name for name in self.outputs if name == output), output)).unit
 
     def with_forces(self, forces: Sequence[PlacedForce]) -> tuple[Self, tuple[str, ...]]:
-        """Return the structure under forces, and the names of their amplitudes, which it chooses.
+        """Return the structure under forces, and the names of their amplitudes.
 
-        The amplitudes become parameters.
+        Structures in general take no forces, so that this always raises. Kinds that do override it:
+        the amplitudes become parameters, whose names are returned in the order of `forces`.
 
         Raises:
             RefusedError: The structure takes no forces.

@@ -10,7 +10,8 @@ import numpy as np
 
 from alphacut.base.errors import require
 
-OUTPUTS = {  # unit and words, by names without the floor
+# SI unit and words of each kind of output, by its name without the number of the floor.
+OUTPUTS = {
     "q": ("m", "displacement of floor"),
     "v": ("m/s", "velocity of floor"),
     "a": ("m/s^2", "acceleration of floor"),
@@ -24,8 +25,9 @@ OUTPUTS = {  # unit and words, by names without the floor
     "force": ("N", ""),
     "phi": ("rad", ""),
 }
+# A name that texts of limits and peaks ("max roof"), files and tables can have.
 NAME = re.compile(r"[^\W\d]\w{0,63}")
-"""A name that texts of limits and peaks ("max roof"), files and tables can have."""
+# Ranges of parameters, as messages say them.
 POSITIVE = "positive"
 NOT_NEGATIVE = "0 or greater"
 UP_TO_ONE = "0 to 1"
@@ -75,11 +77,16 @@ class Output(str):
 
 
 def require_names(key: str, names: Iterable[str]) -> None:
-    """Refuse names of parameters or outputs, and units of the latter, that are out of alphabet.
+    """Check the alphabet of names of parameters or outputs, and of the units of outputs.
+
+    Args:
+        key: What the names are of, for the message.
+        names: The names. A name begins with a letter or _, and has up to 64 letters, digits or _;
+            an `Output` among them also has a unit of up to 32 letters, digits and % ° * / ^ · . ( )
+            + - or blanks.
 
     Raises:
-        RefusedError: A name has a blank or a control character, say, or the unit of an `Output`
-            has a letter that no unit has.
+        RefusedError: A name is no text of this alphabet, or a unit is not.
     """
     for name in names:
         is_name = isinstance(name, str) and NAME.fullmatch(name) is not None
@@ -111,7 +118,13 @@ class Parameter:
     range: str = ""
 
     def admits(self, low: float, high: float) -> bool:
-        """Return whether all values from `low` to `high` are finite and within the range."""
+        """Return whether all values from `low` to `high` are finite and within the range.
+
+        The range `self.range` is one of the texts "positive", "0 or greater", "0 to 1" (both ends
+        allowed) and "0 or greater and below 1, the critical damping", which say what is allowed.
+        Any other text, as the empty one, allows all finite values. `low` must not be above `high`,
+        which is not checked.
+        """
         is_within = {
             POSITIVE: low > 0,
             NOT_NEGATIVE: low >= 0,
@@ -121,7 +134,8 @@ class Parameter:
         return bool(np.isfinite([low, high]).all() and is_within.get(self.range, True))
 
 
-OF_STOREY_FRAME = {  # units and ranges of a storey frame's parameters, by names without the floor
+# SI units and ranges of a storey frame's parameters, by names without the number of the floor.
+OF_STOREY_FRAME = {
     "E": ("Pa", POSITIVE),
     "I": ("m^4", POSITIVE),
     "m": ("kg", POSITIVE),

@@ -19,9 +19,10 @@ from alphacut.base.errors import RefusedError, cure_of, path_of, printable, requ
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
+# The allowed value in messages of all formats.
 ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
+# Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB.
 MAX_ROWS = 5000
-"""Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB."""
 
 
 def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -> Array:
@@ -71,16 +72,19 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
 
 
 def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
-    """Return the array in a file, whose ending tells its format.
+    """Return the array in a file, whose ending (.npy, .npz, .mtx or .csv) tells its format.
+
+    The array may have any number of axes and any type of numbers, and entries that are not finite;
+    the caller checks it. A sparse matrix becomes dense.
 
     Args:
         path: The file.
-        name: Name of the array in a .npz file of several.
-        max_rows: Largest number of rows and of columns.
+        name: Name of the array in a .npz file of several; empty for the only one.
+        max_rows: Largest number of rows and of columns of a sparse matrix or of a .mtx file.
 
     Raises:
-        RefusedError: The file is of another type or holds no matrix.
-        Exception: Whatever readers of files and archives raise.
+        RefusedError: The file is of another type, with a hint for known ones, or holds no matrix.
+        Exception: Whatever readers of files and archives raise for damaged or missing ones.
     """
     ending = path.suffix.lower()
     if ending == ".npy":
@@ -120,6 +124,8 @@ def _read_csv(name: str, text: str) -> Array:
     """
     require(bool(text.strip()), name, "", ALLOWED)
     delimiter: str | None = ","
+    # Where semicolons separate the cells, a comma can only be a decimal comma. Without any of both,
+    # blanks separate them, which NumPy calls None.
     if ";" in text:
         delimiter = ";"
         text = text.replace(",", ".")
@@ -132,12 +138,19 @@ def _read_csv(name: str, text: str) -> Array:
 
 
 def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
-    """Return the error about the first row that is not of as many numbers as most rows have.
+    """Return, without raising it, the error about the first row that has no or too few numbers.
+
+    A row is wrong if a cell is no number, or if it has another count of cells than most rows have;
+    if all counts differ, the first row counts as right. Text behind # and empty lines do not count.
 
     Args:
         name: Name of the file.
-        text: The text.
+        text: The text of the file, with one row at least.
         delimiter: What separates the numbers; None for blanks.
+
+    Returns:
+        The error, which names the line and has a hint; if no row is wrong, an error about the whole
+        file.
     """
     number = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?i:[-+]?(?:nan|inf))"
     lines = dict(enumerate(text.splitlines(), 1))
@@ -164,6 +177,8 @@ def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
 
 def _cure_of_row(row: str) -> str:
     """Return what to mend in a row of a CSV file that is not of numbers alone."""
+    # The first pattern that is found gives the hint: commas before blanks are looked for before
+    # empty cells, and names of units last, since many texts contain their letters.
     cures = {
         r"[\[\]()]": "write numbers without brackets",
         r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
@@ -202,14 +217,20 @@ def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers
 
 
 def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:
-    """Return the matrix in a file of `scipy.sparse.save_npz`, dense.
+    """Return the matrix in a file of `scipy.sparse.save_npz`, dense, shape (rows, columns).
 
+    The file has the arrays "format" (one text: "coo", "csr" or "csc"), "shape" and "data", and two
+    arrays of indices: "row" and "col", or "indptr" and "indices". Entries of one place are added.
     SciPy itself is not asked: its compiled code writes where wrong indices lead, and its own check
     of damaged arrays misses some.
 
+    Args:
+        archive: The file.
+        max_rows: Largest number of rows and of columns.
+
     Raises:
-        RefusedError: The matrix is larger than allowed, of another form, or its arrays contradict
-            one another.
+        RefusedError: The matrix is larger than allowed or of another format, or its arrays are
+            damaged or contradict one another.
     """
     name = archive.path.name
     letters = archive.read("format", kinds="SU").item()
@@ -223,6 +244,8 @@ def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:
     require(form in keys, name, f"sparse of form {form}", "csr, csc or coo", cure)
     values = np.asarray(archive.read("data", kinds="iuf"), float)
     first, second = (np.asarray(archive.read(key, kinds="iu"), float) for key in keys[form])
+    # In csr the pointers are over rows and in csc over columns; the other array has the other
+    # index.
     if form != "coo":
         first = _expanded(name, first, len(values))
     fit = first.shape == second.shape == values.shape and values.ndim == 1

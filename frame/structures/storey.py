@@ -32,6 +32,7 @@ from alphacut.frame.structures.loads import Force, require_loads
 from alphacut.frame.structures.model import Dynamics, PlacedForce, StructureModel
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 
+# Names of the parameters of each list field, with {} for the number of the floor or storey.
 SYMBOLS = {
     "masses": "m{}",
     "lengths": "l{}",
@@ -45,7 +46,6 @@ SYMBOLS = {
     "yield_drift": "dy{}",
     "hardening": "hardening{}",
 }
-"""Names of the parameters of each list, {} for the number of the floor or storey."""
 MOMENT = "overturning_moment"
 
 
@@ -143,7 +143,18 @@ class StoreyFrame(LinearSystem):
     rayleigh_of: Literal["initial", "tangent"] = "initial"
 
     def __post_init__(self) -> None:
-        """Refuse values that are not allowed, and fill empty lists with their defaults."""
+        """Check all fields, store lists as tuples, and fill empty ones with their defaults.
+
+        Empty dampers, q0 and v0 become zeros for each floor; empty columns two in each storey,
+        unless stiffnesses are given; empty hardening zeros, where columns yield; empty outputs the
+        displacements "q1" … of all floors. Outputs become texts that know their unit.
+
+        Raises:
+            RefusedError: A list has a wrong length; a number is outside the range of its parameter;
+                springs are given twice or not at all; hardening is given without a yield force or
+                drift, or both of these; the base excitation or a force has a wrong type or acts on
+                no floor; an output is unknown or repeated; or the weight buckles a storey.
+        """
         self._require_values()
         self._require_springs()
         require_loads(self.ground, self.loads)
@@ -169,10 +180,23 @@ class StoreyFrame(LinearSystem):
             self.quantity(output)
         are_unique = len(set(self.outputs)) == len(self.outputs)
         require(are_unique, "output", value=", ".join(self.outputs), allowed="each output once")
+        # The empty box is the nominal structure alone; boxes of inputs are checked where they are
+        # known.
         self.require_standing({})
 
     def _require_values(self) -> None:
-        """Refuse lists of a wrong length, and numbers outside the range of their parameter."""
+        """Check the lengths of all lists and the ranges of all numbers.
+
+        Each list has one number for each floor, from below. A list that may be left out may be
+        empty; the second moment may also be one number for all storeys, and so may the damping
+        ratio.
+
+        Raises:
+            RefusedError: `masses` is empty; a list has another length or is no list of finite
+                numbers; a number is outside the range of its parameter, such as a mass that is not
+                positive; or the place of the dampers or the stiffness of Rayleigh's damping is none
+                of the two words allowed.
+        """
         for name in ("masses", "stiffness", "lengths", "yield_force", "yield_drift"):
             values = getattr(self, name)
             if values is not None and not isinstance(values, str):
@@ -180,7 +204,7 @@ class StoreyFrame(LinearSystem):
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
-        # lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys
+        # Lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys
         sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
         single = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
         for name, symbol in (SYMBOLS | single).items():
@@ -203,7 +227,16 @@ class StoreyFrame(LinearSystem):
         require_choice("rayleigh_of", self.rayleigh_of, ("initial", "tangent"))
 
     def _require_springs(self) -> None:
-        """Refuse springs that are given twice or not at all, and contradictory yielding."""
+        """Check that each storey's stiffness and yield point is given in exactly one way.
+
+        The stiffness is given as `stiffness`, or follows from `modulus`, `second_moment` and
+        `lengths` (with `columns` if they are not two); beside `stiffness` the lengths are heights,
+        which gravity needs. Columns yield at `yield_force` or at `yield_drift`; `hardening` needs
+        one of them.
+
+        Raises:
+            RefusedError: A value is missing, or two of them contradict one another.
+        """
         names = ("modulus", "second_moment", "columns", "lengths")
         given = [x for x in names if getattr(self, x) is not None and np.size(getattr(self, x))]
         examples = {"modulus": "200e9", "second_moment": "1e-6", "lengths": "[3.0]"}
@@ -212,6 +245,7 @@ class StoreyFrame(LinearSystem):
             beside = ", ".join(name for name in given if name != "lengths")
             allowed = "either stiffness or what makes it"
             require(not beside, beside, value="there", allowed=allowed)
+            # Weights act over the height of a storey, which given stiffnesses do not tell.
             needed, alternative = [], ""
             if self.gravity:
                 needed = ["lengths"]
@@ -259,7 +293,18 @@ class StoreyFrame(LinearSystem):
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """Nominal values of all parameters by name, in SI units; of lists, one for each floor."""
+        """Nominal values of all parameters by name, in SI units.
+
+        A list gives one parameter for each floor or storey, numbered from 1 from below: "m1" …
+        (masses), "l1" … (lengths), "c1" … (columns), "k1" … (given stiffnesses), "d1" … (dampers),
+        "q1_0" …, "v1_0" … (initial displacements and velocities), "fy1" …, "dy1" …, "hardening1" …
+        (yielding). Further names are "E"; "I", or "I1" … of single storeys; "rayleigh_mass" and
+        "rayleigh_stiffness"; "zeta", or "zeta1" … of single modes; and those of the loads'
+        amplitudes, such as "F3" on floor 3. Fields that are not given have no parameters.
+
+        Raises:
+            RefusedError: The amplitude of a load is no finite number.
+        """
         named: dict[str, float] = {}
         if self.modulus is not None:
             named["E"] = self.modulus
@@ -276,12 +321,17 @@ class StoreyFrame(LinearSystem):
 
     @property
     def force_names(self) -> tuple[str, ...]:
-        """Names of the loads' amplitudes in their order: "F3", "F3_2" of a second one; "J3"."""
+        """Names of the parameters that are the loads' amplitudes, in the order of the loads.
+
+        A force on floor 3 is "F3", the second and third one there "F3_2" and "F3_3"; an impulse is
+        "J3". Floors are counted from 1 from below.
+        """
         names: list[str] = []
         for force in self.loads:
             name = f"F{force.at}"
             if force.history is None:
                 name = f"J{force.at}"  # of an impulse
+            # The name before "_" is that of the floor; so many forces of the floor came before.
             n_before = sum(other.partition("_")[0] == name for other in names)
             if n_before:
                 name += f"_{n_before + 1}"
@@ -308,7 +358,20 @@ class StoreyFrame(LinearSystem):
         return replace(self, outputs=tuple(names))
 
     def with_forces(self, forces: Sequence[PlacedForce]) -> tuple[Self, tuple[str, ...]]:
-        """Return the frame under forces on its floors, with the amplitudes `force_names`."""
+        """Return the frame under other forces, and the names of their amplitudes.
+
+        Args:
+            forces: For each force its `place`, the floor counted from 0; its nominal `amplitude` in
+                N, or in N s of an impulse; and its `history`, None for an impulse. They replace the
+                frame's loads.
+
+        Returns:
+            The frame, and the names of the parameters that are the amplitudes, as "F3" on the floor
+            with the place 2.
+
+        Raises:
+            RefusedError: There is no such floor, or an amplitude is no finite number.
+        """
         loads = [Force(force.place + 1, force.amplitude, force.history) for force in forces]
         frame = replace(self, loads=loads)
         return frame, frame.force_names
@@ -321,10 +384,15 @@ class StoreyFrame(LinearSystem):
         """Refuse nothing: the ranges of a frame's parameters have no negative damping."""
 
     def group(self, name: str) -> tuple[str, ...]:
-        """Return the parameters that a short name stands for: "m" for m1 … mn; else itself.
+        """Return the names of the parameters that a name stands for.
+
+        A short name stands for a whole list: "m" for "m1" … "mn", likewise "l", "c", "k", "d",
+        "q0", "v0", "I", "fy", "dy", "hardening" and "zeta", where the frame has numbered ones; "F"
+        stands for the amplitudes of all loads, impulses among them. The name of a single parameter
+        stands for itself.
 
         Raises:
-            RefusedError: There is no such parameter.
+            RefusedError: There is no such parameter or list.
         """
         groups: dict[str, tuple[str, ...]] = {}
         for pattern in (*SYMBOLS.values(), "zeta{}"):
@@ -337,10 +405,12 @@ class StoreyFrame(LinearSystem):
         return groups.get(name, (name,))
 
     def springs(self, p: Mapping[str, Number]) -> Number:
-        """Return k_z of each storey, shape (…, n), in N/m: as given, or 12 c E I / l³ of columns.
+        """Return the stiffness k_z of each storey, shape (…, n), in N/m, from below.
+
+        It is as given, or 12 c E I / l³ of c columns that are clamped at both ends.
 
         Args:
-            p: All parameters by name, shape (…) each.
+            p: All parameters by name, jets or Taylor models of one shape (…).
         """
         if self.stiffness:
             return self._of_floors("k{}", p)
@@ -357,7 +427,7 @@ class StoreyFrame(LinearSystem):
         """Return the drifts at which storeys yield, shape (…, n), in m."""
         if self.yield_drift:
             return self._of_floors("dy{}", p)
-        # a bilinear spring is elastic up to its yield force
+        # A bilinear spring is elastic up to its yield force, so that its drift there is f_y / k.
         return self._of_floors("fy{}", p) * self.springs(p) ** -1
 
     def hardenings(self, p: Mapping[str, Number]) -> Number:
@@ -365,12 +435,12 @@ class StoreyFrame(LinearSystem):
         return self._of_floors("hardening{}", p)
 
     def softening(self, p: Mapping[str, Number]) -> Number:
-        """Return P_z / l_z of storeys, shape (…, n), in N/m, P_z the weight of all floors above."""
+        """Return weight of all floors above over height of storeys, P_z / l_z, (…, n), in N/m."""
         return self._masses_over_heights(p) * self.gravity
 
     def _masses_over_heights(self, p: Mapping[str, Number]) -> Number:
         """Return the mass above each storey over its height, shape (…, n), in kg/m."""
-        # row i of the lower triangle adds the mass of floor i to storeys 1 … i
+        # Row i of the lower triangle adds the mass of floor i to storeys 1 … i
         above = self._of_floors("m{}", p).contract(np.tri(self.floors))
         return above * self.heights(p) ** -1
 
@@ -379,9 +449,26 @@ class StoreyFrame(LinearSystem):
         return self._of_floors("l{}", p)
 
     def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
-        """Return matrices, rows and loads at parameters `p`, jets or Taylor models (eq. 23)."""
+        """Return matrices, output rows and loads of the frame at given parameters (eq. 23).
+
+        Args:
+            p: All parameters by name: jets at S parameter sets (values with derivatives), or Taylor
+                models over a box (polynomials with error bounds).
+
+        Returns:
+            Assembly of numbers of the type of `p`, for n floors from below: mass, stiffness of the
+            springs, weights that reduce it (P-Delta; None without gravity) and damping matrix of
+            the dashpots, shape (…, n, n); Rayleigh's factors a and b and the damping ratios, shape
+            (…); initial displacements and velocities, shape (…, n); rows of the m outputs on [q;
+            v], shape (m, 2n), or (…, m, 2n) with the overturning moment among them, and on absolute
+            accelerations, shape (m, n); factors of these rows, shape (…, m): k_z of a shear, else
+            1; the force vector of each load at its amplitude, shape (…, n, loads), None without
+            loads. Here … stands for S with jets and for nothing with Taylor models.
+        """
         n = self.floors
         identity: Array = np.eye(n)
+        # Matrices are sums of constant ones, one for each floor or storey, with the parameters as
+        # factors: a contraction makes each sum in one step.
         by_floor = diagonal(identity)
         by_storey = chain_matrix(identity)
         springs = self.springs(p)
@@ -427,15 +514,19 @@ class StoreyFrame(LinearSystem):
 
     @cached_property
     def _coefficients(self) -> Array:
-        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n).
+        """Coefficients of the outputs on motions of the floors, shape (m, 3n) for m outputs.
 
-        Those of a shear are of the drift, without the stiffness; those of the overturning moment,
-        which depend on parameters, are 0.
+        Columns 0 … n - 1 are for the displacements of the n floors relative to the ground, from
+        below, the next n for their velocities, and the last n for their absolute accelerations. The
+        row of a shear is that of the drift, without the stiffness. The rows of residual drift,
+        ductility and dissipated energy have a 1 at their floor's displacement, and stand for no
+        sum. The row of the overturning moment is 0, since its coefficients depend on parameters.
         """
         coefficients = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(coefficients, map(self.quantity, self.outputs), strict=True):
             if kind == MOMENT:
                 continue
+            # The storey z stands on the floor z - 1, or on the ground, which does not move here.
             block = {"v": 1, "a": 2}.get(kind, 0)
             row[z + self.floors * block] = 1.0
             if kind in ("drift", "shear") and z:
@@ -443,10 +534,20 @@ class StoreyFrame(LinearSystem):
         return coefficients
 
     def quantity(self, name: str) -> tuple[str, int]:
-        """Return the kind of an output, such as "drift", and its floor or storey, counted from 0.
+        """Return the kind of an output, and its floor or storey, counted from 0 from below.
+
+        Args:
+            name: "q3", "v3" or "a3" (displacement, velocity, absolute acceleration of floor 3),
+                "drift3" or "shear3" (of storey 3), "base_shear", which is the shear of storey 1, or
+                "overturning_moment"; and of a frame whose columns yield "residual3", "ductility3"
+                or "dissipated3".
+
+        Returns:
+            The name without its number, as "drift", and the number less 1; ("shear", 0) of the base
+            shear, and ("overturning_moment", 0).
 
         Raises:
-            RefusedError: A frame has no such output, or not without lengths or yielding columns.
+            RefusedError: The frame has no such output, or the overturning moment without lengths.
         """
         if name == MOMENT:
             allowed = "it beside lengths, the heights of the storeys"
@@ -466,24 +567,33 @@ class StoreyFrame(LinearSystem):
         return match[1], int(match[2]) - 1
 
     def stability_coefficients(self, ends: Mapping[str, tuple[float, float]]) -> Array:
-        """Return the largest P_z / (k_z l_z) of each storey in a box, P_z the weight above.
+        """Return the largest P_z / (k_z l_z) of each storey in a box of parameters, shape (n,).
 
-        Below 0.1 second-order effects may be neglected (EN 1998-1, 4.4.2.2, where the storey is
-        elastic); from 1 on the storey buckles.
+        P_z is the weight of all floors above storey z, under the frame's own gravity, or standard
+        gravity if it has none; k_z is the stiffness and l_z the height of the storey. Below 0.1
+        second-order effects may be neglected (EN 1998-1, 4.4.2.2, where the storey is elastic);
+        from 1 on the storey buckles.
 
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
 
-        Returns:
-            Shape (n,), with the frame's own gravity, or standard gravity if it has none.
+        Raises:
+            KeyError: The frame has no lengths.
         """
         worst = self._worst_storeys(ends)
         return (self.gravity or STANDARD_GRAVITY) * worst.mass_over_height / worst.stiffness
 
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
-        """Refuse weights that buckle a storey somewhere in a box of parameters, by SI ends.
+        """Raise an error if the weight buckles a storey somewhere in a box of parameters.
 
-        A storey stands if k_z is more than P_z / l_z.
+        A storey z stands if its stiffness k_z is more than P_z / l_z, with the weight P_z of all
+        floors above and its height l_z. A frame without gravity stands always.
+
+        Args:
+            ends: Lower and upper end of parameters in SI units, by name; others are nominal.
+
+        Raises:
+            RefusedError: A storey buckles; the message names the lowest one that does.
         """
         if not self.gravity:
             return
@@ -496,13 +606,20 @@ class StoreyFrame(LinearSystem):
             require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
 
     def _worst_storeys(self, ends: Mapping[str, tuple[float, float]]) -> _Storeys:
-        """Return the storeys where k l / P is smallest in a box: stiffness low, mass high.
+        """Return the storeys where k_z l_z / P_z is smallest over a box of parameters.
 
-        The k of columns falls with the cube of the height, so that k l is smallest where it is
-        high; the k of springs does not depend on it.
+        Here k_z is the stiffness of storey z, l_z its height, and P_z the weight of all floors
+        above it. All storeys have their smallest ratio at one corner of the box.
 
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
+
+        Returns:
+            Arrays of shape (n,), from below: `stiffness`, k_z in N/m at that corner, and
+            `mass_over_height`, the mass of all floors above storey z over l_z, in kg/m.
+
+        Raises:
+            KeyError: The frame has no lengths.
         """
         # With k = 12 c E I / l³ the ratio k l / P is 12 c E I / (l² P). It is smallest at the
         # highest l and P and the lowest c, E and I; of given springs at the lowest k and l.
@@ -530,14 +647,15 @@ def yields(model: object) -> TypeGuard[StoreyFrame]:
 
 
 def chain_matrix(links: Array) -> Array:
-    """Return the matrices of chains that are fixed at their lower end.
+    """Return the matrices of chains of n masses that are fixed at their lower end.
 
     Args:
-        links: Coefficients of the links of n masses, from below, shape (…, n): link z joins the
-            masses z − 1 and z, the first one the ground and mass 0.
+        links: Coefficients of the links, from below, shape (…, n), with n ≥ 1: link z joins the
+            masses z - 1 and z, and link 0 joins the ground and mass 0.
 
     Returns:
-        Tridiagonal matrices, shape (…, n, n).
+        Symmetric tridiagonal matrices, shape (…, n, n): the diagonal has the sums of both links of
+        a mass, the others the negative of the link between two masses.
     """
     place = np.arange(links.shape[-1])
     below, above = place[:-1], place[1:]
@@ -556,9 +674,15 @@ def diagonal(values: Array) -> Array:
 def _named(
     pattern: str, given: float | Sequence[float], *, single: bool = True
 ) -> dict[str, float]:
-    """Return values by the names that a pattern such as "I{}" gives them, with numbers from 1 on.
+    """Return values by the names of their parameters.
 
-    With `single` one value alone has no number, since it holds for all floors.
+    Args:
+        pattern: The names, with {} for the number, as "I{}".
+        given: One value or a list of n values, from below.
+        single: Whether a single value has no number, "I", since it holds for all floors.
+
+    Returns:
+        The values by name, as "I1" … "In", in their order; nothing for an empty list.
     """
     values = np.ravel(given).tolist()
     if single and len(values) == 1:
