@@ -9,12 +9,10 @@ import numpy as np
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
 
+# Fraction of max|H| by which Hessians are made more concave before they are solved. It is far above
+# the unit roundoff, so that no Hessian stays singular, and far below what changes a maximum
+# visibly.
 SHIFT = 1e-13
-"""Fraction of max|H| by which Hessians are made more concave before they are solved.
-
-It is far above the unit roundoff, so that no Hessian stays singular, and far below what changes a
-maximum visibly.
-"""
 
 
 def gain(g: Array, H: Array, x: Array) -> Array:
@@ -68,7 +66,20 @@ def local_maximum(
 
 @compiled
 def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int) -> None:
-    """Move the points x, shape (N, d), uphill in place, as `local_maximum` says."""
+    """Move N points uphill on N quadratics g·x + x·H·x/2 within their boxes, in place.
+
+    Each round maximises along one axis after the other and then makes two projected Newton steps.
+    No step goes downhill, but for rounding.
+
+    Args:
+        g: Gradients at x = 0, shape (N, d).
+        H: Symmetric Hessians, shape (N, d, d).
+        lower: Lower ends of the boxes, shape (N, d).
+        upper: Upper ends of the boxes, shape (N, d).
+        x: The points, inside the boxes, shape (N, d).
+        rounds: Largest number of rounds; an ascent ends earlier where a round gains less than 1e-10
+            of the value or 1e-16.
+    """
     for n in range(len(g)):
         value = _value(g[n], H[n], x[n])
         for _ in range(rounds):
@@ -95,7 +106,7 @@ def _ascend(g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: in
 
 @compiled
 def _slope(g: Array, H: Array, x: Array, i: int) -> float:
-    """Return the derivative by x_i of a quadratic, (g + H x)_i."""
+    """Return the derivative (g + H x)_i of g·x + x·H·x/2 by x_i; g and x have shape (d,)."""
     slope = g[i]
     for j in range(len(x)):
         slope += H[i, j] * x[j]
@@ -113,11 +124,18 @@ def _value(g: Array, H: Array, x: Array) -> float:
 
 @compiled
 def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> float:
-    """Make a projected Newton step, and return the value of the quadratic afterwards.
+    """Make a projected Newton step on a quadratic within a box, and return its value afterwards.
 
-    Axes at whose end of the box the quadratic rises outwards are held. The step is tried in its
-    full length, in half and in a quarter, each clipped to the box; x moves, in place, to the best
-    of these points that gains.
+    The quadratic is g·x + x·H·x/2. Axes at whose end of the box it rises outwards are held. The
+    step is tried in its full length, in half and in a quarter, each clipped to the box; x moves, in
+    place, to the best of these points that gains, and stays if none does.
+
+    Args:
+        g: Gradient at x = 0, shape (d,).
+        H: Symmetric Hessian, shape (d, d); it may be singular.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends of the box, shape (d,).
+        x: The point, inside the box, shape (d,).
     """
     d = len(x)
     best = _value(g, H, x)
@@ -133,7 +151,9 @@ def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> fl
             free[:, i] = 0.0
             step[i, 0] = 0.0
             free[i, i] = -1.0
-    shift = SHIFT * (np.abs(free).max() + 1e-100)  # as in `_regular`
+    # The Hessian is made more concave by 1e-13 of its largest entry, so that it is not singular; a
+    # zero one as well. The Newton step is then an ascent direction of a concave quadratic.
+    shift = SHIFT * (np.abs(free).max() + 1e-100)
     for k in range(d):
         free[k, k] -= shift
     solve_in_place(free, step)
@@ -151,7 +171,7 @@ def solve_in_place(matrix: Array, b: Array) -> None:
     """Overwrite b with the solutions of A x = b by Gaussian elimination with partial pivoting.
 
     Args:
-        matrix: A, not singular, shape (n, n); it is not changed.
+        matrix: A, shape (n, n); it is not changed. If it is singular, b receives infinities or NaN.
         b: Right-hand sides as columns, shape (n, m).
     """
     n = len(matrix)
@@ -182,11 +202,12 @@ def solve_in_place(matrix: Array, b: Array) -> None:
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """Return the points of N boxes where the quadratics g·x + x·H·x/2 are largest.
+    """Return the points of N boxes where N quadratics g·x + x·H·x/2 are largest.
 
     A maximum over a box is a stationary point on the interior of one of its 3^d faces. Up to six
     parameters all faces are searched. With more, which are too many faces, the better of two local
-    maxima is taken, uphill from 0 and from the corner that the gradient points to.
+    maxima is taken, uphill from 0 and from the corner that the gradient points to; this need not be
+    the largest one.
 
     Args:
         g: Gradients at x = 0, shape (N, d).
@@ -195,7 +216,8 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
         upper: Upper ends of the boxes, shape (N, d).
 
     Returns:
-        Shape (N, d). Where no point has a positive value it is x = 0.
+        Shape (N, d). The quadratic is not negative there; where no point has a positive value it is
+        x = 0, for d ≤ 6.
     """
     d = g.shape[1]
     problems = np.arange(len(g))
@@ -220,17 +242,22 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
 
 
 def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int, ...]) -> Array:
-    """Return the stationary point of each quadratic on each face with the same free axes.
+    """Return stationary points of N quadratics on all faces of their boxes with the same free axes.
+
+    The quadratics are g·x + x·H·x/2.
 
     Args:
         g: Gradients at x = 0, shape (N, d).
-        H: Symmetric Hessians, shape (N, d, d).
+        H: Symmetric Hessians, shape (N, d, d). Over the free axes they are shifted by 1e-13 of
+            their largest entry, so that a stationary point exists.
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends of the boxes, shape (N, d).
-        free: Axes along which these faces extend; along the others they lie at an end of the box.
+        free: Indices of the axes along which these faces extend, rising; along the others they lie
+            at an end of the box. All corners are meant if there are none.
 
     Returns:
-        The points, clipped to their faces, shape (N, 2^(d − len(free)), d).
+        The points, clipped to their faces, shape (N, 2^(d − len(free)), d). The last fixed axis
+        changes its end fastest, and lower ends come first.
     """
     d = g.shape[1]
     fixed = [i for i in range(d) if i not in free]
@@ -240,6 +267,8 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
     if free:
         f = list(free)
         hessian = _regular(H[:, f][:, :, f])
+        # The points are still zero along the free axes, so that this is the slope at the place
+        # where the face meets them, and one linear system leads to the stationary point.
         slope = g[:, None, f] + np.einsum("nij,ncj->nci", H[:, f], points)
         stationary = -np.linalg.solve(hessian, slope.swapaxes(1, 2)).swapaxes(1, 2)
         points[:, :, f] = np.clip(stationary, lower[:, None, f], upper[:, None, f])
@@ -247,10 +276,11 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
 
 
 def _regular(H: Array) -> Array:
-    """Return symmetric matrices, shape (N, k, k), shifted by `SHIFT` so that none is singular.
+    """Return symmetric matrices, shape (N, k, k), shifted so that none is singular.
 
-    The shift makes the quadratics more concave. A matrix of zeros is shifted as well: then a slope
-    of any size leads out of the box, and the point is clipped to it.
+    The shift takes 1e-13 of the largest entry from the diagonal, which makes the quadratics more
+    concave. A matrix of zeros is shifted as well: then a slope of any size leads out of the box,
+    and the point is clipped to it.
     """
     magnitude = np.abs(H).max((1, 2), keepdims=True) + 1e-100
     return np.asarray(H - SHIFT * magnitude * np.eye(H.shape[-1]))

@@ -46,10 +46,10 @@ class Jet:
 
     @classmethod
     def of(cls, value: Array, first: Array, second: Array) -> Jet:
-        """Return a jet from its derivatives.
+        """Return the jet with the given derivatives by d parameters.
 
         Args:
-            value: Shape V.
+            value: Values, of any shape V.
             first: First derivatives, shape (d, *V).
             second: Second derivatives, symmetric in the first two axes, shape (d, d, *V).
         """
@@ -91,15 +91,16 @@ class Jet:
     def map(self, linear: Callable[[Array], Array]) -> Jet:
         """Return a linear map of the values and of each derivative.
 
-        `linear` takes and returns arrays with one more axis in front of V.
+        Args:
+            linear: The map. It takes and returns arrays with one more axis in front of V.
         """
         return Jet(linear(self.terms), self.directions)
 
     def rescaled(self, units: Array) -> Jet:
-        """Return the jet by other parameters, of which each is the old one over its unit.
+        """Return the same values with derivatives by the parameters over their units.
 
         Args:
-            units: Unit of each new parameter, shape (d,): d/d(p/u) = u d/dp.
+            units: Unit u of each parameter p, shape (d,): d/d(p/u) = u d/dp.
         """
         pairs = _pairs(self.directions)
         factors = np.concatenate([[1.0], units, units[pairs.i] * units[pairs.j]])
@@ -126,7 +127,8 @@ class Jet:
         if not isinstance(other, Jet):
             factor = np.asarray(other, float)
             return Jet(_padded(self, factor.ndim).terms * factor, self.directions)
-        return _product(*_matched(self, other), np.multiply)
+        a, b = _matched(self, other)
+        return _product(a, b, np.multiply)
 
     __rmul__ = __mul__
 
@@ -147,7 +149,11 @@ class Jet:
         return self**-1 * other
 
     def __pow__(self, exponent: float) -> Jet:
-        """Return a real power, with derivatives by the chain rule."""
+        """Return a real power x^k, entry by entry, with derivatives by the chain rule.
+
+        Zeros need k ≥ 2, and negative values a whole k. Elsewhere entries become NaN or infinite,
+        with a warning of NumPy.
+        """
         if exponent == 2:
             return self * self
         x = self.value
@@ -201,12 +207,25 @@ def _matched(a: Jet, other: Jet | ArrayLike) -> tuple[Jet, Jet]:
 
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
-    """Return the product of two jets by `np.multiply` or `np.matmul`.
+    """Return the product a b of two jets, elementwise or of matrices.
 
-    Its derivatives follow Leibniz' rule: (a b)_ij = a_ij b + a_i b_j + a_j b_i + a b_ij.
+    Its derivatives follow Leibniz' rule: (a b)_i = a_i b + a b_i and (a b)_ij = a_ij b + a_i b_j +
+    a_j b_i + a b_ij.
+
+    Args:
+        a: Jet with derivatives by d parameters.
+        b: Jet with derivatives by the same parameters, in the same order. Their values must fit one
+            another as NumPy's arrays, with equally many axes.
+        bilinear: `np.multiply` or `np.matmul`.
+
+    Returns:
+        A new jet; it shares no memory with the factors.
     """
     d = a.directions
     terms = np.asarray(bilinear(a.terms, b.value))
+    # The first product is of all terms of a with the values of b, so that a_i b and a_ij b are
+    # there. The rows of a jet's terms are the values, d first derivatives, and one row for each
+    # pair i ≤ j.
     if d:  # operations on empty arrays take time, too
         pairs = _pairs(d)
         terms[1:] += bilinear(a.value, b.terms[1:])
@@ -233,9 +252,15 @@ def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> d
 
 
 def inverse(a: Jet) -> Jet:
-    """Return the inverses X of square matrices A, V = (..., n, n), with their derivatives.
+    """Return the inverses X of square matrices A, with their derivatives.
 
     They are X_i = −X A_i X and X_ij = −X A_ij X − X A_i X_j − X A_j X_i.
+
+    Args:
+        a: The matrices, a jet of shape (…, n, n).
+
+    Raises:
+        numpy.linalg.LinAlgError: A matrix is singular.
     """
     x = np.linalg.inv(a.value)
     d = a.directions

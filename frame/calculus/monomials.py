@@ -45,14 +45,19 @@ def _place_terms(d: int, degree: int) -> Ints:
 
 
 def places(lists: Ints, d: int) -> Ints:
-    """Return the places of monomials among all of their degree.
+    """Return the places of monomials among all of their degree in d variables.
+
+    The place of u_i u_j u_k … with i ≤ j ≤ k ≤ … is binomial(i, 1) + binomial(j + 1, 2) +
+    binomial(k + 2, 3) + …, which numbers all monomials of a degree from 0 on without gaps
+    (combinatorial number system).
 
     Args:
-        lists: Rising lists of variables, one in each row, shape (N, degree).
-        d: Number of variables.
+        lists: Rising lists of the indices of the variables, one monomial in each row, shape (N,
+            degree).
+        d: Number of variables; indices are below it.
 
     Returns:
-        Shape (N,).
+        Shape (N,); zeros for the degree 0, which has one monomial.
     """
     degree = lists.shape[1]
     if degree == 0:
@@ -64,12 +69,18 @@ def places(lists: Ints, d: int) -> Ints:
 def product_places(d: int, m: int, q: int) -> Ints:
     """Return the places of the products of each monomial of degree m with each of degree q.
 
-    The shape is (monomials of degree m, monomials of degree q).
+    Monomials of a degree in d variables have the order of `monomials(d, degree)`, and a place is
+    the index in this order. Results are cached; callers must not change them.
+
+    Returns:
+        Array of shape (monomials of degree m, monomials of degree q): the place, among those of
+        degree m + q, of the product of the monomials in the places of row and column.
     """
     a = monomials(d, m)
     b = monomials(d, q)
     first_factors = np.repeat(a, len(b), axis=0)
     second_factors = np.tile(b, (len(a), 1))
+    # The list of a product is both lists together, sorted.
     products = np.sort(np.concatenate([first_factors, second_factors], axis=1), axis=1)
     return places(products, d).reshape(len(a), len(b))
 
@@ -83,20 +94,25 @@ def exponents(d: int, degree: int) -> Ints:
 
 @cache
 def _last_factors(d: int, degree: int) -> tuple[Ints, Ints]:
-    """Return the last variable of each monomial, and the place of the product of all others."""
+    """Return the last variable of each monomial, and the place of the product of all others.
+
+    Both have shape (monomials,); the place is among the monomials of one degree less.
+    """
     lists = monomials(d, degree)
     return lists[:, -1], places(lists[:, :-1], d)
 
 
 def monomial_values(u: Array, degree: int) -> Array:
-    """Return the values of all monomials of degrees 0 … `degree` at points.
+    """Return the values of all monomials of degrees 0 … `degree` in d variables at points.
 
     Args:
         u: Points, shape (S, d).
-        degree: Highest degree.
+        degree: Highest degree, not negative.
 
     Returns:
-        Shape (S, terms): the constant 1, then the monomials of degree 1, and so on.
+        Shape (S, terms): the constant 1, then the monomials of degree 1, and so on, those of each
+        degree in the order of `monomials(d, degree)`. It is a view of an array whose rows are the
+        monomials.
     """
     d = u.shape[1]
     coordinates = np.ascontiguousarray(u.T)
@@ -106,6 +122,7 @@ def monomial_values(u: Array, degree: int) -> Array:
     for m in range(1, degree + 1):
         variable, other_factors = _last_factors(d, m)
         end = begin + len(variable)
+        # A monomial is its last variable times a monomial of one degree less.
         lower = values[first_of_lower_degree + other_factors]
         values[begin:end] = lower * coordinates[variable]
         first_of_lower_degree = begin
@@ -118,22 +135,27 @@ def convolve(
 ) -> Array:
     """Return the product of two homogeneous polynomials in d variables.
 
+    A homogeneous polynomial is an array of coefficients, whose first axis runs over the monomials
+    of its degree in the order of `monomials(d, degree)`; a coefficient is an array itself.
+
     Args:
-        a: Coefficients of the first one, shape (monomials, *coefficient).
-        b: Coefficients of the second one.
+        a: Coefficients of the first one, shape (monomials, *shape of a coefficient).
+        b: Coefficients of the second one. Coefficients of both have equally many axes.
         degrees: Degrees of both.
         d: Number of variables.
-        bilinear: Product of coefficients, `np.multiply` or `matmul`, which broadcasts over the
-            first axes.
+        bilinear: Product of coefficients, `np.multiply` or `matmul` of this module, which
+            broadcasts over the first axes.
 
     Returns:
-        Coefficients of the product, whose degree is the sum of both.
+        Coefficients of the product, whose degree is the sum of both: a new array, complex if a or b
+        is.
     """
-    # multiplications up to which, as measured, compiled loops over all pairs of monomials are
-    # faster than one product of arrays for each coefficient of the shorter factor
+    # Multiplications up to which compiled loops over all pairs of monomials are faster than one
+    # product of arrays for each coefficient of the shorter factor. It is tuned: beyond it NumPy's
+    # matrix products win over loops.
     few_multiplications = 300_000
 
-    at = product_places(d, *degrees)
+    at = product_places(d, degrees[0], degrees[1])
     shape = bilinear(a[0], b[0]).shape
     out = np.zeros((count(d, sum(degrees)), *shape), np.result_type(a, b))
     inner = 1
@@ -148,6 +170,8 @@ def convolve(
             b_flat = np.broadcast_to(b, (len(b), *shape)).reshape(len(b), -1)
             _add_products(_writable(a_flat), _writable(b_flat), at, out.reshape(len(out), -1))
             return out
+    # Each coefficient of the shorter factor is multiplied by all of the longer one. Their products
+    # have different places, since x y = x z only if y = z: so the sum by indices misses none.
     if len(a) <= len(b):
         for x in np.flatnonzero(a.reshape(len(a), -1).any(1)):
             out[at[x]] += bilinear(a[x][None], b)
@@ -173,15 +197,23 @@ def product_part(
     """Return the homogeneous part of one degree of the product of two polynomials.
 
     Args:
-        a: Homogeneous parts of the first polynomial by degree, from 0; missing ones are zero.
+        a: Homogeneous parts of the first polynomial by degree, from 0; missing ones are zero. A
+            part has the shape (monomials of the degree, *shape of a coefficient), in the order of
+            `monomials(d, degree)`.
         b: Those of the second one.
-        degree: Degree of the part.
+        degree: Degree of the part that is returned.
         d: Number of variables.
-        bilinear: Product of coefficients, as for `convolve`.
+        bilinear: Product of coefficients, `np.multiply` or `matmul` of this module.
         lowest: Degrees of a and of b below which parts are taken as zero.
+
+    Returns:
+        Coefficients, shape (monomials of the degree, *shape of a product); zeros if no parts of a
+        and b have this degree together.
     """
     shape = bilinear(a[0][0], b[0][0]).shape
     total = np.zeros((count(d, degree), *shape), np.result_type(a[0], b[0]))
+    # k is the degree of the factor from b, and degree − k, that of the factor from a, must be
+    # there.
     first = max(lowest[1], degree - len(a) + 1)
     last = min(degree - lowest[0], len(b) - 1)
     for k in range(first, last + 1):
@@ -193,7 +225,8 @@ def product_part(
 def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
     """Add the elementwise products a[x] b[y] to out[at[x, y]] for all pairs of monomials x, y.
 
-    a, b and out have shapes (monomials, v), `at` has shape (monomials of a, monomials of b).
+    a and out have the shapes (monomials, v), b as well, each with its own number of monomials;
+    `at`, of shape (monomials of a, monomials of b), has the place of each product in `out`.
     """
     for x in range(len(a)):
         if not a[x].any():
@@ -208,7 +241,9 @@ def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
 def _add_matrix_products(a: Array, b: Array, at: Ints, out: Array) -> None:
     """Add the matrix products a[x] @ b[y] to out[at[x, y]] for all pairs of monomials x, y.
 
-    a, b and out have shapes (monomials, p, q), (monomials, q, r) and (monomials, p, r).
+    a, b and out have the shapes (monomials, p, q), (monomials, q, r) and (monomials, p, r), each
+    with its own number of monomials; `at`, of shape (monomials of a, monomials of b), has the place
+    of each product in `out`.
     """
     for x in range(len(a)):
         if not a[x].any():
@@ -234,15 +269,16 @@ def matmul(a: Array, b: Array) -> Array:
 
 
 def derivative(part: Array, degree: int, direction: Array) -> Array:
-    """Return the derivative Σ_i direction_i ∂p/∂u_i of a homogeneous polynomial p.
+    """Return the derivative Σ_i direction_i ∂p/∂u_i of a homogeneous polynomial p in d variables.
 
     Args:
-        part: Coefficients of p, shape (monomials, *coefficient).
+        part: Coefficients of p, shape (monomials, *shape of a coefficient), in the order of
+            `monomials(d, degree)`.
         degree: Degree of p, at least 1.
-        direction: Shape (d,).
+        direction: Weight of each partial derivative, shape (d,).
 
     Returns:
-        Coefficients of the derivative, whose degree is one less.
+        Coefficients of the derivative, whose degree is one less, in the order of its monomials.
     """
     d = len(direction)
     # a monomial b of the derivative by u_i comes from u_i b alone, times the exponent of u_i there

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+# u, the largest relative error of one rounded operation: half the distance of 1 and the next
+# number.
 UNIT_ROUNDOFF = float(np.finfo(float).eps) / 2
-"""u, the largest relative error of one rounded operation."""
+# Roundings that a product of complex numbers has beyond those of a real one. Its relative error is
+# at most √2 γ_2 ≤ γ_3 (Higham 2002, lemma 3.5).
 COMPLEX_ROUNDINGS = 2
-"""Roundings that a product of complex numbers has beyond those of a real one.
-
-Its relative error is at most √2 γ_2 ≤ γ_3 (Higham 2002, lemma 3.5).
-"""
 
 
 def gamma(count: int) -> float:

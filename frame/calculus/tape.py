@@ -25,21 +25,33 @@ first one where there is one operand alone. The array of places holds the argume
 results of all operations, then the numbers of the expression, which are counted from the end: the
 first number stands at −1.
 """
-BINARY = ("add", "multiply", "power")
-UNARY = ("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log")
-OPERATIONS = (*BINARY, *UNARY)
+# Operations by their codes 0, 1, 2, …, which a compiled loop knows: first those of two operands,
+# then those of one.
+OPERATIONS = (
+    "add", "multiply", "power", "reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log",
+)  # fmt: skip
+UNARY = OPERATIONS[3:]
 
 
 def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol]) -> Tape:
-    """Return the tape of m expressions.
+    """Return the tape of m expressions: a list of operations that one compiled loop runs.
 
     Args:
-        components: The expressions.
-        active: Arguments that have the first places.
-        constants: Arguments that follow.
+        components: The m expressions. They are sums, products, powers, and sin, cos, tan, exp and
+            log.
+        active: Symbols that are the first arguments.
+        constants: Symbols that are the arguments behind them. All symbols of the expressions are
+            among both.
+
+    Returns:
+        Three arrays. The operations, whole numbers of shape (operations, 3): the code of each in
+        `OPERATIONS` and the places of its operands; the second one repeats the first one where
+        there is one operand alone. The places of the m results, shape (m,). And the array of
+        places, which holds room for the arguments, then for the result of each operation, then the
+        numbers of the expressions; the first number stands at the end, and its place is −1.
 
     Raises:
-        RefusedError: An expression has a function that is not among `OPERATIONS`.
+        RefusedError: An expression has another function.
     """
     writer = _Writer(list(active) + list(constants))
     results = np.array([writer.place(e) for e in components], np.int64)
@@ -57,12 +69,22 @@ def with_derivatives(
 ) -> Tape:
     """Return the tape of m expressions and of their derivatives by the a active arguments.
 
-    The results are the expressions, the first derivatives in the order of an array (m, a), and the
-    second ones in that of an array (m, a, a). Arguments are as for `tape`.
+    Args:
+        components: The m expressions.
+        active: Symbols that are the first arguments, by which is differentiated.
+        constants: Symbols that are the arguments behind them.
+
+    Returns:
+        The tape of m + m a + m a² results, as `tape` returns it: the expressions; their first
+        derivatives, in the order of an array of shape (m, a); and the second ones, in that of an
+        array (m, a, a).
+
+    Raises:
+        RefusedError: An expression or a derivative has a function that no operation computes.
     """
     first = [e.diff(x) for e in components for x in active]
     second = [e.diff(x) for e in first for x in active]
-    return tape([*components, *first, *second], active, constants)
+    return tape(list(components) + first + second, active, constants)
 
 
 class _Writer:
@@ -84,7 +106,17 @@ class _Writer:
         self.arguments = len(arguments)
 
     def place(self, e: Expr) -> int:
-        """Return the place of an expression, after writing what computes it where it is new."""
+        """Return the place of an expression's value, after writing what computes it if it is new.
+
+        The place is the index among the arguments and the results of operations; a number has the
+        place −1 − k, where k is its index among the numbers, since these stand at the end.
+
+        Args:
+            e: Symbol among the arguments, number, or compound expression of them.
+
+        Raises:
+            RefusedError: The expression has a function that no operation computes.
+        """
         if e not in self.places:
             if e.is_number:
                 self.places[e] = -1 - self.numbers.setdefault(float(e), len(self.numbers))
@@ -93,9 +125,17 @@ class _Writer:
         return self.places[e]
 
     def _write(self, e: Expr) -> int:
-        """Write the operations that compute a compound expression, and return its place."""
+        """Write the operations that compute an expression, and return the place of its result.
+
+        Args:
+            e: A sum or product of any number of operands, a power, or a function of one operand.
+
+        Raises:
+            RefusedError: The expression has a function that no operation computes.
+        """
         name = type(e).__name__
         if name in ("Add", "Mul"):
+            # Sums of several operands become additions from left to right.
             operands = map(self.place, e.args)
             return reduce(lambda x, y: self._apply(name, x, y), operands)
         if name == "Pow":
@@ -104,10 +144,14 @@ class _Writer:
         return self._apply(name, self.place(e.args[0]))
 
     def _power(self, base: Expr, exponent: Expr) -> int:
-        """Write base ** exponent, and return its place.
+        """Write the operations that compute base ** exponent, and return the place of the result.
 
-        Small integer powers become products and half powers become roots, which are exact to a few
-        roundings and faster than a general power.
+        Whole powers up to 4 become products and half powers become roots, which are exact to a few
+        roundings and faster than a general power. The exponent is no 0, which SymPy has replaced by
+        1.
+
+        Raises:
+            RefusedError: Base or exponent has a function that no operation computes.
         """
         if exponent.is_Integer and abs(int(exponent)) <= 4:
             factors = [self.place(base)] * abs(int(exponent))

@@ -37,8 +37,9 @@ from alphacut.frame.calculus.monomials import (
 from alphacut.frame.calculus.rounding import COMPLEX_ROUNDINGS, UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 
+# Order of a Taylor model unless another is given (tuned). A higher one has a smaller remainder, and
+# many more coefficients: binomial(d + order, d) for d inputs.
 ORDER = 3
-"""Order of a Taylor model unless another is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +75,18 @@ class TaylorModel:
 
     @classmethod
     def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
-        """Return the functions centre_i + radius_i u_i, from arrays of shape (d,); V is (d,).
+        """Return the d functions centre_i + radius_i u_i of inputs u in [−1, 1]^d.
 
-        The remainder covers the rounding of the product and of the sum.
+        These are the uncertain parameters over a box. The remainder covers the rounding of the
+        product and of the sum.
+
+        Args:
+            centre: Midpoints, shape (d,).
+            radius: Half-widths, not negative, shape (d,).
+            order: Degree above which products move their terms into the remainder.
+
+        Returns:
+            Taylor model of an array of functions of the shape (d,).
         """
         constant_part = np.asarray(centre, float)[None]
         linear_part = np.diag(np.asarray(radius, float))
@@ -115,11 +125,15 @@ class TaylorModel:
         return np.zeros((count(self.inputs, degree), *self.shape), self.parts[0].dtype)
 
     def part_magnitudes(self) -> list[Array]:
-        """Return a bound over the box of the magnitude of each homogeneous part, each of shape V.
+        """Return a bound over the box of the magnitude of each homogeneous part.
 
-        Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part. The factor
+        Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part. A factor
         covers the rounding of that sum, of the sum of all bounds and of the few products that
         callers form with it.
+
+        Returns:
+            One array for each degree from 0 on, each of the shape of the array of functions. The
+            remainder is not in them.
         """
         roundings_of_callers = len(self.parts) + 4
         return [
@@ -162,10 +176,17 @@ class TaylorModel:
         return _real_times(powers, flat).reshape(len(u), *self.shape)
 
     def jets(self, u: Array) -> Array:
-        """Return values, gradients and Hessians of K polynomials, V = (K,), at points u (S, d).
+        """Return values, gradients and Hessians of the polynomials of K functions at points.
 
-        The shape is (S, q, K) with q = 1 + d + d (d + 1)/2. Along the second axis stand the value,
-        the d first derivatives, and the second derivatives by u_i and u_j for i ≤ j.
+        The remainder, which bounds their distance from the functions, is left out.
+
+        Args:
+            u: Points in the inputs of the model, shape (S, d).
+
+        Returns:
+            Array of shape (S, 1 + d + d (d + 1)/2, K). Along the second axis stand the value, the d
+            first derivatives, and the second derivatives by u_i and u_j for i ≤ j: (0, 0), (0, 1) …
+            (0, d − 1), (1, 1) ….
         """
         powers = monomial_values(u, len(self.parts) - 1)
         tables = [_real_times(powers[:, : len(x)], x) for x in self._derivative_tables]
@@ -173,9 +194,13 @@ class TaylorModel:
 
     @cached_property
     def _derivative_tables(self) -> list[Array]:
-        """Coefficients of the K polynomials and of their first and second derivatives.
+        """Coefficients of the polynomials of K functions and of their derivatives, as three arrays.
 
-        Three arrays of shape (terms, K · derivatives of that order).
+        They are for the derivatives of order 0, 1 and 2, of shape (monomials, K · derivatives of
+        that order). Along the second axis stand the coefficients of all K functions differentiated
+        by u_0, then by u_1 and so on, and in the third array by the pairs (u_i, u_j) with i ≤ j,
+        the last index fastest. The rows are the monomials of all degrees that the derivatives have,
+        by degree.
         """
         directions = np.eye(self.inputs)
         # homogeneous parts of the derivative by each list of inputs, such as (0, 0) or (0, 2)
@@ -184,6 +209,8 @@ class TaylorModel:
         for order in (1, 2):
             of_this_order = []
             for inputs in combinations_with_replacement(range(self.inputs), order):
+                # The derivative by one input less has been found before; it is differentiated by
+                # the last input. A constant has the derivative zero, of degree 0.
                 parts_before = derivatives_by[inputs[:-1]]
                 direction = directions[inputs[-1]]
                 parts = [
@@ -208,7 +235,8 @@ class TaylorModel:
 
         Args:
             inputs: Indices of the inputs that are kept, rising, shape (fewer,). The functions must
-                not depend on any other input.
+                not depend on any other input, which is not checked: terms with another input are
+                lost.
         """
         fewer = len(inputs)
         parts = []
@@ -258,11 +286,12 @@ class TaylorModel:
     def on_subbox(self, low: Array, high: Array) -> TaylorModel:
         """Return the model on the sub-box low ≤ u ≤ high, as a model on the unit box.
 
-        The new inputs w in [−1, 1]^d are those of u = (low + high)/2 + w (high − low)/2.
+        The new inputs w in [−1, 1]^d are those of u = (low + high)/2 + w (high − low)/2. The
+        remainder stays, with the rounding of the new coefficients added.
 
         Args:
             low: Lower ends of the sub-box, shape (d,), not below −1.
-            high: Upper ends, not above 1.
+            high: Upper ends, not above 1 and not below `low`.
         """
         midpoint = (low + high) / 2
         radius = (high - low) / 2
@@ -297,7 +326,14 @@ class TaylorModel:
         return replace(self, parts=parts, remainder=self.remainder[key])
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        """Return the sum, which broadcasts as sums of arrays do, with its rounding."""
+        """Return the sum, which broadcasts as sums of arrays do, with its rounding.
+
+        Args:
+            other: Taylor model of the same inputs, or numbers, which stand for constant functions.
+
+        Returns:
+            Taylor model of the higher order of both.
+        """
         b = self._as_model(other)
         ndim = max(len(self.shape), len(b.shape))
         parts = []
@@ -312,6 +348,7 @@ class TaylorModel:
     __radd__ = __add__
 
     def __neg__(self) -> TaylorModel:
+        """Return the negative functions; a change of sign is not rounded."""
         return replace(self, parts=tuple(-part for part in self.parts))
 
     def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
@@ -321,7 +358,16 @@ class TaylorModel:
         return -self + other
 
     def __mul__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
-        """Return the elementwise product; numbers scale both the polynomials and the remainder."""
+        """Return the elementwise product, which broadcasts as products of arrays do.
+
+        Args:
+            other: Taylor model of the same inputs, or numbers, which scale the polynomials and, by
+                their magnitude, the remainder.
+
+        Returns:
+            Taylor model of the higher order of both, whose remainder bounds the terms above this
+            order and all rounding.
+        """
         if isinstance(other, TaylorModel):
             return _product(self, other, np.multiply)
         factor = _numbers(other)
@@ -333,6 +379,7 @@ class TaylorModel:
     __rmul__ = __mul__
 
     def __matmul__(self, other: TaylorModel | Array) -> TaylorModel:
+        """Return the products of matrices of functions with matrices of functions or numbers."""
         if isinstance(other, TaylorModel):
             return _product(self, other, matmul)
         return self._linear(np.matmul, _numbers(other), self.shape[-1])
@@ -350,15 +397,19 @@ class TaylorModel:
         return self**-1.0 * other
 
     def __pow__(self, exponent: float) -> TaylorModel:
-        """Return a real power of positive functions f.
+        """Return a real power of functions f that are positive over the box.
 
-        With the value c of f at the midpoint and t = f − c, the model is the Taylor series
+        With the value c of f's polynomial at the midpoint and t = f − c, the model is the Taylor
+        series
 
             f^a = Σ_k binomial(a, k) c^(a − k) t^k,    k = 0 … N, N the order.
 
-        The remainder bounds its rounding, and by Lagrange's form what follows:
-        |binomial(a, N + 1)| max(ξ^(a − N − 1)) max|t|^(N + 1), ξ between the bounds of f. A power
-        of ξ is monotonic, so that its maximum lies at one of these two bounds.
+        The remainder bounds its rounding, and by Lagrange's form what follows: |binomial(a, N + 1)|
+        max(ξ^(a − N − 1)) max|t|^(N + 1), ξ between the bounds of f. A power of ξ is monotonic, so
+        that its maximum lies at one of these two bounds.
+
+        Args:
+            exponent: a.
 
         Raises:
             UnprovedError: A function is not known to be positive on the box.
@@ -397,8 +448,9 @@ class TaylorModel:
     def with_rounding(self, count: int) -> TaylorModel:
         """Return the model with the error of `count` roundings of all coefficients added.
 
-        The coefficients and the remainder are those after rounding. They must be sums without
-        cancellation, so that each rounding error is a fraction of the result.
+        The coefficients and the remainder are those after rounding. Each must be the result of
+        `count` rounded operations without cancellation, so that its error is at most γ_count =
+        count u / (1 − count u) of it, with the unit roundoff u.
         """
         of_coefficients = gamma(count) * np.sum(self.part_magnitudes(), 0)
         return self.widened(of_coefficients + gamma(count + 3) * self.remainder)
@@ -412,11 +464,12 @@ class TaylorModel:
     def _linear(
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
-        """Return a bilinear product with numbers, with its rounding in the remainder.
+        """Return a bilinear product with numbers, whose rounding goes into the remainder.
 
         Args:
             bilinear: Product of an array of functions' coefficients with `factor`. It must accept
-                one more axis in front of the first array.
+                one more axis in front of the first array, and be a sum of products of entries, so
+                that the product of the magnitudes bounds its magnitude.
             factor: The numbers.
             terms: Number of products that each entry of the result is the sum of.
         """
@@ -430,11 +483,14 @@ class TaylorModel:
 
 
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
-    """Return Taylor models of the same inputs, joined along an axis of V.
+    """Return Taylor models of arrays of functions of the same inputs, joined along an axis.
 
     Args:
-        models: At least one; their order becomes the highest one of all.
-        axis: Negative, counted from the last axis of V.
+        models: At least one. Their arrays of functions fit as those of `numpy.concatenate`.
+        axis: Axis of these arrays, negative, counted from the last one.
+
+    Returns:
+        Taylor model with the highest order of all.
     """
     parts = []
     for degree in range(max(len(model.parts) for model in models)):
@@ -446,10 +502,21 @@ def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
 
 
 def all_on_subbox(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
-    """Return each model on the sub-box low ≤ u ≤ high, as `TaylorModel.on_subbox` does.
+    """Return each model on the sub-box low ≤ u ≤ high, as a model on the unit box.
 
-    All models are moved at once as one array of functions, which is faster than one by one.
+    The new inputs w in [−1, 1]^d are those of u = (low + high)/2 + w (high − low)/2. All models are
+    moved at once as one array of functions, which is faster than one by one.
+
+    Args:
+        models: At least one; all of the same d inputs.
+        low: Lower ends of the sub-box, shape (d,), not below −1.
+        high: Upper ends, not above 1 and not below `low`.
+
+    Returns:
+        The models in their order, each with its shape and order.
     """
+    # The highest order serves all while they are joined: the sub-box forms no products, so that no
+    # model gains terms.
     joined = concatenate([model.reshaped(-1) for model in models], axis=-1).on_subbox(low, high)
     moved = list[TaylorModel]()
     first = 0
@@ -464,16 +531,19 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
     """Return a bound, entry by entry, of |A⁻¹| for all matrices A of a Taylor model.
 
     With an approximate inverse C of the matrix at the midpoint, A⁻¹ = (I − (I − C A))⁻¹ C. If the
-    spectral radius of R ≥ |I − C A| is below 1, Neumann's series converges and
-    |A⁻¹| ≤ (I − R)⁻¹ |C|. Of a matrix that is diagonal at the midpoint, this bound is the inverse
-    of Ostrowski's comparison matrix (1937).
+    spectral radius of R ≥ |I − C A| is below 1, Neumann's series converges and |A⁻¹| ≤ (I − R)⁻¹
+    |C|. Of a matrix that is diagonal at the midpoint, this bound is the inverse of Ostrowski's
+    comparison matrix (1937).
 
     Args:
-        matrix: Square matrices, V = (n, n).
+        matrix: Square matrices of functions, of the shape (n, n).
 
     Returns:
         The bound, shape (n, n), or None where the series is not known to converge: then A may be
         singular.
+
+    Raises:
+        numpy.linalg.LinAlgError: The matrix at the midpoint, or I − R, is exactly singular.
     """
     n = len(matrix.value)
     C = np.linalg.inv(matrix.value)  # any C would do; a good one makes the bound tight
@@ -491,14 +561,19 @@ def inverse_bound(matrix: TaylorModel) -> Array | None:
 def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     """Return polynomials Y that solve A Y = B degree by degree, without a bound of their error.
 
-    The part of degree m of A Y = B gives Y_m = A_0⁻¹ (B_m − Σ_{k < m} A_{m−k} Y_k).
+    The part of degree m of A Y = B gives Y_m = A_0⁻¹ (B_m − Σ_{k < m} A_{m−k} Y_k), where A_0 is
+    the matrix at the midpoint of the box.
 
     Args:
-        matrix: A, V = (n, n), whose matrix A_0 at the midpoint is not singular.
-        right: B, V = (n, m).
+        matrix: A, matrices of functions of the shape (n, n).
+        right: B, of the shape (n, m), of the same inputs.
 
     Returns:
-        Y, V = (n, m), with a remainder of zero. Where there are no inputs, it is constant.
+        Y, of the shape (n, m) and the higher order of both, with a remainder of zero. Where there
+        are no inputs, it is constant.
+
+    Raises:
+        numpy.linalg.LinAlgError: A_0 is singular.
     """
     order = 0
     if matrix.inputs:
@@ -514,16 +589,17 @@ def solution_series(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
 def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     """Return a Taylor model of the solutions Y of A Y = B.
 
-    The error of the polynomials Y' of `solution_series` is |Y' − Y| ≤ |A⁻¹| |A Y' − B|, whose
-    factors are bounded over the box. Both sides of the system are first multiplied by the inverse
-    of A at the midpoint, which makes these bounds tight.
+    Polynomials Y' that solve the system degree by degree have the error |Y' − Y| ≤ |A⁻¹| |A Y' −
+    B|, whose factors are bounded over the box. Both sides of the system are first multiplied by the
+    inverse of A at the midpoint, which makes these bounds tight.
 
     Args:
-        matrix: A, V = (n, n).
-        right: B, V = (n, m).
+        matrix: A, matrices of functions of the shape (n, n).
+        right: B, of the shape (n, m), of the same inputs.
 
     Raises:
         UnprovedError: A may be singular somewhere in the box.
+        numpy.linalg.LinAlgError: A is exactly singular at the midpoint.
     """
     # any matrix serves as a preconditioner, so that the rounding of this inverse needs no bound
     midpoint_inverse: Any = np.linalg.inv(matrix.value)
@@ -570,7 +646,12 @@ def _product(
     Args:
         a: Left factor.
         b: Right factor, of the same inputs.
-        bilinear: `np.multiply` for elementwise products or `monomials.matmul` for matrices.
+        bilinear: `np.multiply` for elementwise products, or `matmul` of the module of monomials for
+            products of matrices.
+
+    Returns:
+        Taylor model whose remainder bounds what the product of the polynomials leaves out of the
+        product of the functions, the terms above the order, and all rounding.
     """
     order = max(a.order, b.order)
     ndim = max(a.remainder.ndim, b.remainder.ndim)

@@ -34,27 +34,29 @@ from alphacut.frame.structures.linear import (
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.frame.structures.model import Dynamics, StructureModel
 
-MAX_STEPS = 10_000_000
-"""Most steps of a motion: bounds of one output at two levels are 320 MB of them."""
-CURE = "keep the parameters where the motion exists, such as positive masses"
-
 
 def time_nodes(duration: float, step: float) -> Array:
-    """Return time nodes 0, step, 2 step … up to `duration`, shape (T,), in s.
+    """Return the time nodes 0, step, 2 step … up to `duration`, shape (steps + 1,), in s.
+
+    Args:
+        duration: Last node, in s: a whole number of steps to 1e-9 of it.
+        step: Distance of neighbouring nodes, in s.
 
     Raises:
         RefusedError: An argument is not a number, the step is not positive, or the duration is not
-            a whole number of steps from 1 to `MAX_STEPS`.
+            1 to 10,000,000 whole steps.
     """
     checked_number("step", step, positive=True)
-    # durations are given in decimal numbers, whose quotients are whole but for rounding
+    # More steps are a mistake in a unit: bounds of one output at two levels are 320 MB of them.
+    max_steps = 10_000_000
+    # Durations are given in decimal numbers, whose quotients are whole but for rounding
     count = round(checked_number("duration", duration) / step)
-    is_multiple = 1 <= count <= MAX_STEPS and abs(count * step - duration) <= 1e-9 * duration
+    is_multiple = 1 <= count <= max_steps and abs(count * step - duration) <= 1e-9 * duration
     require(
         is_multiple,
         "duration",
         value=f"{duration:g} s",
-        allowed=f"1 to {MAX_STEPS:,} whole steps of {step:g} s",
+        allowed=f"1 to {max_steps:,} whole steps of {step:g} s",
     )
     return np.arange(count + 1) * step
 
@@ -86,6 +88,7 @@ class Flow(ABC):
     step: float
 
     def __post_init__(self) -> None:
+        """Raise RefusedError if a name is unknown, or the duration is no multiple of the step."""
         for name in self.names:
             require_choice("parameter", name, self.system.parameters)
         time_nodes(self.duration, self.step)
@@ -125,7 +128,14 @@ class Flow(ABC):
         return time_nodes(self.duration, self.step)
 
     def values(self, points: Array) -> Array:
-        """Return trajectories of the outputs at parameter sets (S, d), shape (S, T, m).
+        """Return trajectories of the outputs at S sets of the uncertain parameters.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each of the d names in
+                `self.names`. Other parameters have their nominal values.
+
+        Returns:
+            Array of shape (S, time nodes, outputs), in the SI units of the outputs.
 
         Raises:
             RefusedError: A trajectory does not exist, or leaves the range of floating-point
@@ -135,22 +145,46 @@ class Flow(ABC):
         return self._finite(points, derivatives=False).value
 
     def taylor(self, points: Array) -> Jet:
-        """Return trajectories with first and second derivatives by the d uncertain parameters.
+        """Return trajectories with first and second derivatives by the uncertain parameters.
 
-        It is the time-stepping scheme that is differentiated. The jet has shape (S, T, m).
+        It is the time-stepping scheme that is differentiated, so that the derivatives are those of
+        what `values` returns, to rounding.
 
         Args:
-            points: Parameter sets, shape (S, d).
+            points: Parameter sets in SI units, shape (S, d): a column for each of the d names in
+                `self.names`. Other parameters have their nominal values.
+
+        Returns:
+            Jet whose `value` has the shape (S, time nodes, outputs), in SI units; `first` and
+            `second` have one and two axes of length d in front, in the order of the names.
 
         Raises:
-            RefusedError: As `values` does, or the flow has no derivatives.
+            RefusedError: A trajectory does not exist, or leaves the range of floating-point
+                numbers, or the flow has no derivatives.
             StepError: A step did not converge.
         """
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at points (S, d), and raise errors that name the point at fault."""
-        # overflow and NaN are looked for in the result, so that the error can name time and point
+        """Return trajectories, or raise an error that names the parameter set at fault.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+            derivatives: Whether the result has first and second derivatives by the d parameters.
+                Their values are not checked.
+
+        Returns:
+            Jet of shape (S, time nodes, outputs), all of whose values are finite.
+
+        Raises:
+            RefusedError: A matrix is singular, or a value is not finite; the message names the
+                first parameter set and time node. Or the flow has no derivatives.
+            StepError: A step did not converge.
+        """
+        cure = "keep the parameters where the motion exists, such as positive masses"
+        # Overflow and NaN are looked for in the result, so that the error can name time and point;
+        # all parameter sets are computed at once, and one bad set must not stop NumPy with a
+        # warning.
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
@@ -158,18 +192,25 @@ class Flow(ABC):
             raise StepError(f"{failure}; it failed at {self._failing_point(points)}") from None
         except np.linalg.LinAlgError:
             what = f"a singular matrix at {self._failing_point(points)}"
-            raise RefusedError("trajectory", what, "motions that exist", CURE) from None
+            raise RefusedError("trajectory", what, "motions that exist", cure) from None
         is_finite = np.isfinite(motion.value)
         if not is_finite.all():
             row, node, _ = np.argwhere(~is_finite)[0]
             where = self._point_words(points[row])
             what = f"not finite from t = {self.time[node]:g} s on at {where}"
-            cure = f"{CURE}, or a smaller step"
+            cure += ", or a smaller step"
             raise RefusedError("trajectory", what, "motions that exist", cure)
         return motion
 
     def _failing_point(self, points: Array) -> str:
-        """Return, in words, the first point that fails alone, or the last one if none does."""
+        """Return, in words, the first parameter set that fails alone, or the last one if none does.
+
+        A set fails alone if its trajectory raises LinAlgError or StepError. Other errors leave as
+        they are.
+
+        Args:
+            points: At least one parameter set, shape (S, d), all of which together have failed.
+        """
         for point in points:
             try:
                 self._march(point[None], derivatives=False)
@@ -229,8 +270,9 @@ class LinearFlow(Flow):
     def finer(self) -> tuple[LinearFlow, int]:
         """Return the exact flow with 4 to 64 equal substeps in a step, and their number.
 
-        Where 64 substeps suffice, the fastest mode turns by at most .8 rad in one of them, so that
-        its curve is resolved. More substeps would cost memory only.
+        The number is such that the fastest undamped mode at the nominal parameters turns by at most
+        0.8 rad in a substep, so that its curve is resolved, unless this would take more than 64.
+        More substeps would cost memory only.
         """
         phase_per_step = float(frequencies(self.system)[-1]) * self.step
         substeps = int(np.clip(np.ceil(phase_per_step / 0.8), 4, 64))
@@ -242,11 +284,18 @@ class LinearFlow(Flow):
         return exact_values, np.abs(self.values(points) - exact_values)
 
     def reach(self) -> Array:
-        """Return the size of each output that the energy of the nominal response allows, (m,).
+        """Return the size of each output that the energy of the nominal response allows.
 
-        An output r·q + s·v of displacements q and velocities v is at most
-        √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + vᵀ M v), by the inequality of Cauchy and Schwarz. The
-        second factor is the root of twice the energy, here the largest one at a time node.
+        An output r·q + s·v of displacements q and velocities v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ)
+        √(qᵀ K q + vᵀ M v), by the inequality of Cauchy and Schwarz. The second factor is the root
+        of twice the energy, here the largest one at a time node of the response at the nominal
+        parameters. What forces add to accelerations at once is left out.
+
+        Returns:
+            Array of shape (outputs,), in the units of the outputs, not negative.
+
+        Raises:
+            numpy.linalg.LinAlgError: A matrix is singular at the nominal parameters.
         """
         nominal = np.array([[self.system.parameters[name] for name in self.names]], float)
         matrices, rows = evaluate(self.system, self.names, nominal, derivatives=False)
@@ -264,7 +313,8 @@ class LinearFlow(Flow):
             x = states[:, half]
             row = rows.value[0, :, half]
             energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
-            # a pseudo-inverse, since massless unknowns make M singular
+            # A pseudo-inverse serves, since free unknowns make K singular: they store no energy,
+            # and an output on them has no bound from it.
             inverse = np.linalg.pinv(matrix, hermitian=True)
             squared_size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
         largest_energy = max(float(energy.max()), 0.0)
@@ -281,7 +331,23 @@ class LinearFlow(Flow):
         return self.integrator.step_map(matrices, *self._loads(matrices), self.step, steps)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories at parameter sets, perhaps not finite.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+            derivatives: Whether the jet has first and second derivatives by the d parameters.
+
+        Returns:
+            Jet of shape (S, time nodes, outputs).
+
+        Raises:
+            RefusedError: Damping is given by ratios, and the stiffness is not positive definite; or
+                an exact step would take more than 4096 substeps.
+            numpy.linalg.LinAlgError: A matrix is singular.
+        """
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
+        # Superposition is the fastest way. Where modes are coupled or too close it gives None, and
+        # powers of the map of a step, which need no modes, give the same trajectories to rounding.
         outputs = None
         if self.exact and self.by_modes:
             outputs = self._by_superposition(matrices, rows)
@@ -290,14 +356,20 @@ class LinearFlow(Flow):
         return with_feedthrough(outputs, matrices, self.system, self.time)
 
     def _by_superposition(self, matrices: Matrices, rows: Jet) -> Jet | None:
-        """Return exact trajectories by superposition of modes, without feedthrough, (S, T, m).
+        """Return exact trajectories of the outputs C [q; v] by superposition of modes.
 
-        Values come from classical modes, derivatives from complex ones. None is returned where
-        these modes are coupled or too close to each other.
+        What forces add to accelerations at once is not in them. Without derivatives the modes are
+        the undamped ones, which must stay uncoupled by damping; with derivatives they are the
+        complex ones of the state matrix.
 
         Args:
-            matrices: Of S parameter sets.
-            rows: Rows of the outputs in the state [q; v], shape (S, m, 2n).
+            matrices: Matrices of the structure at S parameter sets.
+            rows: Rows C of the outputs, shape (S, outputs, 2n), with or without derivatives.
+
+        Returns:
+            Jet of shape (S, time nodes, outputs), with derivatives if `rows` has them. None if
+            damping couples the modes, two of them are too close, or a mode does not oscillate or
+            grows.
         """
         pushes, loads = self._loads(matrices)
         if not rows.directions:
@@ -311,15 +383,21 @@ class LinearFlow(Flow):
 
 
 def with_feedthrough(outputs: Jet, matrices: Matrices, system: LinearSystem, time: Array) -> Jet:
-    """Return outputs with the direct part of the forces, which accelerations have.
+    """Return outputs with what forces add to accelerations at once.
 
     Args:
-        outputs: Trajectories C x(t) of states x, shape (S, T, m).
-        matrices: Of the same S parameter sets. `feeds` has shape (S, m, distinct load histories).
-        system: The structure, which says the loads.
-        time: Time nodes, shape (T,), in s.
+        outputs: Trajectories C x(t) of the states x of a structure, a jet of shape (S, nodes,
+            outputs).
+        matrices: Matrices of the structure at the same S parameter sets.
+        system: The structure, which has the loads.
+        time: Time nodes, shape (nodes,), in s.
+
+    Returns:
+        Jet of the shape of `outputs`. Each distinct load history f adds its feedthrough, the
+        accelerations of the outputs under a unit of it, times f(t), the value after a jump. It is
+        `outputs` itself if no output observes accelerations, or no force has a history.
     """
-    feedthrough = matrices.feeds
+    feedthrough = matrices.feeds  # (S, outputs, histories)
     if feedthrough is None:
         return outputs
     forces = np.stack([history.values(time) for history in distinct_histories(system.loads)])
@@ -357,6 +435,7 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
         size = 2 * size
     blocks = -(-nodes // size)
 
+    # Zero loads fill the last block up; the nodes that they lead to are cut off at the end.
     # what the loads of a block add to its outputs, and to the state at the next block's first node
     first_states = start @ np.eye(1, blocks)
     from_rest = list[Jet]()
@@ -384,6 +463,7 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
         outputs = outputs + concatenate(from_rest, -2)
 
     def in_time_order(x: Array) -> Array:
+        """Return (…, S, size m, blocks) as (…, S, nodes, m), without the nodes behind the last."""
         derivative_axes = x.shape[:-3]
         by_block = x.reshape((*derivative_axes, samples, size, m, blocks))
         ordered = np.moveaxis(by_block, -1, -3)
@@ -395,8 +475,12 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet) -> Jet:
 def exact_flow(flow: object) -> LinearFlow:
     """Return a flow unchanged if its trajectories are exact ones of a linear structure.
 
+    Args:
+        flow: A mapping from parameter sets to trajectories.
+
     Raises:
-        UnprovedError: They are not.
+        UnprovedError: It is not linear, as with columns that yield, or it integrates by another
+            scheme than the exact one.
     """
     if not isinstance(flow, LinearFlow):
         raise UnprovedError("the system is not linear")

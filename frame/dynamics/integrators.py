@@ -22,8 +22,10 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Matrices
 
+# Distance of a load's sample from a time node, as a fraction of the step, that is rounding. A
+# larger one would move samples; a smaller one would make segments so short that they are rounding
+# alone.
 SAME = 1e-12
-"""Distance of a load's sample from a time node, as a fraction of the step, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +56,24 @@ class Midpoint:
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
     ) -> StepMap:
-        """Return the map of one step, whose velocities are M⁻¹ times the momenta.
+        """Return the map of one step of the midpoint scheme for the states [q; v] of structures.
+
+        The velocities are M⁻¹ times the momenta of the discrete Lagrangian.
 
         Args:
-            matrices: Of S structures with n unknowns.
-            pushes: Accelerations by a unit of each of the L loads, shape (S, n, L).
-            loads: Histories of the loads.
+            matrices: Matrices of S structures with n unknowns.
+            pushes: Accelerations of the unknowns by a unit of each of the L loads, shape (S, n, L).
+            loads: Histories of the loads, in the order of these columns.
             step: Length h of a step, in s.
-            count: Number of steps.
+            count: Number of steps from t = 0 on.
+
+        Returns:
+            T, shape (S, 2n, 2n), and G, shape (S, 2n, 2 L), of x[k+1] = T x[k] + G load[k]; and the
+            numbers load[k] of each step, shape (count, 2 L): the line that stands for each load in
+            the step, its values at the beginning, then those at the end.
+
+        Raises:
+            numpy.linalg.LinAlgError: M/h + D/2 + h K/4 is singular.
         """
         m = matrices
         h = step
@@ -92,18 +104,28 @@ class Exact:
     def step_map(
         self, matrices: Matrices, pushes: Jet, loads: Sequence[History], step: float, count: int
     ) -> StepMap:
-        """Return the exact map of one step; arguments as for `Midpoint.step_map`.
+        """Return the exact map x[k+1] = T x[k] + G load[k] of the states [q; v] over one step.
 
-        With the state matrix A and b = [0; push], a load f adds to the state in a substep of
-        length h
+        With the state matrix A and b = [0; push], a load f adds to the state in a substep of length
+        h
 
             ∫ exp(A τ) b f(h − τ) dτ = Σ_k (A h)^k b / k! · ∫ (τ/h)^k f(h − τ) dτ.
 
-        G holds the vectors (A h)^k b / k! of each load and substep, carried on to the end of the
-        step; `StepMap.loads` holds the integrals, the moments of the load.
+        Args:
+            matrices: Matrices of S structures with n unknowns.
+            pushes: Accelerations of the unknowns by a unit of each of the L loads, shape (S, n, L).
+            loads: Histories of the loads, in the order of these columns.
+            step: Length of a step, in s.
+            count: Number of steps from t = 0 on.
+
+        Returns:
+            T, shape (S, 2n, 2n); G, shape (S, 2n, L · substeps · 26), the vectors (A h)^k b / k! of
+            each load and substep, the last substep first, carried on to the end of the step; and
+            load[k], shape (count, L · substeps · 26), the integrals that they multiply.
 
         Raises:
             RefusedError: A step would take more than 4096 substeps.
+            numpy.linalg.LinAlgError: A mass matrix is singular.
         """
         # In a substep |λ| h ≤ 2 for all eigenvalues, up to which 26 terms of the exponential are
         # enough: the next one is 2^26/26! = 2e-19.
@@ -114,7 +136,7 @@ class Exact:
         substeps = 1
         if loads:
             fastest = float(np.abs(np.linalg.eigvals(A.value)).max())
-            fastest = max(fastest, *(load.frequency for load in loads), 1e-300)
+            fastest = max(fastest, max(load.frequency for load in loads), 1e-300)
             # a power of 2, so that doubling the time ends at a whole step
             doublings = ceil(log2(max(1.0, fastest * step / largest_phase)) - 1e-9)
             substeps = 1 << max(0, doublings)
@@ -156,7 +178,17 @@ INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), Exact())}
 
 
 def state_matrix(m: Matrices) -> Jet:
-    """Return the state matrices A of [q; v]˙ = A [q; v] (eq. 17, eq. 23), shape (S, 2n, 2n)."""
+    """Return the state matrices A of the free motion [q; v]˙ = A [q; v] (eq. 17, eq. 23).
+
+    Args:
+        m: Mass M, damping D and stiffness K of n unknowns at S parameter sets.
+
+    Returns:
+        Jet of shape (S, 2n, 2n) with the blocks [[0, I], [-M⁻¹ K, -M⁻¹ D]].
+
+    Raises:
+        numpy.linalg.LinAlgError: A mass matrix is singular.
+    """
     inverse_mass = m.inverse_mass
     lower = concatenate([-(inverse_mass @ m.stiffness), -(inverse_mass @ m.damping)], -1)
     n = m.mass.value.shape[-1]
@@ -166,9 +198,18 @@ def state_matrix(m: Matrices) -> Jet:
 
 
 def exponential(z: Jet) -> Jet:
-    """Return the exponentials of matrices (…, N, N), with derivatives, by scaling and squaring."""
+    """Return the exponentials of matrices, with derivatives, by scaling and squaring.
+
+    Args:
+        z: Matrices, a jet of shape (…, N, N), of finite values.
+
+    Returns:
+        Jet of the same shape, accurate to rounding in the values; squaring amplifies rounding where
+        a matrix has a large norm.
+    """
     # exp(z) = exp(z/2^s)^(2^s), with s such that the 1-norm of z/2^s is at most .25
     norm = float(np.abs(z.value).sum(-2).max(initial=0.0))
+    # One number of squarings serves all matrices, since they are squared together.
     squarings = 0
     if norm > 0:
         squarings = max(0, ceil(log2(norm / 0.25)))
@@ -186,19 +227,21 @@ def exponential(z: Jet) -> Jet:
 
 @lru_cache(maxsize=8)
 def load_moments(history: History, step: float, count: int, order: int) -> Array:
-    """Return the moments ∫ s^k f(t) dt, k < `order`, of a load f over each step.
+    """Return the moments ∫ s^k f(t) dt of a load f over each step, for k = 0 … order - 1.
 
     In each step s falls from 1 at its beginning to 0 at its end. The integrals are exact to
-    rounding.
+    rounding, also where samples and jumps of the load lie inside a step. Results are cached;
+    callers must not change them.
 
     Args:
-        history: The load f.
+        history: The load f, zero before it starts, and behind its end unless its last sample is
+            held.
         step: Length of a step, in s.
-        count: Number of steps from t = 0.
+        count: Number of steps from t = 0 on.
         order: Number of moments of each step.
 
     Returns:
-        Shape (count, order), in the unit of the load times s.
+        Array of shape (count, order), in the unit of the load times s.
     """
     # Segments in which the load is smooth, between neighbouring nodes and samples. Each has the
     # number of its step (`home`), and its start and end from the beginning of that step.
@@ -233,13 +276,18 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
 
 
 def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
-    """Return the line through each of L loads in each step that has its impulse and first moment.
+    """Return the line through each load in each step that has its impulse and its first moment.
 
-    A load that is linear in a step is its own line.
+    A load that is linear in a step is its own line there.
+
+    Args:
+        loads: The L loads; there may be none.
+        step: Length of a step, in s.
+        count: Number of steps from t = 0 on.
 
     Returns:
-        Values of the lines, shape (count, 2 L): of each load at the beginning of the step, then of
-        each load at its end.
+        Values of the lines in the units of the loads, shape (count, 2 L): of each load at the
+        beginning of the step, then of each load at its end.
     """
     moments = np.array([load_moments(load, step, count, 2) for load in loads])
     mean, first_moment = np.moveaxis(moments.reshape(len(loads), count, 2) / step, -1, 0)

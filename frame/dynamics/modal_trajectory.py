@@ -29,22 +29,25 @@ def modal_trajectory(
 ) -> Jet | None:
     """Return outputs at time nodes with first and second derivatives, by complex modes.
 
+    Arguments and result are jets: values at S parameter sets with derivatives by d parameters.
+
     Args:
-        state_matrix: A of S parameter sets, shape (S, N, N).
+        state_matrix: A of ẋ = A x, shape (S, N, N).
         columns: The initial state, then what a unit of each of L loads adds to the rate of the
             state, shape (S, N, 1 + L).
-        rows: Rows C of the m outputs, shape (S, m, N).
+        rows: Rows C of the outputs C x, shape (S, outputs, N).
         loads: Histories of the L loads.
-        time: T time nodes, shape (T,), in s.
+        time: Time nodes, equally spaced from 0 on, shape (nodes,), in s.
 
     Returns:
-        Shape (S, T, m). None where two eigenvalues are too close, or where a mode grows or turns
-        beyond the range of the recursion of Duhamel's integral.
+        Jet of shape (S, nodes, outputs). None if two eigenvalues of A are too close, or a mode
+        grows or turns beyond the range of the recursion of Duhamel's integral.
     """
     modes = _complex_modes(state_matrix)
     if modes is None:
         return None
-    # of each conjugate pair the first one is kept, with weight 2; real modes have weight 1
+    # A is real, so that its modes are real or come in conjugate pairs, whose sum is twice the real
+    # part of one. Of each pair the first one is kept, with weight 2; real modes have weight 1.
     weight = 1.0 + np.sign(modes.rate.value.imag)
     kept = int((weight > 0).sum(1).max())
     rate = modes.rate[:, :kept]
@@ -52,7 +55,9 @@ def modal_trajectory(
     at_outputs = (rows @ modes.shapes)[..., :kept]
     of_columns = (modes.adjoint @ columns)[:, :kept]
 
-    # ρ, ρ′ and ρ″ by λ of the initial state and of each load, shape (S, 3, modes, T) each
+    # Each mode is a sum of amplitudes times responses ρ(λ, t): exp(λ t) of the initial state, and
+    # ∫ exp(λ τ) f(t − τ) dτ of a load f. Here are ρ and its derivatives ρ′ and ρ″ by λ of each,
+    # shape (S, 3, modes, T).
     free = np.exp(rate.value[..., None] * time)
     waves = [np.stack([free, time * free, time**2 * free], 1)]
     for load in loads:
@@ -79,18 +84,20 @@ def modal_trajectory(
 
 
 def _factors_of_waves(a: Jet, rate: Jet) -> list[Array]:
-    """Return what multiplies ρ, ρ′ and ρ″ in a ρ(λ) and in its derivatives by the parameters.
+    """Return what multiplies ρ, ρ′ and ρ″ in a ρ(λ) and in its derivatives by d parameters.
 
-    With subscripts for derivatives by parameters, (a ρ)_i = a_i ρ + a λ_i ρ′ and (a ρ)_ij =
-    a_ij ρ + (a_i λ_j + a_j λ_i + a λ_ij) ρ′ + a λ_i λ_j ρ″.
+    ρ(λ) is a response at all times that depends on the parameters through an eigenvalue λ alone,
+    and ρ′ and ρ″ are its derivatives by λ. With subscripts for derivatives by parameters, (a ρ)_i =
+    a_i ρ + a λ_i ρ′ and (a ρ)_ij = a_ij ρ + (a_i λ_j + a_j λ_i + a λ_ij) ρ′ + a λ_i λ_j ρ″.
 
     Args:
-        a: Amplitudes, shape (S, m, modes).
-        rate: Eigenvalues λ, shape (S, 1, modes).
+        a: Amplitudes, a jet of shape (S, outputs, modes).
+        rate: Eigenvalues λ, a jet of shape (S, 1, modes).
 
     Returns:
-        Factors of the values, of first and of second derivatives, shapes (S, m, 3 modes),
-        (d, S, m, 3 modes) and (d, d, S, m, 3 modes): of ρ for all modes, of ρ′, then of ρ″.
+        Factors of the values, of the first and of the second derivatives, shapes (S, outputs, 3
+        modes), (d, S, outputs, 3 modes) and (d, d, S, outputs, 3 modes). Along the last axis stand
+        the factors of ρ for all modes, then those of ρ′, then those of ρ″.
     """
     slope = rate.first
     zero = 0.0 * a.value
@@ -115,9 +122,18 @@ class _ComplexModes(NamedTuple):
 
 
 def _complex_modes(A: Jet) -> _ComplexModes | None:
-    """Return the modes of state matrices (S, N, N); None where two eigenvalues are too close.
+    """Return the modes of real state matrices with derivatives, or None if two are too close.
 
     The derivatives of a mode v_k are chosen without a component along v_k itself.
+
+    Args:
+        A: State matrices, a jet of shape (S, N, N).
+
+    Returns:
+        Complex jets: `rate`, the eigenvalues, shape (S, N), with falling imaginary parts, so that
+        of each conjugate pair the one above the real axis comes first; `shapes`, the modes as
+        columns, shape (S, N, N); and `adjoint`, the inverse of this matrix. None if at any set the
+        distance of two eigenvalues is below 1e-4 of one of them plus 1e-7 of the largest.
     """
     # Below a relative distance of 1e-4 the second derivatives of modes lose more than eight digits.
     # Double eigenvalues at zero split by the root of the rounding, 1e-7 of the largest one.
@@ -218,7 +234,10 @@ def classical_trajectory(
 
 
 def _intervals_of_step(loads: Sequence[History], step: float) -> int | None:
-    """Return the least number of intervals of a step, up to 16, in which all loads are linear."""
+    """Return the least number of equal intervals of a step in which all loads are linear.
+
+    None if it is above 16.
+    """
     for intervals in range(1, 17):
         if all(_is_linear(load, step / intervals) for load in loads):
             return intervals
@@ -226,7 +245,15 @@ def _intervals_of_step(loads: Sequence[History], step: float) -> int | None:
 
 
 def _is_linear(load: History, interval: float) -> bool:
-    """Whether a load is linear in each of equal intervals from t = 0 on."""
+    """Return whether a load is linear in each of equal intervals from t = 0 on.
+
+    It is if its samples begin at the end of an interval, their step is a whole number of intervals,
+    both to 1e-9, and it is not multiplied by a sine. It may jump between two intervals.
+
+    Args:
+        load: The load.
+        interval: Length of an interval, in s.
+    """
     if load.frequency:
         return False
     ratios = np.array([load.step, load.start]) / interval
@@ -249,20 +276,21 @@ def _march_modes(
 ) -> None:
     """Write the outputs Im Σ_k read_ok z_k at time nodes to `out`, in place.
 
-    Over an interval z_k(t + h) = exp(σ_k h) z_k(t) + Σ_l moved_kl (J₀ end_l − J₁ slope_l), where
-    J_j = ∫ exp(σ_k τ) τ^j dτ over the interval and load l is end_l − slope_l τ a time τ before its
-    end.
+    The modal coordinates z_k obey ż_k = σ_k z_k + Σ_l moved_kl f_l(t). Over an interval of length
+    h, z_k(t + h) = exp(σ_k h) z_k(t) + Σ_l moved_kl (J₀ end_l − J₁ slope_l), where J_j = ∫ exp(σ_k
+    τ) τ^j dτ over the interval, and load l is end_l − slope_l τ a time τ before the end of the
+    interval.
 
     Args:
-        sigma: σ of n modes, shape (S, n).
-        h: Length of an interval.
-        intervals: Number of intervals in a step.
-        start: z at t = 0, shape (S, n).
-        moved: ΦᵀM b of each load, shape (S, n, L).
-        ends: Values of the loads at the ends of the intervals, shape (I, L).
-        slopes: Slopes of the loads in the intervals, shape (I, L).
-        read: Output rows times mode shapes, shape (S, m, n).
-        out: Shape (S, T, m).
+        sigma: Complex σ of n modes at S parameter sets, shape (S, n).
+        h: Length of an interval, in s.
+        intervals: Number of intervals in a step, from one time node to the next.
+        start: Complex z at t = 0, shape (S, n).
+        moved: ΦᵀM b, what a unit of each load adds to ż, shape (S, n, L).
+        ends: Values of the loads at the ends of the intervals, shape (intervals in all steps, L).
+        slopes: Slopes of the loads in the intervals, of the same shape.
+        read: Complex output rows times mode shapes, shape (S, outputs, n).
+        out: Receives the outputs, shape (S, time nodes, outputs).
     """
     samples, n_nodes, m = out.shape
     n = sigma.shape[1]

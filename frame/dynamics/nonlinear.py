@@ -30,9 +30,6 @@ from alphacut.frame.structures.linear import has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import yields
 
-MAX_ITERATIONS = 30
-"""Newton iterations after which a time step has failed; five or six are usual."""
-
 
 class Expressions(NamedTuple):
     """SymPy expressions and the symbols that they depend on.
@@ -64,18 +61,23 @@ def make_flow(
     step: float,
     integrator: str | Integrator | None = None,
 ) -> Flow:
-    """Return the flow that integrates a structure.
+    """Return the mapping from parameter sets to trajectories that integrates a structure.
 
     Args:
         model: The structure.
         names: Names of the uncertain parameters.
-        duration: Length of the simulation, in s.
+        duration: Length of the simulation, in s: a whole number of steps.
         step: Length of a step, in s.
-        integrator: The time integrator or its name. If it is not given, it is "exact" where the
-            structure has an exact solution, else "midpoint".
+        integrator: The time integrator or its name. A linear structure takes "exact" and
+            "midpoint", and "exact" if none is given; columns that yield take "exact" alone; a
+            nonlinear smooth system "midpoint" alone.
+
+    Returns:
+        A `LinearFlow`, `YieldingFlow` or `LagrangianFlow`.
 
     Raises:
-        RefusedError: The structure has no such parameter, or no such integrator.
+        RefusedError: The structure has no such parameter or takes no such integrator, or the
+            duration is no whole number of steps.
     """
     name = integrator
     if isinstance(integrator, Integrator):
@@ -107,17 +109,37 @@ class LagrangianFlow(Flow):
         return fine, 2
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Return trajectories with half the step at points (S, d), and the errors of this flow.
+        """Return more accurate trajectories, and estimates of the errors of this flow.
 
-        Both have shape (S, T, m). By Richardson's extrapolation of a method of order 2 the error is
-        4/3 of the distance between both trajectories.
+        The more accurate ones have half the step. By Richardson's extrapolation of a method of
+        order 2 the error is 4/3 of the distance between both trajectories; this is an estimate for
+        small steps, and no bound.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+
+        Returns:
+            Trajectories and errors, both of shape (S, time nodes, outputs), in the units of the
+            outputs.
+
+        Raises:
+            RefusedError: A trajectory does not exist, or is not finite.
+            StepError: A step did not converge.
         """
+        # Halving the step divides the error by 4: the distance is 3/4 of the error of this flow.
         fine = self.finer()[0].values(points)[:, ::2]
         return fine, np.abs(self.values(points) - fine) * 4 / 3
 
     @cached_property
     def _expressions(self) -> SystemExpressions:
-        """Equations of a step, of the outputs and of the initial state."""
+        """SymPy expressions of a step, of the outputs and of the initial state.
+
+        With n coordinates q, momenta π and uncertain parameters u: `momenta` are the n momenta
+        before a step and the n after it, as functions of (q after, q before, u); `outputs` are the
+        outputs as functions of (q, π, u); and `initial` are the n coordinates and n momenta at t =
+        0 as functions of u. All depend on the other parameters as constants, in the order of the
+        system's parameters; the momenta also on the length of the step, which is the last constant.
+        """
         import sympy
 
         eq = self.system.symbols
@@ -156,7 +178,13 @@ class LagrangianFlow(Flow):
 
     @cached_property
     def _newton(self) -> Tape:
-        """Tape of the momenta before a step and their derivatives by the coordinates after it."""
+        """Tape of the n momenta before a step, then of their n × n derivatives.
+
+        These are by the coordinates after the step, row by row: those of the first momentum come
+        first. A tape is a list of operations that a compiled loop evaluates. Its arguments are the
+        coordinates after and before the step, the parameters (the uncertain ones first) and the
+        length of the step.
+        """
         momenta = self._expressions.momenta
         n = self.system.coordinates
         before = momenta.components[:n]
@@ -166,15 +194,28 @@ class LagrangianFlow(Flow):
 
     @cached_property
     def _plain(self) -> list[Tape]:
-        """Tapes of momenta, outputs and initial state."""
+        """Tapes of momenta, outputs and initial state, in this order, without derivatives."""
         return [tape(*expressions) for expressions in self._expressions]
 
     @cached_property
     def _deep(self) -> list[Tape]:
-        """The same with first and second derivatives."""
+        """Tapes of momenta, outputs and initial state with first and second derivatives."""
         return [with_derivatives(*expressions) for expressions in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories at parameter sets, perhaps not finite.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+            derivatives: Whether the jet has first and second derivatives by the d parameters.
+
+        Returns:
+            Jet of shape (S, time nodes, outputs).
+
+        Raises:
+            RefusedError: A function of the system is not smooth.
+            StepError: A step did not converge, or its coordinates leave the range of numbers.
+        """
         d = 0
         tapes = self._plain
         if derivatives:
@@ -215,17 +256,29 @@ def _march(
 ) -> bool:
     """Write trajectories and their derivatives; return False if a step fails.
 
+    A state is n coordinates and then n momenta. A tape is a list of operations that evaluates
+    several expressions at once. Where d > 0, a tape with derivatives gives first all expressions,
+    then their first derivatives by all its variables, then their second ones.
+
     Args:
-        newton: Tape of `LagrangianFlow._newton`.
-        step: Tape of the momenta before and after a step, with derivatives where d > 0.
-        observe: Tape of the outputs, with derivatives where d > 0.
-        initial: Tape of the initial state, with derivatives where d > 0.
+        newton: Tape of the n momenta before a step and their derivatives by the n new coordinates,
+            at (new coordinates, old ones, parameters, length of the step).
+        step: Tape of the n momenta before and the n after a step at the same arguments; where d > 0
+            with derivatives by the coordinates and the d inputs.
+        observe: Tape of the m outputs at (coordinates, momenta, parameters); where d > 0 with
+            derivatives by the state and the d inputs.
+        initial: Tape of the 2n initial coordinates and momenta at the parameters; where d > 0 with
+            derivatives by the d inputs.
         n: Number of coordinates.
-        inputs: The d inputs to differentiate by, then the other parameters, shape (S, K).
-        h: Length of a step.
-        out: Receives the outputs, shape (S, T, m).
-        out1: Receives their first derivatives, shape (S, T, m, d); d may be 0.
-        out2: Receives their second derivatives, shape (S, T, m, d, d).
+        inputs: Parameters of each set: the d inputs to differentiate by, then all others, shape (S,
+            parameters).
+        h: Length of a step, in s.
+        out: Receives the outputs, shape (S, time nodes, m).
+        out1: Receives their first derivatives, shape (S, time nodes, m, d); d may be 0.
+        out2: Receives their second derivatives, shape (S, time nodes, m, d, d).
+
+    Returns:
+        Whether all steps of all sets converged. If not, the arrays are filled up to the failure.
     """
     size = 2 * n
     d = out1.shape[3]
@@ -265,17 +318,21 @@ def _midpoint_step(
 ) -> bool:
     """Advance a state by one midpoint step, in place; return False if the step fails.
 
-    Newton's method finds the new coordinates at which the momenta before the step are those of the
-    state.
+    A state is n coordinates and then n momenta. Newton's method finds the new coordinates at which
+    the momenta before the step are those of the state. The step fails if 30 iterations do not
+    converge to 1e-12 of the coordinates, or a coordinate is not finite; the state is then
+    unchanged. A tape is a list of operations that evaluates several expressions at once.
 
     Args:
-        newton: Tape of these momenta and of their derivatives by the new coordinates.
-        step: Tape of the momenta before and after the step, with derivatives where d > 0.
+        newton: Tape of the n momenta before the step, then of their n × n derivatives by the new
+            coordinates, row by row, at (new coordinates, old ones, parameters, h).
+        step: Tape of the n momenta before and the n after the step at the same arguments; where d >
+            0 then of their first and second derivatives by the coordinates and the d inputs.
         n: Number of coordinates.
-        p: All parameters.
-        h: Length of the step.
+        p: Parameters: the d inputs first, then all others.
+        h: Length of the step, in s.
         x: The state, shape (2n,).
-        x1: Its first derivatives by the inputs, shape (2n, d).
+        x1: Its first derivatives by the inputs, shape (2n, d); d may be 0.
         x2: Its second derivatives, shape (2n, d, d).
     """
     d = x1.shape[1]
@@ -289,7 +346,8 @@ def _midpoint_step(
     arguments[:n] = arguments[n:m] = x[:n]
     arguments[m : m + n_parameters] = p
     arguments[m + n_parameters] = h
-    for _ in range(MAX_ITERATIONS):
+    max_iterations = 30  # five or six are usual; a step that is too long may need any number
+    for _ in range(max_iterations):
         _evaluate(newton, arguments, flat)
         for i in range(n):
             residual[i, 0] = flat[i] - x[n + i]
@@ -324,16 +382,19 @@ def _midpoint_step(
 def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     """Advance the derivatives of a state by one midpoint step, in place.
 
-    The new coordinates depend on the inputs through the equations π[k](new, old, inputs) = given,
-    which are differentiated once and twice (implicit function theorem): J new_i is the derivative
-    of the state's momenta less that of π[k] with the new coordinates held.
+    A state is n coordinates and then n momenta. The new coordinates depend on the d inputs through
+    the equations π[k](new, old, inputs) = momenta of the state, which are differentiated once and
+    twice (implicit function theorem): J new_i is the derivative of the state's momenta less that of
+    π[k] with the new coordinates held, where J are the derivatives of π[k] by the new coordinates.
 
     Args:
-        flat: Momenta before and after the step, (2n,), then their first derivatives, (2n, a), and
-            second ones, (2n, a, a), by the a variables: new coordinates, old ones, d inputs.
+        flat: One array after another: the n momenta before and the n after the step, shape (2n,),
+            then their first derivatives, (2n, a), and second ones, (2n, a, a), by the a variables:
+            n new coordinates, n old ones, d inputs.
         n: Number of coordinates.
-        x1: First derivatives of the state by the inputs, shape (2n, d).
-        x2: Its second derivatives, shape (2n, d, d).
+        x1: First derivatives of the state by the inputs, shape (2n, d): before the step on entry,
+            after it on return.
+        x2: Its second derivatives, shape (2n, d, d), likewise.
     """
     m, d = x1.shape
     a = m + d
@@ -412,10 +473,20 @@ def _chain_rule(flat: Array, inner1: Array, inner2: Array, out1: Array, out2: Ar
 
 @compiled
 def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
-    """Write the values of a tape's m expressions to `out`, at K arguments.
+    """Write the values of a tape's m expressions to `out`.
 
-    The tape's array of places is overwritten. Operations are numbered by `tape.OPERATIONS`; those
-    of one operand ignore the second one.
+    A tape is (operations, places of the results, array of places). The array of places holds the
+    arguments, then the result of each operation, then constants. An operation is three whole
+    numbers: its code, and the places of two operands, which may be negative to count from the end.
+    Codes are 0 x + y, 1 x · y, 2 x^y, 3 1/x, 4 √x, 5 sin x, 6 cos x, 7 tan x, 8 exp x and 9 log x,
+    of which those from 3 on ignore y.
+
+    Args:
+        tape: The tape. Its array of places is overwritten.
+        arguments: Values of the arguments, in the order of the tape.
+        out: Receives the m values in its first entries.
+
+    An operation that is not defined at its operands, such as 1/0 or √−1, gives infinity or NaN.
     """
     code, results, slots = tape
     for k in range(len(arguments)):

@@ -30,34 +30,30 @@ from alphacut.frame.records.history import History
 from alphacut.frame.structures.linear import Matrices, evaluate, histories
 from alphacut.frame.structures.storey import MOMENT, StoreyFrame
 
-MAX_PHASE = 1.0
-"""Largest |λ| h of a substep h: up to it the series of exp(A h) has no cancellation."""
+# Largest degree of the series over a substep. With |λ| h ≤ 1 the next term is below 1/25! = 6e-26
+# of the first one. The series mostly ends sooner.
 MAX_TERMS = 24
-"""Largest degree of the series: 1/24! is 2e-24. It mostly ends sooner."""
-TERM_ROUNDING = 1e-17
-"""Fraction of the largest term at which, twice in a row, the series ends."""
+# Quadrature on [0, 1] for works: for |λ| h ≤ 1 products of two velocities exp(±i τ) are exact to
+# 1e-17.
 GAUSS_NODES, GAUSS_WEIGHTS = (np.polynomial.legendre.leggauss(8) + np.array([[1], [0]])) / 2
-"""Quadrature on [0, 1] for works: products of exp(±i MAX_PHASE τ) are exact to 1e-17."""
+# Width in τ to which an event is located (tuned: some hundred units of rounding). By the same
+# fraction of the yield drift, or of the velocity, a state may pass an event, so that an event just
+# handled is not met again at once.
 EVENT_ROUNDING = 1e-13
-"""Width in τ to which an event is located. By the same fraction of the yield drift, or of the
-velocity, a state may pass an event, so that an event just handled is not met again at once."""
-RESOLUTION = 2.0**-34
-"""Shortest interval of τ in which a double root is looked for. In it a polynomial differs from its
-chord by 2⁻⁷¹ of its curvature, far below rounding."""
+# Events in a substep after which the computation has failed.
 MAX_EVENTS = 1000
-"""Events in a substep after which the computation has failed."""
+# Largest energy that may be missing at the end, as a fraction of all energies exchanged (tuned).
 MAX_IMBALANCE = 1e-9
-"""Largest energy that may be missing at the end, as a fraction of all energies exchanged."""
+# Kinds of outputs, which kernels know by their index.
 KINDS = ("q", "drift", "shear", "ductility", "v", "a", "residual", "dissipated", MOMENT)
-"""Kinds of outputs, which kernels know by their index."""
+# Indices of those kinds whose peaks are found between nodes, too.
 Q, DRIFT, SHEAR, DUCTILITY = range(4)
-"""Indices of those kinds whose peaks are found between nodes, too."""
+# Kinds whose peaks are sought at nodes alone; dissipated energy never falls.
 AT_NODES = ("v", "a", "residual", MOMENT)
-"""Kinds whose peaks are sought at nodes alone; dissipated energy never falls."""
+# How a motion ends: at its last node, by collapse, or with too many events.
 RUNS = 0
 COLLAPSED = 1
 FAILED = 2
-"""How a motion ends: at its last node, by collapse, or with too many events."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +71,13 @@ class YieldingFlow(Flow):
     system: StoreyFrame
 
     def __post_init__(self) -> None:
+        """Check the arguments, as all flows do, and the structure.
+
+        Raises:
+            RefusedError: A parameter is unknown, the duration is no whole number of steps, no
+                storey of the frame can yield, or a load is harmonic, which is not linear between
+                samples.
+        """
         super().__post_init__()
         require(bool(self.system.hardening), "frame", value="elastic", allowed="columns that yield")
         for history in histories(self.system).values():
@@ -96,6 +99,13 @@ class YieldingFlow(Flow):
         return replace(self, step=self.step / 4), 4
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories at parameter sets (S, d), shape (S, time nodes, outputs).
+
+        Raises:
+            RefusedError: Derivatives are asked for, which do not exist where a storey yields; a
+                static force yields a storey before the start; or a storey collapses.
+            StepError: A substep has too many events, or the balance of energy is not met.
+        """
         if derivatives:
             allowed = "methods without derivatives: auto or quasi-monte-carlo"
             raise RefusedError("method", "a follower or a proof, of columns that yield", allowed)
@@ -106,15 +116,24 @@ class YieldingFlow(Flow):
     ) -> tuple[Array, Array]:
         """Return trajectories at parameter sets, and the peak magnitudes of the outputs over time.
 
-        Peaks of outputs of the kinds `AT_NODES` are those at time nodes, all others are exact.
+        Peaks of displacements, drifts, shears and ductilities are exact, also between time nodes.
+        Those of velocities, accelerations, residual drifts and the overturning moment are the
+        largest at a time node. Dissipated energy never falls, so that its peak is its last value.
 
         Args:
-            points: Parameter sets, shape (S, d).
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
             takes_collapse: Whether a motion that collapses has trajectories of zero and infinite
-                peaks. If not, it raises RefusedError.
+                peaks. If not, it raises an error.
 
         Returns:
-            Trajectories, shape (S, T, m), and peaks, shape (S, m).
+            Trajectories, shape (S, time nodes, outputs), and peaks, shape (S, outputs), both in the
+            SI units of the outputs.
+
+        Raises:
+            RefusedError: A static force yields a storey before the start, or a storey collapses
+                under its weight and `takes_collapse` is false.
+            StepError: A substep has more than 1000 events, or the balance of energy is off by more
+                than 1e-9 of all energies exchanged at the end.
         """
         system = self.system
         points = np.asarray(points, float)
@@ -128,7 +147,11 @@ class YieldingFlow(Flow):
         pushes = matrices.pushes(ground=system.ground is not None).value
         fastest = float(np.abs(np.linalg.eigvals(state_matrix(matrices).value)).max())
         loads = list(histories(system).values())
-        substeps = load_substeps(loads, self.time, longest=MAX_PHASE / max(fastest, 1e-300))
+        # The response over a substep h is a Taylor series, whose terms are at most (|λ| h)^k / k!
+        # of the first one. Up to |λ| h = 1 they fall from the first one on, without cancellation.
+        # Yielding only softens a storey, so that the elastic structure has the fastest mode.
+        max_phase = 1.0
+        substeps = load_substeps(loads, self.time, longest=max_phase / max(fastest, 1e-300))
         kinds = np.array([(KINDS.index(x), z) for x, z in map(system.quantity, self.outputs)])
         values: Array = np.empty((len(points), len(self.time), len(kinds)))
         peaks = np.zeros((len(points), len(kinds)))
@@ -154,10 +177,16 @@ class YieldingFlow(Flow):
     def _storeys(self, points: Array, matrices: Matrices) -> tuple[Array, Array]:
         """Return the properties of n storeys at S parameter sets, and their yield drifts.
 
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+            matrices: Matrices of the frame at these sets, of which the masses are taken.
+
         Returns:
-            Properties, shape (S, 7, n): mass, stiffness, softening by weight (weight over height),
-            hardening, yield drift, height, and the damping in N s/m that is lost while a storey
-            yields. Then the yield drifts alone, shape (S, n), in m.
+            Properties, shape (S, 7, n), with the rows 0 mass of the floor in kg, 1 initial
+            stiffness in N/m, 2 softening by the weight above over the height in N/m (0 without
+            gravity), 3 hardening, the stiffness after yielding over the initial one, 4 yield drift
+            in m, 5 height in m (0 if not given), and 6 damping in N s/m that is lost while the
+            storey yields. Then the yield drifts alone, shape (S, n), in m.
         """
         system = self.system
         named = {**system.parameters, **dict(zip(self.names, points.T, strict=True))}
@@ -172,15 +201,29 @@ class YieldingFlow(Flow):
         if len(system.lengths):
             heights = system.heights(p)
         mass = matrices.mass.value.diagonal(axis1=1, axis2=2)
+        # Rayleigh damping b K by the tangent stiffness K loses b (1 - hardening) k of a storey.
         lost_damping = k * 0.0
         if system.rayleigh_of == "tangent":
             lost_damping = k * (1.0 - hardening) * p["rayleigh_stiffness"][:, None]
-        properties = [k, softening, hardening, yield_drift, heights, lost_damping]
-        storeys = np.stack([mass, *(jet.value for jet in properties)], 1)
+        rows = [mass]
+        for jet in (k, softening, hardening, yield_drift, heights, lost_damping):
+            rows.append(jet.value)
+        storeys = np.stack(rows, 1)
         return storeys, yield_drift.value
 
     def _require_motion(self, point: Array, end: MotionEnd) -> None:
-        """Raise RefusedError of a collapse at a parameter set (d,), and StepError of a failure."""
+        """Raise an error unless a motion has reached its end with its energy in balance.
+
+        Args:
+            point: Parameter set of the motion, shape (d,), for the message.
+            end: How it ended: its status (0 at the last node, 1 by collapse, 2 with too many
+                events), the time in s, the storey of the collapse, from 0 on, and the fraction of
+                energy that is missing.
+
+        Raises:
+            RefusedError: A storey has collapsed under its weight.
+            StepError: A substep had more than 1000 events, or the energy is off by more than 1e-9.
+        """
         if end.status == COLLAPSED:
             where = self._point_words(point)
             value = f"collapsing under its weight at t = {end.time:.6g} s at {where}"
@@ -228,13 +271,21 @@ def load_substeps(loads: Sequence[History], time: Array, *, longest: float) -> L
     """Return substeps between all time nodes and all samples of the loads, up to `longest` each.
 
     Args:
-        loads: Histories that are linear between samples.
-        time: Equally spaced nodes from 0, in s.
-        longest: Largest length of a substep, in s.
+        loads: Histories that are linear between samples; there may be none.
+        time: Equally spaced nodes from 0, two or more, in s.
+        longest: Largest length of a substep, in s; intervals between nodes and samples are divided
+            into equal parts.
+
+    Returns:
+        E substeps up to the last node: `edges`, the times between them, shape (E + 1,), in s;
+        `is_node`, which of these are time nodes, shape (E + 1,); and `first` and `last`, the loads
+        at the beginning and at the end of each substep, on its side of a jump, shape (E, loads).
     """
     step = time[1]
-    sample_times = [load.start + np.arange(len(load.samples)) * load.step for load in loads]
-    samples = np.unique(np.concatenate([np.zeros(0), *sample_times]))
+    sample_times: list[Array] = [np.zeros(0)]  # so that there may be no loads
+    for load in loads:
+        sample_times.append(load.start + np.arange(len(load.samples)) * load.step)
+    samples = np.unique(np.concatenate(sample_times))
     # samples that lie on a node, or on another load's sample, but for rounding, make no new edge
     is_new = np.abs(samples - np.round(samples / step) * step) > SAME * step
     is_new &= (samples < time[-1]) & (np.diff(samples, prepend=-1.0) > SAME * step)
@@ -257,18 +308,23 @@ def _march(
     """Write the response of one frame to `values` and `peaks`, and return how it ends.
 
     Args:
-        storeys: Properties as of `YieldingFlow._storeys`, shape (7, n).
-        damping: Damping matrix while no storey yields, shape (n, n).
-        pushes: Accelerations by a unit of each load, shape (n, L).
-        start: Initial displacements and velocities, shape (2n,).
-        edges: As of `LoadSubsteps`, as are the next three.
-        is_node: Which edges are time nodes.
-        first: Loads at the beginning of the substeps.
-        last: Loads at their end.
-        kinds: Index of the kind in `KINDS` and storey of each output, shape (m, 2).
-        values: Receives the outputs at nodes, shape (T, m). Accelerations lack the forces over the
-            masses.
-        peaks: Raised to the largest magnitudes within substeps, shape (m,).
+        storeys: Properties of the n storeys, shape (7, n), with the rows 0 mass, 1 initial
+            stiffness, 2 softening by weight, 3 hardening, 4 yield drift, 5 height, 6 damping lost
+            while yielding, in SI units.
+        damping: Damping matrix while no storey yields, shape (n, n), in N s/m.
+        pushes: Accelerations of the floors by a unit of each of L loads, shape (n, L).
+        start: Initial displacements in m, then velocities in m/s, shape (2n,).
+        edges: Times between E substeps, shape (E + 1,), in s.
+        is_node: Which edges are time nodes, shape (E + 1,).
+        first: Loads at the beginning of the substeps, shape (E, L).
+        last: Loads at their end, shape (E, L).
+        kinds: Code and storey (from 0) of each of m outputs, shape (m, 2). Codes are 0
+            displacement, 1 drift, 2 shear, 3 ductility, 4 velocity, 5 acceleration, 6 residual
+            drift, 7 dissipated energy, 8 overturning moment.
+        values: Receives the outputs at time nodes, shape (T, m). Accelerations lack the forces over
+            the masses.
+        peaks: Raised to the largest magnitudes of outputs of the codes 0 to 3 within substeps,
+            shape (m,).
     """
     mass, k, softening, hardening, yield_drift, _, lost_damping = storeys
     n = len(mass)
@@ -374,21 +430,26 @@ def _expand(
 ) -> int:  # fmt: skip
     """Write the Taylor series of a state over a substep, and return the number of its terms.
 
+    The equations are M q̈ + D q̇ + (forces of the storeys) = loads. Time is measured by τ in [0,
+    1], the fraction of the substep that has passed.
+
     Args:
-        inverse_mass: 1/m of each floor, shape (n,).
-        damping: Damping matrix, shape (n, n).
-        tangent: Net force of a storey is tangent · drift + constant, shape (n,) each.
-        constant: See `tangent`.
-        load: Force on each floor is load + rise τ, shape (n,) each.
-        rise: See `load`.
+        inverse_mass: 1/m of each of n floors, shape (n,), in 1/kg.
+        damping: Damping matrix, shape (n, n), in N s/m.
+        tangent: Stiffness t of each storey, in N/m: its force on the floor above is −(t · drift +
+            c), on the floor below the opposite, shape (n,).
+        constant: c of each storey, in N, shape (n,).
+        load: Force on each floor at τ = 0, in N, shape (n,).
+        rise: Rise of this force until τ = 1, linear in τ, in N, shape (n,).
         h: Length of the substep, in s.
-        q: Displacements at its beginning, shape (n,).
-        v: Velocities, shape (n,).
-        series: Receives coefficients of displacements, velocities and drifts by powers of τ, shape
-            (3, n, MAX_TERMS + 1).
+        q: Displacements at τ = 0, in m, shape (n,).
+        v: Velocities at τ = 0, in m/s, shape (n,).
+        series: Receives coefficients by powers of τ, shape (3, n, MAX_TERMS + 1): of displacements,
+            velocities and drifts. Those behind the returned number of terms are not meant.
     """
     Q, V, drifts = series
     n = len(q)
+    term_rounding = 1e-17  # a tenth of the unit roundoff: what follows changes no digit
     scale = 0.0
     previous = math.inf
     for i in range(n):
@@ -405,7 +466,7 @@ def _expand(
         # The series ends at two small terms in a row, since in free vibration every other one
         # may vanish.
         scale = max(scale, size)
-        if term == MAX_TERMS or (term > 1 and max(size, previous) <= TERM_ROUNDING * scale):
+        if term == MAX_TERMS or (term > 1 and max(size, previous) <= term_rounding * scale):
             return term + 1
         previous = size
         above = 0.0
@@ -435,8 +496,20 @@ def _first_event(
 ) -> tuple[float, int]:  # fmt: skip
     """Return τ at the first event of a substep, and its storey; 1 and −1 where there is none.
 
-    An elastic storey yields where |drift − plastic| exceeds the yield drift; a yielding one turns
-    elastic where the velocity of its drift changes its sign. Arguments are as in `_march`.
+    An elastic storey yields where |drift − plastic drift| exceeds the yield drift; a yielding one
+    turns elastic where the velocity of its drift changes its sign.
+
+    Args:
+        series: Coefficients by powers of τ, τ in [0, 1] the fraction of the substep that has
+            passed, shape (3, n, coefficients): of displacements of the floors, of their velocities,
+            and of drifts of the storeys.
+        terms: Number of coefficients that count.
+        plastic: Plastic drift of each storey, in m, shape (n,).
+        direction: 1 or −1 of a storey that yields with rising or falling drift, 0 of an elastic
+            one, shape (n,).
+        yield_drift: Yield drift of each storey, in m, shape (n,).
+        hardening: Stiffness after yielding over the initial one, shape (n,); a storey of 1 never
+            yields.
     """
     first = 1.0
     storey = -1
@@ -465,7 +538,8 @@ def _first_event(
             for side in (-1.0, 1.0):
                 for term in range(terms):
                     margin[term] = -side * drifts[z, term]
-                # a drift far above the yield drift rounds more than that: after a reversal no event
+                # A drift far above the yield drift rounds by more than that. Without the second
+                # term a storey that has just reversed would yield at once.
                 rounding = EVENT_ROUNDING * yield_drift[z] + 4.5e-16 * abs(drifts[z, 0])
                 margin[0] = yield_drift[z] + rounding - side * elastic
                 at = min(at, _first_root(margin, terms, at))
@@ -482,13 +556,21 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
     Over an interval of width w a polynomial deviates from its chord by at most w²/8 times its
     largest second derivative, and its slope from that of the chord by w/2 times that. An interval
     is passed where the chord is above this deviation, halved where this is not known, and searched
-    for the root where the polynomial surely falls through zero.
+    for the root where the polynomial surely falls through zero. A dip below zero over less than
+    2⁻³⁴ may be passed. The root is found to 1e-13.
 
     Args:
         polynomial: Coefficients by powers of τ.
-        terms: Number of coefficients.
+        terms: Number of coefficients that count, at least 1.
         end: End of the search, at most 1.
+
+    Returns:
+        0 if the polynomial is negative at 0; `end` if it is not negative before, but is so there.
     """
+    # Shortest interval in which a double root is looked for. In it a polynomial differs from its
+    # chord by w²/8 = 2⁻⁷¹ of its curvature, far below rounding.
+    resolution = 2.0**-34
+    # On [0, 1] the sum of the magnitudes of its coefficients bounds the second derivative.
     curvature = 0.0
     for term in range(2, terms):
         curvature += term * (term - 1) * abs(polynomial[term])
@@ -499,11 +581,11 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
     while low < end and left >= 0:
         width = min(width, end - low)
         right = _value(polynomial, terms, low + width)
-        if min(left, right) > curvature * width**2 / 8 or (width <= RESOLUTION and right >= 0):
+        if min(left, right) > curvature * width**2 / 8 or (width <= resolution and right >= 0):
             low = low + width
             left = right
             width = 2 * width
-        elif width <= RESOLUTION or (right < 0 and right - left < -curvature * width**2 / 2):
+        elif width <= resolution or (right < 0 and right - left < -curvature * width**2 / 2):
             # Newton's method from the chord's root, with bisection where a step leaves the interval
             high = low + width
             root = low + width * left / (left - right)
@@ -534,9 +616,19 @@ def _add_works(
     damping: Array, load: Array, rise: Array, series: Array, terms: int, at: float, h: float,
     works: Array,
 ) -> None:  # fmt: skip
-    """Add works ∫ v·f dt from τ = 0 to τ = `at` in place: of the loads, and taken by damping.
+    """Add works ∫ v·f dt from τ = 0 to τ = `at` to `works`, in place.
 
-    `works` has shape (2,); h is the length of the substep, other arguments are as in `_expand`.
+    Args:
+        damping: Damping matrix of n floors, shape (n, n), in N s/m.
+        load: Force on each floor at τ = 0, in N, shape (n,).
+        rise: Rise of this force until τ = 1, linear in τ, in N, shape (n,).
+        series: Coefficients by powers of τ, τ in [0, 1] the fraction of the substep that has
+            passed, shape (3, n, coefficients): of displacements of the floors, of their velocities,
+            and of drifts of the storeys.
+        terms: Number of coefficients that count.
+        at: End of the integration, from 0 to 1.
+        h: Length of the substep, in s.
+        works: Works in J, shape (2,): what the loads do, and what damping takes.
     """
     n = len(load)
     V = series[1]
@@ -559,7 +651,19 @@ def _add_works(
 
 @compiled
 def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
-    """Return the kinetic and the elastic energy of a state, less the work of weights, in J."""
+    """Return the kinetic and the elastic energy of a state, less the work of weights, in J.
+
+    It is ½ Σ [m v² + (a k − s) d² + (1 − a) k (d − p)²] over floors and storeys, with the drift d,
+    the plastic drift p, the hardening a and the softening s by weight.
+
+    Args:
+        storeys: Properties of the n storeys, shape (7, n), with the rows 0 mass, 1 initial
+            stiffness, 2 softening by weight, 3 hardening, 4 yield drift, 5 height, 6 damping lost
+            while yielding, in SI units.
+        q: Displacements of the floors, in m, shape (n,).
+        v: Their velocities, in m/s, shape (n,).
+        plastic: Plastic drifts, in m, shape (n,).
+    """
     total = 0.0
     for z in range(len(q)):
         mass, k, softening, a = storeys[:4, z]
@@ -581,11 +685,30 @@ def _add_peaks(
     kinds: Ints, storeys: Array, tangent: Array, constant: Array, series: Array, terms: int,
     end: float, q: Array, v: Array, peaks: Array,
 ) -> None:  # fmt: skip
-    """Raise the peaks of outputs, in place, by those from τ = 0 to τ = `end`.
+    """Raise the peaks of outputs, in place, by those from τ = 0 to τ = `end` of a substep.
 
-    A quantity scale · x + shift, x a displacement or drift, is looked at where its velocity changes
-    its sign and at the end, where displacements and velocities are q and v. Other arguments are as
-    in `_march`; the beginning was the end of the substep before.
+    An output scale · x + shift, x a displacement or drift, is looked at where the velocity of x
+    changes its sign and at the end. The beginning was the end of the substep before. Outputs of the
+    codes from 4 on are passed over.
+
+    Args:
+        kinds: Code and storey (from 0) of each of m outputs, shape (m, 2). Codes are 0
+            displacement, 1 drift, 2 shear, 3 ductility, 4 velocity, 5 acceleration, 6 residual
+            drift, 7 dissipated energy, 8 overturning moment.
+        storeys: Properties of the n storeys, shape (7, n), with the rows 0 mass, 1 initial
+            stiffness, 2 softening by weight, 3 hardening, 4 yield drift, 5 height, 6 damping lost
+            while yielding, in SI units.
+        tangent: Stiffness t of each storey less its softening: the net force of its columns and of
+            the weight is t · drift + c, shape (n,).
+        constant: c of each storey, shape (n,).
+        series: Coefficients by powers of τ, τ in [0, 1] the fraction of the substep that has
+            passed, shape (3, n, coefficients): of displacements of the floors, of their velocities,
+            and of drifts of the storeys.
+        terms: Number of coefficients that count.
+        end: End of the interval, from 0 to 1.
+        q: Displacements at the end, in m, shape (n,).
+        v: Velocities at the end, in m/s, shape (n,).
+        peaks: Peak magnitude of each output, shape (m,).
     """
     for row in range(len(kinds)):
         kind, z = kinds[row]
@@ -613,6 +736,7 @@ def _add_peaks(
             for term in range(1, terms):
                 slope[term - 1] = math.copysign(term, polynomial[1]) * polynomial[term]
                 reach += abs(scale * polynomial[term])
+            # The sum of all magnitudes bounds the output: mostly no new peak is possible.
             if reach > peaks[row]:
                 # a turn that rounding hides lies at the end
                 stop = min(_first_root(slope, terms - 1, end), end)
@@ -625,10 +749,20 @@ def _observe(
     kinds: Ints, storeys: Array, damping: Array, state: tuple[Array, Array, Array, Array],
     values: Array,
 ) -> None:  # fmt: skip
-    """Write all outputs of a state to `values`, shape (m,).
+    """Write all outputs of a state to `values`, shape (m,), in SI units.
 
-    `state` holds displacements, velocities, plastic drifts and dissipated energies of n storeys;
-    other arguments are as in `_march`.
+    Args:
+        kinds: Code and storey (from 0) of each of m outputs, shape (m, 2). Codes are 0
+            displacement, 1 drift, 2 shear, 3 ductility, 4 velocity, 5 acceleration, 6 residual
+            drift, 7 dissipated energy, 8 overturning moment.
+        storeys: Properties of the n storeys, shape (7, n), with the rows 0 mass, 1 initial
+            stiffness, 2 softening by weight, 3 hardening, 4 yield drift, 5 height, 6 damping lost
+            while yielding, in SI units.
+        damping: Damping matrix at this state, shape (n, n), in N s/m.
+        state: Displacements in m, velocities in m/s, plastic drifts in m and dissipated energies in
+            J of n floors or storeys, shape (n,) each.
+        values: Receives the outputs. Accelerations lack the forces of the loads over the masses,
+            which the caller adds; they are absolute ones where the load is a base excitation.
     """
     q, v, plastic, dissipated = state
     for row in range(len(kinds)):
@@ -644,7 +778,9 @@ def _observe(
             force -= damping[z, i] * v[i]
             shear = _net_force(storeys, q, plastic, i) + storeys[2, i] * _drift(q, i)
             moment += storeys[5, i] * shear
-        # the drift at which the storey would rest without load; it may yield back on the way
+        # The residual drift is that at which the storey would rest without load. Elastic unloading
+        # leads to (1 − a) k p / (k − s), a the hardening, p the plastic drift and s the softening.
+        # The storey yields back on the way if that is beyond (1 − a) k d_y / |a k − s|.
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
         residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (

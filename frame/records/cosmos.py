@@ -87,10 +87,10 @@ def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:
             the head of the channel is not understood, or it does not agree with the samples; or no
             unit of acceleration is stated.
     """
-    channels = [*_cosmos_channels(file)]
+    channels = list(_cosmos_channels(file))
     read = _read_cosmos
     if not channels:
-        channels = [*_csmip_channels(file)]
+        channels = list(_csmip_channels(file))
         read = _read_csmip
     names = [found.names for found in channels]
     chosen = choose_channel(file.location(channels[0].line), channel, names)
@@ -125,7 +125,7 @@ def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
             codes = [match[1].lower() for x in below if (match := re.match(code_line, x, re.I))]
             # A dictionary keeps the order, in which a message lists the names, and leaves repeated
             # ones out.
-            unique = dict.fromkeys(name for name in (*names, *codes[:1]) if name)
+            unique = dict.fromkeys(name for name in names + codes[:1] if name)
             yield _Channel(tuple(unique), row, reals=reals)
 
 
@@ -259,7 +259,9 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
     # begins no channel. So a title with UN counts only in files that begin with one.
     starts = [k for k, match in titles.items() if match[1] == titles[0][1] or match[1] is None]
     pattern = r".*\bChan(?:nel)?\s*(\w+)\s*:\s*(.*?)\s*(?:\(|from|$).*"
-    for start, end in zip(starts, [*starts[1:], len(file.lines)], strict=True):
+    ends = starts[1:]
+    ends.append(len(file.lines))
+    for start, end in zip(starts, ends, strict=True):
         names: tuple[str, ...] = ()
         for line in file.lines[start : min(start + 13, end)]:
             if match := re.fullmatch(pattern, line, re.I):

@@ -74,10 +74,12 @@ class _Component:
             allowed = "40 integers, of which 34 to 36 count samples"
             raise file.refusal(first, f"counts of {counts}", allowed, "load the file anew")
         text = " ".join(file.lines[start:first])
-        names = [*re.findall(r"Component\s+(\S+)", text), ""]
+        name = ""
+        if match := re.search(r"Component\s+(\S+)", text):
+            name = match[1].lower()
         samples = first + 10  # behind 4 lines of integers and 6 of reals
         end = samples + sum(ceil(count / cls.per_line) for count in counts)
-        return cls(start, samples, end, counts[0], names[0].lower())
+        return cls(start, samples, end, counts[0], name)
 
 
 def read_geonet(file: TextFile, channel: str = "") -> Recording:
@@ -103,7 +105,7 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
     if match is not None and match[1]:
         cure = "take the corrected file of the same record, .V2A"
         raise file.refusal(0, file.lines[0].strip(), "a corrected accelerogram", cure)
-    components = [*_components(file)]
+    components = list(_components(file))
     # A component can be named by its place in the file, from 1 on, since some have no orientation.
     names = []
     for number, component in enumerate(components, 1):

@@ -101,8 +101,8 @@ class History:
     def identity(self) -> tuple[object, ...]:
         """Hashable value that two histories have in common only if they are equal."""
         samples = self.samples.tobytes()
-        wave = self.frequency, self.phase
-        return (self.step, samples, self.start, *wave, self.is_held, self.is_static)
+        course = self.step, samples, self.start, self.frequency, self.phase
+        return (course, self.is_held, self.is_static)
 
     @property
     def extremes(self) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -28,10 +28,6 @@ from alphacut.frame.records.text_file import (
     require_step,
 )
 
-# The marks of PEER are looked for in so many first lines. Most heads have four; a larger number
-# would find the marks in other formats' text.
-PEER_HEAD_LINES = 12
-
 
 @dataclass(frozen=True)
 class _PeerHead:
@@ -40,6 +36,9 @@ class _PeerHead:
     count: int
     step: float
     line: int
+    # The marks of PEER are looked for in so many first lines. Most heads have four; a larger number
+    # would find the marks in other formats' text.
+    max_lines: ClassVar[int] = 12
 
     @classmethod
     def of(cls, file: TextFile) -> _PeerHead:
@@ -59,7 +58,7 @@ class _PeerHead:
         real = r"(?P<step>[0-9]*\.?[0-9]+(?:[eEdD][-+]?[0-9]+)?)"
         names_last = rf"(?P<count>[0-9]+)[\s,]+{real}[\s,]+NPTS\s*,?\s*DT\b"
         names_first = rf"(?:NPTS\s*=?\s*(?P<count>[0-9]+)\s*[,;]?\s*)?\bDT\s*=?\s*{real}(?P<end>.*)"
-        head = file.lines[:PEER_HEAD_LINES]
+        head = file.lines[: cls.max_lines]
         named = [k for k, line in enumerate(head) if re.search(r"\b(?:DT|NPTS)\b", line, re.I)]
         line = named[0] if named else min(3, len(file.lines) - 1)
         for row in named:
@@ -333,6 +332,8 @@ def read_smc(file: TextFile, unit: str) -> Recording:
         width=10,
         head=integers_line,
     )
+    stated = list(peaks_in_text(file.lines[:integers_line], "cm/s^2"))
+    stated.append(_smc_peak(reals))
     return recording_in_si(
         file.location(reals_line),
         "SMC",
@@ -340,7 +341,7 @@ def read_smc(file: TextFile, unit: str) -> Recording:
         1 / rate,
         samples,
         "vertical" if is_vertical else "",
-        stated=[*peaks_in_text(file.lines[:integers_line], "cm/s^2"), _smc_peak(reals)],
+        stated=stated,
     )
 
 
@@ -367,7 +368,7 @@ FORMATS = (
             r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
             re.IGNORECASE,
         ),
-        PEER_HEAD_LINES,
+        _PeerHead.max_lines,
         read_peer,
     ),
 )

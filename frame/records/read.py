@@ -21,9 +21,6 @@ from alphacut.frame.records.text_file import TextFile, choose_channel, read_byte
 from alphacut.frame.records.uff import is_universal, read_uff_record
 from alphacut.frame.records.units import acceleration_factor
 
-# The formats in messages about files of none of them.
-READ = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
-
 
 def read_recording(
     path: Path, channel: str = "", step: float | None = None, unit: str = ""
@@ -108,11 +105,12 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         lost_head = is_named and begins_with_number and not is_described
         require(not lost_head, path.name, value, READ, cure)
         return read_table(file, step, unit, channel)
+    allowed = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"
-        raise RefusedError(path.name, "no record but a page in HTML or XML", READ, cure)
+        raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)
     cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'
-    raise RefusedError(path.name, "of no format that is read", READ, cure)
+    raise RefusedError(path.name, "of no format that is read", allowed, cure)
 
 
 def _waveform_format(content: bytes) -> str:

@@ -155,7 +155,7 @@ def read_recordings(
         except RefusedError as error:
             errors.append(error)
             continue
-        remarks = (*recording.remarks, *_contradictions(recording, step, unit))
+        remarks = recording.remarks + tuple(_contradictions(recording, step, unit))
         # Names of results are those of files and variables as well, and have their alphabet.
         name = re.sub(r"[^A-Za-z0-9_+-]+", "_", path.stem)
         if channel:

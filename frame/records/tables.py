@@ -128,7 +128,7 @@ class _Table:
                 first = line
                 break
         texts = {line: text for line, text in lines.items() if line >= first}
-        has_decimal_commas = _have_decimal_commas([*texts.values()])
+        has_decimal_commas = _have_decimal_commas(list(texts.values()))
         rows = {}
         for line, text in texts.items():
             # A cell may be a lone comma where quoted numbers stand between commas: "0,01","0,2".
@@ -168,7 +168,7 @@ class _Table:
         They are those that begin with a time, and the last one.
         """
         named = [line for line in self.above[:-1] if _Column.of(line).is_time]
-        return [*named, *self.above[-1:]]
+        return named + list(self.above[-1:])
 
     @property
     def has_times(self) -> bool:
@@ -200,7 +200,7 @@ class _Table:
             RefusedError: A cell is no finite number, or a row has another count of cells than the
                 first row of the table.
         """
-        lines = rows or [*self.rows]
+        lines = rows or list(self.rows)
         for line in lines:
             if len(self.rows[line]) != self.width or not _are_numbers(self.rows[line]):
                 raise _wrong_row(self.file, line, self.width)
@@ -347,7 +347,7 @@ def is_table(file: TextFile, *, is_described: bool = False) -> bool:
     table = _Table.of(file)
     if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
         return True
-    last_row = [*table.rows.values()][-1:]
+    last_row = list(table.rows.values())[-1:]
     is_row = any(all(NUMBER.fullmatch(cell) for cell in cells) for cells in last_row)
     return is_row and (is_described or not table.head or len(last_row[0]) < 3)
 
@@ -478,7 +478,7 @@ def _require_cell_of_each_head(table: _Table) -> None:
     has_commas = all("," in table.file.lines[line] for line in table.rows)
     if has_commas and 1 < heads < table.width <= 2 * heads and _Column.of(table.head).is_time:
         value = f"{table.width} numbers in a row below {heads} heads"
-        first_row, *_ = table.rows
+        first_row = next(iter(table.rows))
         cure = "these seem to be decimal commas: write decimal points, or semicolons between the"
         cure += " columns"
         raise table.file.refusal(first_row, value, "a number in a row for each head", cure)
@@ -649,7 +649,7 @@ def _even_steps(
             agree with them.
     """
     file = table.file
-    lines = [*table.rows]
+    lines = list(table.rows)
     to_s = 1.0
     if table.columns[0].is_time:
         to_s = seconds_of(table.columns[0].unit or "s")
@@ -808,7 +808,7 @@ def read_force_history(path: Path) -> ForceHistory:
     numbers = table.numbers()
     steps = _even_steps(table, or_step="")
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
-        first_row, *_ = table.rows
+        first_row = next(iter(table.rows))
         cure = f'write times from 0 s on, and in the case "{file.name}, from {steps.first:g} s"'
         raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s", cure)
     if not numbers[:, 1].any():

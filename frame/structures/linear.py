@@ -330,7 +330,7 @@ def evaluate(
     fixed_columns = np.tile(list(fixed.values()), (len(points), 1))
     values = np.hstack([points, fixed_columns])
     # All parameters are jets of the same type, and only the named ones have derivatives.
-    p = variables(values, [*names, *fixed], names if derivatives else ())
+    p = variables(values, list(names) + list(fixed), names if derivatives else ())
     full = system.assembly(p)
 
     damping = full.dashpots

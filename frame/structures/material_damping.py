@@ -46,7 +46,7 @@ def damping_from_loss(
 
     if all(number.support.width == 0 for number in fuzzy.values()):
         return Crisp(ratio(fuzzy["loss"].nominal, fuzzy["joints"].nominal))
-    alpha = sorted({*fuzzy["loss"].cuts.alpha, *fuzzy["joints"].cuts.alpha})
+    alpha = sorted(set(fuzzy["loss"].cuts.alpha) | set(fuzzy["joints"].cuts.alpha))
     lower: list[float] = []
     upper: list[float] = []
     for level in alpha:

@@ -164,13 +164,14 @@ class StoreyFrame(LinearSystem):
             require(is_floor, "floor", value=force.at, allowed=f"1 to {n}")
             checked_number("amplitude", force.amplitude)
 
-        defaults: dict[str, tuple[float, ...]] = dict.fromkeys(("dampers", "q0", "v0"), (0.0,) * n)
+        zeros = ("dampers", "q0", "v0")
+        defaults: dict[str, tuple[float, ...]] = dict.fromkeys(zeros, (0.0,) * n)
         if not len(self.stiffness):
             defaults["columns"] = (2.0,) * n
         if len(self.yield_force) or len(self.yield_drift):
             defaults["hardening"] = (0.0,) * n
         others = ("loads", "stiffness", "columns", "yield_force", "yield_drift", "hardening")
-        for name in ("dampers", "q0", "v0", *others):
+        for name in zeros + others:
             values = tuple(getattr(self, name)) or defaults.get(name, ())
             object.__setattr__(self, name, values)
         # frozen dataclasses are set by `object.__setattr__`, as in their own initialiser
@@ -240,7 +241,7 @@ class StoreyFrame(LinearSystem):
         names = ("modulus", "second_moment", "columns", "lengths")
         given = [x for x in names if getattr(self, x) is not None and np.size(getattr(self, x))]
         examples = {"modulus": "200e9", "second_moment": "1e-6", "lengths": "[3.0]"}
-        needed, alternative = [*examples], ", or stiffness, as [30e6]"
+        needed, alternative = list(examples), ", or stiffness, as [30e6]"
         if len(self.stiffness):
             beside = ", ".join(name for name in given if name != "lengths")
             allowed = "either stiffness or what makes it"
@@ -401,7 +402,7 @@ class StoreyFrame(LinearSystem):
                 groups[short] = tuple(pattern.format(z + 1) for z in range(self.floors))
         if self.loads:
             groups["F"] = self.force_names
-        require_choice("parameter", name, dict.fromkeys([*groups, *self.parameters]))
+        require_choice("parameter", name, groups | self.parameters)
         return groups.get(name, (name,))
 
     def springs(self, p: Mapping[str, Number]) -> Number:
