@@ -260,8 +260,13 @@ def _add_matrix_products(a: Array, b: Array, at: Ints, out: Array) -> None:
 def matmul(a: Array, b: Array) -> Array:
     """Return products of matrices, as `numpy.matmul` does for stacks of them.
 
-    If the right stack has one matrix alone, one product of tall matrices takes the place of many
-    small ones.
+    Args:
+        a: Matrices, shape (…, p, q).
+        b: Matrices, shape (…, q, r), or one. A stack of one matrix alone, shape (1, q, r), is
+            multiplied as one product of tall matrices, which is faster than many small ones.
+
+    Returns:
+        Products, shape (…, p, r).
     """
     if b.ndim == 3 and len(b) == 1 and a.ndim > 2:
         return np.asarray(np.tensordot(a, b[0], 1))

@@ -258,7 +258,7 @@ class TaylorModel:
             return self
         parts = []
         for degree, part in enumerate(self.parts):
-            wider_part = np.zeros((count(d, degree), *self.shape))
+            wider_part = np.zeros((count(d, degree), *self.shape), part.dtype)
             wider_part[places(inputs[monomials(self.inputs, degree)], d)] = part
             parts.append(wider_part)
         return TaylorModel(tuple(parts), self.remainder, d, self.order)

@@ -479,14 +479,13 @@ def _evaluate(tape: Tape, arguments: Array, out: Array) -> None:
     arguments, then the result of each operation, then constants. An operation is three whole
     numbers: its code, and the places of two operands, which may be negative to count from the end.
     Codes are 0 x + y, 1 x · y, 2 x^y, 3 1/x, 4 √x, 5 sin x, 6 cos x, 7 tan x, 8 exp x and 9 log x,
-    of which those from 3 on ignore y.
+    of which those from 3 on ignore y. What is not defined, such as 1/0 or √−1, gives infinity or
+    NaN.
 
     Args:
         tape: The tape. Its array of places is overwritten.
         arguments: Values of the arguments, in the order of the tape.
         out: Receives the m values in its first entries.
-
-    An operation that is not defined at its operands, such as 1/0 or √−1, gives infinity or NaN.
     """
     code, results, slots = tape
     for k in range(len(arguments)):

@@ -76,7 +76,7 @@ def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:
         file: The file.
         channel: Number, orientation or code of the channel, as "1", "90 deg" or "HNE", in any
             capitals. It may be empty if the file has one channel of acceleration.
-        unit: Unit of acceleration that the case states, as "g". It counts only for a file of CSMIP
+        unit: Unit of acceleration that the user states, as "g". It counts only for a file of CSMIP
             that states none.
 
     Returns:
@@ -282,7 +282,7 @@ def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
         file: The file.
         channel: The channel; its `line` and `end` are the indices of its first line and of the line
             behind its last.
-        unit: Unit of acceleration that the case states, for a channel that states none.
+        unit: Unit of acceleration that the user states, for a channel that states none.
 
     Returns:
         The recording, with samples in m/s². Peaks that the lines above the samples state are
@@ -290,8 +290,8 @@ def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
 
     Raises:
         RefusedError: The headers do not tell the series; samples are missing or are no numbers; no
-            unit of acceleration is stated; no record has this step; or the samples have another
-            peak than the head.
+            unit of acceleration is stated; the step is not from 4e-5 s to below 0.5 s; or the
+            samples have another peak than the head.
     """
     # Groups: 1 the count of samples, 2 the step in s, 3 or 4 the unit behind "in" or "units", 5 the
     # numbers in a line, 6 the characters of a number. All from the unit on may be missing.
@@ -335,7 +335,7 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
         file: The file.
         channel: The channel; its `line` and `end` are the indices of its first line and of the line
             behind its last.
-        unit: Unit of acceleration that the case states. It counts if no line of the text states one
+        unit: Unit of acceleration that the user states. It counts if no line of the text states one
             behind the word UNIT or UNITS.
 
     Returns:
@@ -344,8 +344,8 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
 
     Raises:
         RefusedError: The headers are missing or do not tell the series; the times are uneven;
-            samples are missing or are no numbers; no unit is stated; no record has this step; or
-            the samples have another peak than the head.
+            samples are missing or are no numbers; no unit is stated; the step is not from 4e-5 s to
+            below 0.5 s; or the samples have another peak than the head.
     """
     integers_line = channel.line + 13
     reals_line = integers_line + 7

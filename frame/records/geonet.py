@@ -98,8 +98,8 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
 
     Raises:
         RefusedError: The file is not corrected; there is no such component; a head does not tell
-            counts and step; samples are missing or are no numbers; no record has this step; or the
-            samples have another peak than the head.
+            counts and step; samples are missing or are no numbers; the step is not from 4e-5 s to
+            below 0.5 s; or the samples have another peak than the head.
     """
     match = MARK.match(file.lines[0])
     if match is not None and match[1]:

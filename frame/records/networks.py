@@ -1,7 +1,7 @@
 """Records of networks with one channel a file: PEER, K-NET and KiK-net, ESM and ITACA, SMC.
 
 Readers raise RefusedError with the line at which a file is not of its format. Each takes the file
-and the unit that the case states, which counts where the head states none.
+and the unit that the user states, which counts where the head states none.
 
 PEER's files of type AT2 are read with all the heads that were written since 1999. The head names
 the unit and, in one of its first lines, the number of samples and their step: ``NPTS= 4000, DT=
@@ -89,7 +89,7 @@ def read_peer(file: TextFile, unit: str) -> Recording:
 
     Args:
         file: The file.
-        unit: Unit of acceleration that the case states. It counts only if the head names none,
+        unit: Unit of acceleration that the user states. It counts only if the head names none,
             neither as "UNITS OF G" nor as "ACCELERATION TIME HISTORY IN G"; it may be empty if the
             head does.
 
@@ -100,8 +100,8 @@ def read_peer(file: TextFile, unit: str) -> Recording:
     Raises:
         RefusedError: The head does not state the step in s; no unit of acceleration is stated, or
             the head names velocities or displacements; a sample is no finite number, or there are
-            more or fewer than stated; no record has this step; or the samples have another peak
-            than the head.
+            more or fewer than stated; the step is not from 4e-5 s to below 0.5 s; or the samples
+            have another peak than the head.
     """
     head = _PeerHead.of(file)
     cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
@@ -159,8 +159,8 @@ def read_knet(file: TextFile, unit: str) -> Recording:
     Raises:
         RefusedError: The line Memo. is missing; the sampling frequency, the duration or the scale
             factor is missing or is not above 0; a count is no number, or their number is not the
-            duration times the frequency; no record has this step; or the samples have another peak
-            than the head.
+            duration times the frequency; the step is not from 4e-5 s to below 0.5 s; or the samples
+            have another peak than the head.
     """
     memo_lines = [k for k, line in enumerate(file.lines) if line.startswith("Memo")]
     if not memo_lines:
@@ -201,8 +201,8 @@ def _knet_numbers(
 
     Args:
         file: The file.
-        head: Line and text of each field by its name.
-        end: Line at which the head ends.
+        head: Index of the line, counted from 0, and text of each field by its name.
+        end: Index of the line at which the head ends, for the message.
         name: Name of the field.
         pattern: Regular expression of its text, with a group for each number.
         example: A text that it may have, for the message.
@@ -236,7 +236,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
 
     Args:
         file: The file.
-        unit: Unit of acceleration that the case states. It counts only if the key UNITS is missing.
+        unit: Unit of acceleration that the user states. It counts only if the key UNITS is missing.
 
     Returns:
         The recording, with samples in m/s².
@@ -244,8 +244,8 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     Raises:
         RefusedError: The step or the count is missing or not above 0; the data are no
             accelerations, or no unit is stated; a sample is no finite number, or there are more or
-            fewer than stated; no record has this step; or the samples have another peak than the
-            head.
+            fewer than stated; the step is not from 4e-5 s to below 0.5 s; or the samples have
+            another peak than the head.
     """
     head = dict[str, _EsmField]()
     for row, line in enumerate(file.lines):
@@ -303,8 +303,8 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     Raises:
         RefusedError: The first line does not begin with 1 or 2, the numbers of accelerograms; the
             head has more or fewer numbers, or counts fewer than two samples or a rate that is not
-            above 0; samples are missing or are no numbers; no record has this step; or the samples
-            have another peak than the head.
+            above 0; samples are missing or are no numbers; the step is not from 4e-5 s to below 0.5
+            s; or the samples have another peak than the head.
     """
     if file.lines[0].split()[0] not in ("1", "2"):
         allowed = "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM"

@@ -70,9 +70,9 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         path: The file.
         channel: Name of the channel; empty where there is only one. Formats with one channel a file
             (PEER, K-NET, ESM, SMC) ignore it.
-        step: Time between samples in s, for a table without times; None if the case states none.
+        step: Time between samples in s, for a table without times; None if the user states none.
             Other formats ignore it.
-        unit: Unit of the samples, for files that state none; empty if the case states none.
+        unit: Unit of the samples, for files that state none; empty if the user states none.
 
     Returns:
         The recording, with samples in m/s². They may be too few or not finite.
@@ -146,7 +146,7 @@ def _read_waveform(
         content: The file.
         file_format: ObsPy's name of the format.
         channel: Name of the channel; empty where there is only one.
-        unit: Unit that the case states.
+        unit: Unit that the user states.
 
     Raises:
         RefusedError: ObsPy is not installed or cannot read the file, there is no such channel or it

@@ -1,6 +1,6 @@
 """Records and forces in tables: times and values, with units in a head or without a head.
 
-Without a head the case states the unit, and of numbers without times the step as well: one number
+Without a head the user states the unit, and of numbers without times the step as well: one number
 a line, or several that follow one another. Of several components a channel chooses the column.
 """
 
@@ -337,12 +337,12 @@ def is_table(file: TextFile, *, is_described: bool = False) -> bool:
 
     It is one if the last line above the numbers begins with "time", "t", "date" or "timestamp".
     Otherwise the last row must be numbers, and there must be one or two of them, or no line above
-    the numbers, or a description by the case. A file without numbers is none, unless it has such a
+    the numbers, or a description by the user. A file without numbers is none, unless it has such a
     line.
 
     Args:
         file: The file. Lines that begin with "#" do not count.
-        is_described: Whether the case says how to read the numbers: a channel, or step and unit.
+        is_described: Whether the user says how to read the numbers: a channel, or step and unit.
     """
     table = _Table.of(file)
     if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
@@ -364,9 +364,9 @@ def read_table(
 
     Args:
         file: The file.
-        step: Step in s that the case states, for numbers without times; beside times it counts only
+        step: Step in s that the user states, for numbers without times; beside times it counts only
             where these do not tell the step.
-        unit: Unit of acceleration that the case states, for a head without one. Times without a
+        unit: Unit of acceleration that the user states, for a head without one. Times without a
             unit are in s.
         channel: Column of the accelerations: its number, counted from 1 with the times, or its name
             in the head; empty where there is only one.
@@ -376,9 +376,9 @@ def read_table(
 
     Raises:
         RefusedError: There are fewer than two rows; a row or the head is not understood; step or
-            unit is stated by neither the file nor the case; the times are uneven; no record has
-            this step; the column is not one of accelerations; or the samples have another peak than
-            a line above them states.
+            unit is stated by neither the file nor the user; the times are uneven; the step is not
+            from 4e-5 s to below 0.5 s; the column is not one of accelerations; or the samples have
+            another peak than a line above them states.
     """
     table = _Table.of(file)
     allowed = "a header with units, and rows of numbers below it"
@@ -403,9 +403,9 @@ def _read_columns(
 
     Args:
         table: The table.
-        step: Step in s that the case states; None if it states none. Beside times it counts only
+        step: Step in s that the user states; None if it states none. Beside times it counts only
             where these do not tell the step.
-        unit: Unit that the case states, or empty. The unit in the head of the column goes before
+        unit: Unit that the user states, or empty. The unit in the head of the column goes before
             it, if there are more than two columns or the head begins with times.
         channel: Number of the column, counted from 1 with the times, or its name in the head; empty
             if there is only one beside the times.
@@ -418,9 +418,9 @@ def _read_columns(
 
     Raises:
         RefusedError: A row or the head is not understood; there is no such column, or it is not one
-            of accelerations; step or unit is stated by neither the file nor the case; the times are
-            uneven; no record has this step; or the samples have another peak than a line above them
-            states.
+            of accelerations; step or unit is stated by neither the file nor the user; the times are
+            uneven; the step is not from 4e-5 s to below 0.5 s; or the samples have another peak
+            than a line above them states.
     """
     if table.head:  # without one, the last row of a series of numbers may be a short one
         table.numbers()
@@ -554,12 +554,12 @@ def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
     """Return what is to be mended in the head of times and accelerations; empty if it is complete.
 
     Complete means: times, if the head names them, in a known unit; accelerations in the second
-    place, not a spectrum; and a known unit of acceleration, from the head or the case.
+    place, not a spectrum; and a known unit of acceleration, from the head or the user.
 
     Args:
         table: The table, with one column at least.
         column: Name and unit of the accelerations in the head, both possibly empty.
-        unit: Unit of acceleration that is taken, of the head or of the case; empty without one.
+        unit: Unit of acceleration that is taken, from the head or the user; empty without one.
     """
     first = table.columns[0]
     # Times without a unit are in s, as most files have them.
@@ -586,7 +586,7 @@ def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[floa
 
     Args:
         table: The table of two rows or more, whose first column has the times.
-        stated_step: Step that the case states, in s; None if it states none. It is returned where
+        stated_step: Step that the user states, in s; None if it states none. It is returned where
             the times do not tell their step: if they count the samples, are all equal, or are
             rounded too coarsely. Else it is ignored.
 
@@ -630,13 +630,13 @@ def _even_steps(
 ) -> _EvenSteps:
     """Return the even steps of the times in the first column of a table of two rows or more.
 
-    A step that the case states is taken where the times do not tell it: if all are equal, or if
+    A step that the user states is taken where the times do not tell it: if all are equal, or if
     they were rounded so coarsely that even steps look uneven. In the latter case it must agree with
     the duration to the last digit of the times.
 
     Args:
         table: The table. Its times are numbers, in the unit in the head of their column, or in s.
-        stated_step: Step that the case states, in s; None if it states none.
+        stated_step: Step that the user states, in s; None if it states none.
         or_step: What a hint says of the key that states the step; "{:.9g}" in it is replaced by a
             step. It is empty where there is no such key.
 

@@ -164,17 +164,21 @@ def recording_in_si(
     Args:
         location: File and line, for messages.
         file_format: Name of the format.
-        unit: Unit of the samples; empty where neither the file nor the case states one.
+        unit: Unit of the samples; empty where neither the file nor the user states one.
         step: Time between samples, in s.
         samples: The samples, shape (n,).
         channel: Name of the channel in the file.
         remarks: Clauses on what is unusual in the file.
-        stated: Peaks in the file's head. If the samples have another peak, the recording bears a
-            remark, or is refused, as `remarks_on_peak` says.
+        stated: Peaks in the file's head. If the peak of the samples is none of them by more than 5
+            %, the recording bears a remark; by more than a factor of 2 from all of them, it is
+            refused.
+
+    Returns:
+        The recording, with samples in m/s².
 
     Raises:
-        RefusedError: The unit is not one of accelerations, no record has this step, or the peak in
-            the head is another one.
+        RefusedError: The unit is missing or not one of accelerations, the step is not from 4e-5 s
+            to below 0.5 s, or the peak in the head is another one.
     """
     to_si = acceleration_factor(unit)
     if to_si is None:

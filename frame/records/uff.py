@@ -43,18 +43,24 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     """Return the recording of acceleration in a data set 58 of a universal file.
 
     The stated unit says whether it is an acceleration; types of data of displacements, velocities
-    and forces contradict it, and others say nothing.
+    and forces contradict it, and others say nothing. Data sets 58 in text and in bytes are read.
 
     Args:
         name: Name of the file, for messages.
         content: The file.
-        channel: NODE.DIRECTION of the response, as "7.x"; empty where there is one. Of several data
-            sets of one response it is "7.x#1", "7.x#2" …, or the first line of their heads.
+        channel: NODE.DIRECTION of the response, as "7.x", in any capitals; empty where there is
+            one. Of several data sets of one response it is "7.x#1", "7.x#2" …, or the first line of
+            their heads.
         unit: Unit of a data set that states none.
 
+    Returns:
+        The recording, with samples in m/s². Its channel is NODE.DIRECTION.
+
     Raises:
-        RefusedError: There is no such data set, or it is no time history of an acceleration in even
-            steps with as many samples as it states.
+        RefusedError: There is no such data set; it is no time history of an acceleration in even
+            steps with as many samples as it states; its unit is missing or not one of
+            accelerations; or the step is not from 4e-5 s to below 0.5 s.
+        ValueError: A code of its head is no whole number.
     """
     allowed = "a universal file with time histories, data sets 58"
     try:

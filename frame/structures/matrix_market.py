@@ -142,7 +142,7 @@ def dense_of_entries(
 
 
 def _numbers(name: str, text: bytes) -> Array:
-    """Return the numbers in a text whose letters are those of numbers.
+    """Return the numbers in a text, shape (numbers,), in which blanks separate them.
 
     Raises:
         RefusedError: A word is no number, such as 1e or 1-2.

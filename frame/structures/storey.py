@@ -557,7 +557,7 @@ class StoreyFrame(LinearSystem):
         kinds = ["q", "v", "a", "drift", "shear"]
         if self.hardening:
             kinds += ["residual", "ductility", "dissipated"]
-        pattern = rf"({'|'.join(kinds)})([1-9]\d*)"
+        pattern = rf"({'|'.join(kinds)})([1-9]\d{{0,5}})"
         if name == "base_shear":
             return "shear", 0
         match = re.fullmatch(pattern, name)
@@ -624,6 +624,7 @@ class StoreyFrame(LinearSystem):
         """
         # With k = 12 c E I / l³ the ratio k l / P is 12 c E I / (l² P). It is smallest at the
         # highest l and P and the lowest c, E and I; of given springs at the lowest k and l.
+        # Only names of masses begin with m, and only names of heights with l.
         worst_when_high = "m" if self.stiffness else "ml"
         p: dict[str, Jet] = {}
         for name, nominal in self.parameters.items():

@@ -140,6 +140,13 @@ def test_a_matrix_that_may_be_singular_has_no_bound_of_its_inverse():
     )
 
 
+def test_complex_functions_of_fewer_inputs_stay_complex():
+    line = TaylorModel((np.ones((1, 1)), np.array([[2.0 + 3.0j]])), np.zeros(1), 1)
+    wider = line.embedded(np.array([1]), 2)
+    assert wider.at(np.array([[0.7, 0.5]])) == pytest.approx(2.0 + 1.5j)
+    assert wider.restricted_to(np.array([1])).at(np.array([[0.5]])) == pytest.approx(2.0 + 1.5j)
+
+
 def test_gamma_is_that_of_the_worst_sum():
     assert gamma(1) == pytest.approx(UNIT_ROUNDOFF, rel=1e-9)
     total = np.float64(1.0)

@@ -45,6 +45,7 @@ def matrices(**changes):
         (COLUMNS, {"damping_ratio": (0.1,) * 3}, "damping_ratio is a list of 3; allowed: 2"),
         (COLUMNS, {"q0": (0.1, np.nan)}, "q0 is nan; allowed: finite numbers"),
         (COLUMNS, {"outputs": ("q3",)}, "output is q3; allowed: q, v, a, drift or shear"),
+        (COLUMNS, {"outputs": ("q" + 5000 * "1",)}, "output is q1.*…; allowed: q, v, a, drift"),
         (COLUMNS, {"damper_placement": "roof"}, "damper_placement is roof; allowed: ground, storey"),
         (COLUMNS, {"stiffness": (1e6, 1e6)}, "modulus, second_moment.* either stiffness or what"),
         (SPRINGS, {"gravity": 500.0}, "storey 1 under P-Delta is 1e.06 N/m; .* it buckles"),
