@@ -28,7 +28,7 @@ def read_recording(
     """Read a recording of the ground's acceleration, or one channel of several, from a file.
 
     Formats are PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58 and CSV.
-    The content says which it is; the name of the file does not matter.
+    The content says which it is, and not the name of the file.
 
     Args:
         path: The file.
@@ -64,7 +64,74 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
     """Read a recording from a file of the format whose marks its content has.
 
     Marks that are sure go first: those of universal files (UFF) and of miniSEED and SAC, which are
-    binary, then those of text formats, and at last a table of numbers, which has no mark.
+    binary, then those of text formats, and at last a table of numbers, which has no mark. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them. Numbers alone are not taken from a file
+    whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says
+    how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a,
+    .smc) is that of a format with a head, unless the user says how to read them. Numbers alone are
+    not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head,
+    unless the user says how to read them. Numbers alone are not taken from a file whose ending
+    (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read
+    them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that
+    of a format with a head, unless the user says how to read them. Numbers alone are not taken from
+    a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the
+    user says how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1,
+    .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read them. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them. Numbers alone are not taken from a file
+    whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says
+    how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a,
+    .smc) is that of a format with a head, unless the user says how to read them. Numbers alone are
+    not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head,
+    unless the user says how to read them. Numbers alone are not taken from a file whose ending
+    (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read
+    them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that
+    of a format with a head, unless the user says how to read them. Numbers alone are not taken from
+    a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the
+    user says how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1,
+    .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read them. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them. Numbers alone are not taken from a file
+    whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says
+    how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a,
+    .smc) is that of a format with a head, unless the user says how to read them. Numbers alone are
+    not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head,
+    unless the user says how to read them. Numbers alone are not taken from a file whose ending
+    (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read
+    them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that
+    of a format with a head, unless the user says how to read them. Numbers alone are not taken from
+    a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the
+    user says how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1,
+    .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read them. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them. Numbers alone are not taken from a file
+    whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says
+    how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a,
+    .smc) is that of a format with a head, unless the user says how to read them. Numbers alone are
+    not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head,
+    unless the user says how to read them. Numbers alone are not taken from a file whose ending
+    (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read
+    them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that
+    of a format with a head, unless the user says how to read them. Numbers alone are not taken from
+    a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the
+    user says how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1,
+    .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read them. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them. Numbers alone are not taken from a file
+    whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says
+    how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a,
+    .smc) is that of a format with a head, unless the user says how to read them. Numbers alone are
+    not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head,
+    unless the user says how to read them. Numbers alone are not taken from a file whose ending
+    (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read
+    them. Numbers alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that
+    of a format with a head, unless the user says how to read them. Numbers alone are not taken from
+    a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format with a head, unless the
+    user says how to read them. Numbers alone are not taken from a file whose ending (.at2, .v1,
+    .v2, .v2a, .smc) is that of a format with a head, unless the user says how to read them. Numbers
+    alone are not taken from a file whose ending (.at2, .v1, .v2, .v2a, .smc) is that of a format
+    with a head, unless the user says how to read them.
 
     Args:
         path: The file.
@@ -96,16 +163,17 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
     for mark, n_lines, read in FORMATS:
         if any(mark.match(line) for line in file.lines[:n_lines]):
             return read(file, unit)
+    allowed = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
     is_described = bool(channel or (step and unit))
     if is_table(file, is_described=is_described):
         is_named = path.suffix.lower() in (".at2", ".v1", ".v2", ".v2a", ".smc")
         begins_with_number = re.match(rb"\s*[-+]?\.?[0-9]", content) is not None
         value = "without the head that files of this name begin with"
         cure = 'load it anew; numbers alone have records.step = "0.005 s" and records.unit = "g"'
+        # A file of these names that is numbers alone has lost its head, and with it unit and step.
         lost_head = is_named and begins_with_number and not is_described
-        require(not lost_head, path.name, value, READ, cure)
+        require(not lost_head, path.name, value, allowed, cure)
         return read_table(file, step, unit, channel)
-    allowed = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"
         raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)
