@@ -88,10 +88,17 @@ class CellContent(Section, defer_build=True):
     def random_cell(
         self,
     ) -> tuple[RadiusMapSection | ThetaSection | FractionMap, RoundCell | MeshedCell]:
-        """The radius map, or the distribution of θ of a mesh, and the phases.
+        """Return where the random size of the particles comes from, and the cell with its phases.
+
+        Returns:
+            The section on the random variable θ, and the section [cell]. A cell whose mesh comes
+            from a file needs the distribution of θ alone: [radius], or θ between -3 and 3 without
+            one. A cell with one particle comes with the map from θ to its radius: [radius], else
+            the map of the constant fraction `cell.fraction`.
 
         Raises:
-            RefusedError: The case has no cell with a particle or a mesh, or no radius.
+            RefusedError: The cell is an image or missing, or a particle has neither [radius] nor a
+                fraction.
         """
         if self.mesh_cell is not None:
             return self.radius or ThetaSection(), self.mesh_cell
@@ -112,7 +119,16 @@ class CellContent(Section, defer_build=True):
         self._require_stages()
 
     def _require_mesh(self) -> None:
-        """Refuse a mesh file without [cell.phases] or the reverse; keys that repeat the file."""
+        """Refuse keys of [mesh], [radius] and [modulus] that do not fit the source of the mesh.
+
+        Without `mesh.file` the program makes the mesh: then [cell.phases] and `mesh.refine` have no
+        meaning, and [radius] must be a whole radius map, with the keys a1 … a4. With `mesh.file`
+        the geometry comes from the file: [cell.phases] must give a phase for each physical group,
+        element sizes and radius maps are refused, and [radius] may only have the distribution of θ.
+
+        Raises:
+            RefusedError: With the key that does not fit.
+        """
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
@@ -123,12 +139,14 @@ class CellContent(Section, defer_build=True):
             return
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
         require(self.mesh_cell is not None, "cell.phases", None, allowed)
-        # the file has its own elements, and its own shape of particles
+        # The file has its own elements and its own shape of particles. Keys that a run would
+        # ignore are refused, since their author expects them to act.
         for key in ("size", "layers"):
             require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
         has_map = self.radius_map is not None or "microstructure" in self.stages
         require(not has_map, "radius", "a map of radii", "theta alone beside mesh.file")
-        # Without a second, finer mesh nothing is known of the error, and a tolerance promises one.
+        # The error is estimated from the results on the mesh of the file and on its refinement.
+        # Without the second mesh nothing is known of the error, and a tolerance promises one.
         tolerance = self.modulus.tolerance
         allowed = "none beside mesh.file, whose error nobody knows"
         has_error = tolerance is None or self.mesh.refine
@@ -136,8 +154,19 @@ class CellContent(Section, defer_build=True):
         require(has_error, "modulus.tolerance", tolerance, allowed, cure=cure)
 
     def _require_stages(self) -> None:
-        """Refuse stages without the sections that they need, and two sources of a radius."""
-        # the radius comes from one source: a stage, a fraction of equal particles, or [radius]
+        """Refuse stages without the sections that they need, and several sources of the radius.
+
+        Each name in `stages` but "modulus" needs the section of the same name. Stage modulus needs
+        [cell], and [radius] unless stage microstructure computes the radius map, `cell.fraction`
+        makes all particles equal, or the cell is an image or a mesh from a file. `modulus.method`
+        must be one of the methods of the kind of cell.
+
+        Raises:
+            RefusedError: With the key that is missing, or that stands beside another source of the
+                radius.
+        """
+        # The radius comes from one source: a stage, a fraction of equal particles, or [radius].
+        # Of two sources one would silently win.
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
         has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell

@@ -43,7 +43,12 @@ class Content(CellContent):
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
-        """Sections of questions about the response by key, with one limit of each storey."""
+        """Return the sections that ask about limits of the response, by key.
+
+        The keys are probability, decision, tolerances and fragility, in this order; missing
+        sections are left out. If the case has a structure, a limit of "drift", which means every
+        storey, is replaced by one limit of each storey: drift1, drift2 …
+        """
         questions: dict[str, QuestionSection] = {}
         for section in (self.probability, self.decision, self.tolerances, self.fragility):
             if section is not None:
@@ -55,14 +60,20 @@ class Content(CellContent):
     @property
     def incremental_question(self) -> FragilitySection | None:
         """The question of fragility, with one limit of each storey, if columns yield; else None."""
-        question, structure = self.fragility, self.structure
+        question = self.fragility
+        structure = self.structure
         if question is None or structure is None or not yields(structure.model):
             return None
         return question.with_storeys(structure)
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:
-        """Peaks that questions compare with limits, each once, such as q3 and max q3."""
+        """Return the names of the peaks over time whose bounds the questions need, each once.
+
+        The peak of an output is the largest magnitude over time, named as the output, such as "q3".
+        The largest and the smallest value have names of their own: "max q3" and "min q3". Questions
+        that compute responses themselves, instead of reading peaks of the envelope, are left out.
+        """
         peaks: dict[str, None] = {}
         for section in self.questions.values():
             if not section.reads_peaks:
@@ -107,14 +118,17 @@ class Content(CellContent):
     def structure_of(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """Return the structure with its forces.
+        """Return the structure of the case with the forces of [[force]].
 
         Args:
-            modulus: Young's modulus in Pa; the structure's own if not given.
-            loss: Loss factor of its material, where the case takes damping from there.
+            modulus: Young's modulus in Pa, as stage modulus computes it; None for that of the
+                section, or a stand-in of 20 GPa where the section has none.
+            loss: Loss factor of the material, from which the damping ratios follow if the case asks
+                for damping by the material; None for a stand-in of 2 %. It is ignored otherwise.
 
         Raises:
-            RefusedError: The case has no structure, or it takes no such force.
+            RefusedError: The case has no structure, the values make none, or it takes no such
+                force.
         """
         section = self.structure_section
         if section is None:
@@ -128,9 +142,16 @@ class Content(CellContent):
         return isinstance(ratios, MaterialDamping)
 
     def require_consistent(self) -> None:
-        """Refuse sections that do not fit each other."""
+        """Refuse sections that do not fit each other. Pydantic calls it once all keys have values.
+
+        Raises:
+            RefusedError: Damping by the material has no loss factors; nothing moves the structure;
+                a question does not fit the excitation; or stage envelope has not exactly one
+                structure that can answer the studies and the questions.
+        """
         super().require_consistent()
-        # the loss factor of the material is that which stage modulus computes
+        # The damping of a structure by its material follows from the loss factor of the cell, which
+        # is a result of stage modulus: a stand-in for it would look like a result.
         if self.has_material_damping:
             has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
             key = f"{next(iter(self.structure_sections))}.damping_ratio"
@@ -145,7 +166,11 @@ class Content(CellContent):
             self._require_response(self.envelope, self._one_structure())
 
     def _require_excitation(self) -> None:
-        """Refuse a structure at rest without loads."""
+        """Refuse a structure that starts at rest and has no loads.
+
+        Loads are an accelerogram of the structure, a suite [records], or [[force]]. A case without
+        a structure has nothing to refuse.
+        """
         section = self.structure_section
         # Without loads a structure at rest stays at rest, and bounds of that look like results.
         if section is None or section.moves_by_itself:
@@ -163,19 +188,32 @@ class Content(CellContent):
             require(not means, f"{key}.limits", means, "a mean over records beside [records]")
 
     def _require_records_alone(self, records: RecordsSection) -> None:
-        """Refuse another excitation of the ground, and what a suite of records cannot answer."""
+        """Refuse what cannot stand beside a suite of ground motion records, [records].
+
+        These are an accelerogram of the structure, a structure that no ground motion moves, and the
+        sections [probability], [tolerances], [identify] and [[study]], which ask about one
+        response, while a suite has one response for each record.
+
+        Raises:
+            RefusedError: With the key that does not fit.
+        """
         section = self.structure_section
         if section is not None:
             has_ground = section.nominal.model.ground is not None
             require_alone("records", has_ground, "an accelerogram")
             section.require_pattern()
-        # these ask for one response, and a suite has one for each record
+        # Answers over a suite are means and fractions of records. Of these four questions nobody
+        # has defined how the answers under several records make one.
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
 
     def _one_structure(self) -> Structure:
-        """Return the structure; refuse a case with none or several."""
+        """Return the structure of the case, without what later stages compute.
+
+        Raises:
+            RefusedError: The case has no section of a structure, such as [frame], or several.
+        """
         structure = self.structure
         n_sections = len(self.structure_sections)
         if structure is None or n_sections > 1:
@@ -187,9 +225,23 @@ class Content(CellContent):
         return structure
 
     def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
-        """Refuse studies and questions that the structure cannot answer."""
-        # the response of columns that yield has kinks where they do, and proofs and followers need
-        # derivatives by the inputs
+        """Refuse studies and questions that the structure cannot answer.
+
+        Checked are the method and the integrator where columns yield, the inputs, outputs and
+        duration of [envelope] and of each [[study]], that no two studies have the same name, that a
+        modulus is known or computed, the limits of each question, and that identification has a
+        frame.
+
+        Args:
+            envelope: What holds for all studies: method, integrator, α-levels, time step.
+            structure: The structure, with a stand-in for what stage modulus computes.
+
+        Raises:
+            RefusedError: With the key of the first thing that does not fit.
+        """
+        # Where columns begin to yield, the response has kinks as a function of the inputs. Proofs
+        # expand it in Taylor polynomials and Graph Followers follow gradients: both need
+        # derivatives. Sampling needs none.
         if yields(structure.model):
             allowed = "auto or quasi-monte-carlo where columns yield"
             is_possible = envelope.method in ("auto", "quasi-monte-carlo")
@@ -220,17 +272,23 @@ class Content(CellContent):
         """Refuse inputs, outputs and a duration that do not fit the structure and its forces.
 
         Args:
-            key: Name of the study's section, for messages.
-            study: The study.
-            envelope: What holds for all studies.
-            structure: The structure. What a stage will make fuzzy may be crisp in it.
+            key: Section of the study, "envelope" or "study[2]", for messages.
+            study: Names of its fuzzy inputs, of the outputs in its figures, and its duration in s.
+            envelope: What holds for all studies; its time step must divide the duration.
+            structure: The structure. What a stage will make fuzzy may still be crisp in it.
+
+        Raises:
+            RefusedError: An input is unknown or crisp, an output is unknown, the duration is no
+                multiple of the time step, or a force begins only after the duration.
         """
+        # Stage modulus computes Young's modulus E and, from the loss factor of the material, the
+        # damping ratios: zeta of all modes, or zeta1, zeta2 … of each. They may be crisp in the
+        # stand-in and fuzzy in the run, so that their width is not judged here.
         computed = "(?!)"  # which matches no name
         if self.has_material_damping:
             computed = r"E|zeta\d*"
         elif "modulus" in self.stages:
             computed = "E"
-        # what a stage computes may be crisp in the stand-in and fuzzy in the run
         stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
         structure.inputs(stated, f"{key}.fuzzy")
         for output in study.figures:
@@ -241,7 +299,8 @@ class Content(CellContent):
             if history is None:
                 continue
             acts = history.start < study.duration
-            value, allowed = f"from {history.start:g} s", f"a start below {key}.duration"
+            value = f"from {history.start:g} s"
+            allowed = f"a start below {key}.duration"
             require(acts, f"force[{number}].history", value, allowed)
 
 
@@ -249,9 +308,14 @@ Case = ParsedCase[Content]
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
-    """Read a TOML case file, with changes ``KEY=VALUE`` such as ``cell.matrix_modulus=20 GPa``.
+    """Read a case from a TOML file.
+
+    Args:
+        path: The file. Files that the case names are looked for in its folder.
+        changes: Texts "KEY=VALUE", such as ``cell.matrix_modulus=20 GPa``, that replace keys of the
+            file.
 
     Raises:
-        BadInput: With every problem of the case.
+        BadInput: With every problem of the case at once, as one line each.
     """
     return parse(with_structures(Content, built=True), path, changes)

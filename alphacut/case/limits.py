@@ -31,11 +31,18 @@ BASE_SHEAR = "base_shear"
 
 @dataclass(frozen=True)
 class CaseLimit:
-    """Largest magnitude allowed of an output, or its greatest or least value, as a case states it.
+    """Limit of an output over time, as the text of a case states it.
 
-    `side` is "max" or "min" of the output itself, "" of its magnitude, "mean" of that over records;
-    the value is in SI or, if relative, a fraction of the storey's height or of the weight. `event`
-    is the text of a limit of all storeys of which this one is a part.
+    Args:
+        side: "" if the magnitude of the output is limited, "mean" if the mean of the largest
+            magnitudes over the records of a suite is, "max" or "min" if its largest or smallest
+            value is.
+        output: Name of the output, such as "drift1".
+        value: The limit. If `is_relative`, a fraction of the height of the storey or of the weight;
+            else in the SI unit of the output.
+        is_relative: Whether `value` is such a fraction.
+        text: The limit as the case states it.
+        event: Text of the limit of all storeys of which this one is a part; empty otherwise.
     """
 
     side: Side
@@ -51,22 +58,41 @@ class CaseLimit:
         return f"{self.side} {self.output}".strip()
 
     def limit(self, structure: Structure, key: str) -> Limit:
-        """The limit in the SI unit of its output."""
+        """Return the limit in the SI unit of its output, as `alphacut.frame` takes it.
+
+        Args:
+            structure: Structure with the output. Heights and weight are taken from it.
+            key: Key of the limits in the case, for messages.
+
+        Raises:
+            RefusedError: A fraction refers to a height or weight that the structure lacks, or the
+                unit is not that of the output.
+        """
         return Limit(
             self.output,
             self.value_in_si(structure, key),
-            largest={"max": True, "min": False}.get(self.side),
+            largest={"max": True, "min": False}.get(self.side),  # None: the magnitude is limited
             mean=self.side == "mean",
             stated=re.split("[<>]=", self.text)[1].strip(),
             event=self.event,
         )
 
     def value_in_si(self, structure: Structure, key: str) -> float:
-        """The limit in the SI unit of its output; a fraction is of the least height or weight."""
+        """Return the limit in the SI unit of its output.
+
+        A relative limit of a base shear is a fraction of the weight of all floors; any other one is
+        a fraction of the height of the storey.
+
+        Raises:
+            RefusedError: The structure has no floor masses, or no height of the storey; or the
+                limit is not in the unit of the output.
+        """
         if not self.is_relative:
             return self._value_in_unit_of_output(structure, key)
         if self.output == BASE_SHEAR:
             allowed = "a share of the weight beside [frame], or a force, as 90 kN"
+            # A fuzzy weight or height enters with the lower end of its support: the limit is then
+            # the strictest of those that it may mean.
             masses = structure.floor_masses
             require(bool(masses), key, self.text, allowed)
             least = sum(mass.support.lower for mass in masses)
@@ -77,12 +103,20 @@ class CaseLimit:
         return self.value * height.support.lower
 
     def _value_in_unit_of_output(self, structure: Structure, key: str) -> float:
-        """The limit in the SI unit of its output, which a structure from matrices states itself.
+        """Return an absolute limit in the SI unit of its output.
+
+        The name of an output of a frame tells its unit, so `value` was converted when the case was
+        read. A structure from matrices states the unit of each output itself: its limit is
+        converted here. Outputs in a unit without a known dimension keep the number as it is.
+
+        Args:
+            structure: The structure, which may not have the output; then `value` is returned.
+            key: Key of the limits in the case, for messages.
 
         Raises:
             RefusedError: The limit is in another unit, or in none.
         """
-        is_known_before = Output(self.output).unit != "SI"
+        is_known_before = Output(self.output).unit != "SI"  # "SI": the name tells no unit
         if is_known_before or self.output not in structure.outputs:
             return self.value
         unit = structure.unit(self.output)
@@ -96,7 +130,15 @@ class CaseLimit:
             raise RefusedError(key, self.text, allowed, str(error)) from None
 
     def by_storey(self, structure: Structure) -> tuple[CaseLimit, ...]:
-        """The limits of all floors or storeys of a frame that "drift" means; else itself."""
+        """Return one limit for each floor or storey, if the output is named without a number.
+
+        In a frame with three floors "drift <= 1 %" becomes "drift1 <= 1 %", "drift2 <= 1 %" and
+        "drift3 <= 1 %". If there are several, each has the original text as its `event`, by which
+        questions join them again. Other limits, and those of structures without floors, are
+        returned alone and unchanged.
+        """
+        # Kinds of outputs that each storey or floor has are known with words, as "drift of storey";
+        # those of the whole frame, such as the base shear, without.
         _, words = OUTPUTS.get(self.output, ("", ""))
         if not structure.model.floors or not words:
             return (self,)
@@ -109,7 +151,16 @@ class CaseLimit:
 
 
 def parse_limit(value: object) -> CaseLimit:
-    """Limit that a text such as "drift1 <= 40 mm" states; of a magnitude it is positive."""
+    """Return the limit that a text such as "drift1 <= 40 mm" states.
+
+    The text is "[max|min|mean] OUTPUT <= VALUE", and "min OUTPUT >= VALUE". VALUE is a quantity
+    with its unit. Of drifts, residual drifts and the base shear it may be a fraction, "1/200" or
+    "0.5 %", which then refers to the height of the storey or to the weight.
+
+    Raises:
+        RefusedError: The text is another one, the sign does not fit the side, the unit is not that
+            of the output, or a limit of a magnitude is not positive.
+    """
     match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift <= 1/200', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
     if match is None or (match[3] == ">=") != (match[1] == "min"):  # only least values have >=
@@ -122,7 +173,9 @@ def parse_limit(value: object) -> CaseLimit:
     try:
         if ratio is not None and is_relative:
             number = 1 / int(ratio[1])
-        elif unit == "SI":  # the output's is not known here
+        elif unit == "SI":
+            # Only a structure from matrices knows the unit of such an output: any unit is taken
+            # here, and `CaseLimit.value_in_si` reads the text again.
             fuzzy, _ = quantity.parse_fuzzy_in_any_unit(text)
             number = float(fuzzy.nominal)
         else:
@@ -153,12 +206,18 @@ class QuestionSection(Section):
     weight"""
 
     def with_storeys(self, structure: Structure) -> Self:
-        """The section with a limit of every storey as one of each; see `CaseLimit.by_storey`."""
+        """Return the section with each limit of every storey as one limit for each storey."""
         limits = (x for limit in self.limits for x in limit.by_storey(structure))
         return self.model_copy(update={"limits": tuple(limits)})
 
     def limits_of(self, structure: Structure) -> tuple[Limit, ...]:
-        """The limits in the SI units of their outputs; RefusedError where they do not fit."""
+        """Return the limits of this question in SI units, in the order of the case.
+
+        Raises:
+            RefusedError: The structure cannot have an output; a unit, height or weight does not
+                fit; a limit is given twice, or one of a magnitude is not positive; or the question
+                needs one limit of the magnitude of each output and gets others.
+        """
         key = f"{self.key}.limits"
         limits = tuple(limit.limit(structure, key) for limit in self.limits)
         structure.require_quantities(key, [*dict.fromkeys(x.output for x in self.limits)])
@@ -173,7 +232,16 @@ class QuestionSection(Section):
 
 @contextmanager
 def _naming(key: str) -> Iterator[None]:
-    """Gives refused limits the key of the case."""
+    """Replace the key "limits" of a RefusedError raised in the block by the key in the case.
+
+    Args:
+        key: Key of the limits in the case, such as "decision.limits". It replaces "limits" and
+            "limit of …", the names in the Python interface; errors with other keys pass with their
+            own.
+
+    Raises:
+        RefusedError: Each one that the block raises, with value, allowed values and hint unchanged.
+    """
     try:
         yield
     except RefusedError as error:

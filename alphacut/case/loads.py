@@ -31,10 +31,23 @@ class ForceHistory(NamedTuple):
 
 
 def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
-    """Return the history that a text such as "harmonic, 1.5 Hz, 90 deg, from 2 s" states.
+    """Return the time history that a text such as "harmonic, 1.5 Hz, 90 deg, from 2 s" states.
 
-    Its first word is a kind or the name of a file. Then come a frequency and perhaps a phase, of a
-    harmonic force alone, and one of "from TIME" and "static".
+    The words are separated by commas. The first is "step", "harmonic", "impulse" or the name of a
+    file. A harmonic force has a frequency and may have a phase. All but the impulse may have "from
+    TIME", the start; a step or a file may have "static" instead, by which the structure starts at
+    rest under the force.
+
+    Args:
+        value: The text.
+        info: Its context, whose folder the file stands in.
+
+    Returns:
+        ForceHistory: The history, None of an impulse; and the SI unit of the amplitudes: "N*s" of
+        an impulse, "" if a file with a unit of force has the forces themselves, else "N".
+
+    Raises:
+        RefusedError: The text is another one, or the file is missing or holds no history.
     """
     allowed = (
         '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'
@@ -104,7 +117,14 @@ class ForceSection(Section):
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
     def require_consistent(self) -> None:
-        """Refuse amplitudes whose unit is not that of the time history."""
+        """Refuse a section without amplitudes, and amplitudes in another unit than it needs.
+
+        Forces are in N, amplitudes of an impulse in N s. A file with a unit has the forces, and its
+        amplitudes are factors without a unit.
+
+        Raises:
+            RefusedError: With the key of the first amplitude that does not fit.
+        """
         require(bool(self.amplitude), "force.amplitude", None, "one floor or more")
         dimension = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
@@ -142,7 +162,8 @@ def with_forces(
             forces.append(PlacedForce(places.index(place), amplitude.nominal, history))
             amplitudes.append(amplitude)
             units.append(unit)
-    # the structure chooses the names of amplitudes: of floors as F3, of unknowns F1, F2 …
+    # The structure chooses the names of amplitudes, in the order of the forces that it was given.
+    # A frame names them by floor, F3 and F3_2 of a second one; a structure from matrices F1, F2 …
     model, names = structure.model.with_forces(forces)
     numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
     force_units = dict(zip(names, units, strict=True))
@@ -163,10 +184,23 @@ class Scale:
 
 
 def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
-    """Return the recordings of all files that "records/*.AT2" or "a.v2#1" matches.
+    """Return the recordings of all files that a text such as "records/*.AT2" or "a.v2#1" matches.
 
-    Files stand below the case's folder; the text after # is the channel of each file. None is read
-    where step or unit is refused: without it the files would seem to lack one.
+    The part before "#" is a path or pattern relative to the folder of the case; the part after it
+    is the channel that is read from each file. Files are read in the order of their names.
+
+    Args:
+        value: The text.
+        info: Its context: the folder of the case, and the keys `step` (in s) and `unit` for files
+            that state neither.
+
+    Returns:
+        The recordings; none if `step` or `unit` was refused, since without them the files would
+        seem to lack these, and a second message would mislead.
+
+    Raises:
+        RefusedError: The pattern is not relative, no file or more than `MAX_RECORDS` files match,
+            or a file holds no record.
     """
     if "step" not in info.data or "unit" not in info.data:
         return ()

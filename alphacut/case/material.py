@@ -84,7 +84,14 @@ class RadiusMapSection(ThetaSection):
         return HermiteMap(a1, a2, a3, a4, self.distribution)
 
     def require_consistent(self) -> None:
-        """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
+        """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ.
+
+        The radius is over half the side of the cell, so that a particle with radius 1 touches its
+        periodic images.
+
+        Raises:
+            RefusedError: With the first corner of the supports at which the radius leaves (0, 1).
+        """
         # r(θ) is linear in a1 … a4, so that its extremes over the box of their supports are at
         # corners: the map stays in (0, 1) if it does at the 2⁴ corners.
         for ends in itertools.product(*({*x.support} for x in self.numbers.values())):
@@ -158,7 +165,8 @@ class MeshedCell(Section):
         """Refuse losses of some phases alone."""
         for name, phase in self.phases.items():
             is_complete = phase.loss is not None or not self.losses
-            key, allowed = f"cell.phases.{name}.loss", "a loss factor of each phase, 0 for none"
+            key = f"cell.phases.{name}.loss"
+            allowed = "a loss factor of each phase, 0 for none"
             require(is_complete, key, None, allowed)
 
 
@@ -194,7 +202,11 @@ class RoundCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """The elastic constants by the names of their keys."""
+        """Return the fuzzy elastic constants of matrix and particle by their keys.
+
+        Young's moduli are in Pa. A particle that is given by a stiffness matrix has neither
+        inclusion_modulus nor inclusion_poisson.
+        """
         constants: dict[str, FuzzyNumber] = {}
         names = ("matrix_modulus", "matrix_poisson", "inclusion_modulus", "inclusion_poisson")
         for name in names:
@@ -205,10 +217,13 @@ class RoundCell(Section):
 
     @property
     def outline(self) -> Ellipse | None:
-        """Outline of the particle, None for round ones.
+        """Return the outline of an elliptic particle in the plane; None for cylinders and spheres.
+
+        `particles` of an ellipse is "ellipses(ASPECT, DEGREES)": the ratio of the axes, and the
+        angle between the first axis and x.
 
         Raises:
-            RefusedError: The shape is unknown.
+            RefusedError: The text is another one, or the ratio of the axes is not from 1/4 to 4.
         """
         if self.particles in ("cylinders", "spheres"):
             return None
@@ -216,7 +231,8 @@ class RoundCell(Section):
         if match is None:
             raise RefusedError("cell.particles", self.particles, SHAPES)
         try:
-            aspect, degrees = float(match[1]), float(match[2])
+            aspect = float(match[1])
+            degrees = float(match[2])
         except ValueError:
             raise RefusedError("cell.particles", self.particles, SHAPES) from None
         return Ellipse(aspect, degrees)
@@ -273,7 +289,16 @@ class RoundCell(Section):
         return LOSSES[: len(self.losses)]
 
     def require_consistent(self) -> None:
-        """Refuse unknown shapes, keys too few or too many, and touching particles."""
+        """Refuse keys of the particle and of the losses that do not fit each other.
+
+        A particle has either Young's modulus and Poisson's ratio or a plane stiffness alone;
+        spheres have no stiffness of a plane. All values of `fraction` must be below the fraction at
+        which particles touch their periodic images. Loss factors are given of both phases or of
+        none.
+
+        Raises:
+            RefusedError: With the key that does not fit, or the shape of the particles is unknown.
+        """
         outline = self.outline or circle  # refuses unknown shapes
         has_ratio = self.inclusion_poisson is not None
         is_isotropic = self.stiffness is None
@@ -284,13 +309,14 @@ class RoundCell(Section):
         is_solved = is_isotropic or self.particles != "spheres"
         allowed = "Young's modulus of spheres"
         require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
-        # An outline of the reach R (its largest distance from the centre over r) touches the next
-        # cell where r is 1/R.
+        # An outline whose largest distance from its centre is R r, with r the radius over half the
+        # side, touches the next cell where R r = 1. Beyond that the phases would overlap.
         if self.fraction is not None:
             largest = self.fraction.support.upper
             touching = float(self.shape.fractions(1 / reach(outline)))
             allowed = f"values below {touching:.6g}, where particles touch"
             require(largest < touching, "cell.fraction", f"{largest:g}", allowed)
+        # A missing loss is not taken as 0: the loss of the cell would be too small unnoticed.
         has_losses = self.matrix_loss is not None or self.inclusion_loss is not None
         for name in LOSSES:
             is_complete = getattr(self, name) is not None or not has_losses
@@ -351,7 +377,17 @@ class ImageCell(Section):
         return self._of_phases(self.loss or ())
 
     def require_consistent(self) -> None:
-        """Refuse two keys for the same thing or neither, and numbers of values that do not fit."""
+        """Refuse keys that exclude each other, and numbers of values that do not fit the phases.
+
+        The phases come from `threshold`, one more phase than thresholds, or from `labels`, one
+        phase for each. Young's modulus has a value for each phase, Poisson's ratio one for each or
+        one for all, the loss factor likewise or none. An image has `pixel`, a side or (width,
+        height), and a volume has `voxel`, a side or those along x, y and z.
+
+        Raises:
+            RefusedError: With the key that does not fit; no phase is solid; or there are loss
+                factors beside a pore or a rigid phase.
+        """
         self._require_one("threshold", "labels")
         n_phases = len(self.labels or ())
         if self.threshold:
@@ -361,6 +397,8 @@ class ImageCell(Section):
             n_values = len(getattr(self, key) or ())
             allowed = f"one for each of {n_phases} phases"
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
+        # Bounds of E are found between those of the phases. Pores and rigid phases have none on one
+        # side, so that without any other phase nothing is bounded.
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
         # A pore dissipates nothing and a rigid phase is not strained: their loss factors would

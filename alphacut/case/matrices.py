@@ -31,7 +31,23 @@ from alphacut.io.quantity import parse_fuzzy_in_any_unit
 
 
 def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
-    """Factor and array of a pair of texts, a factor and a file as "K.npz" or "K.npz:columns"."""
+    """Return the factor and the matrix of one term of M, K or D.
+
+    Args:
+        value: Pair of texts [FACTOR, FILE]. FACTOR is a product of powers of parameters, such as
+            "Ec*I/l^3". FILE is a matrix file, in the folder of the case; "K.npz:columns" names one
+            array of several in it.
+        info: Context of the case; its `data` has the names of the unknowns if these were accepted.
+
+    Returns:
+        The factor as a function of the parameters, and the array, shape (unknowns, unknowns). The
+        shape is not checked if the names of the unknowns were refused, which is told of their own
+        key.
+
+    Raises:
+        RefusedError: The value is no such pair, the factor is no product of powers, the file is
+            missing or holds no matrix of this shape, or all entries are zero.
+    """
     match value:
         case [str(factor), str(file)]:
             name, _, member = file.partition(":")
@@ -57,6 +73,11 @@ def _require_shape(name: str, array: Array, n: int) -> None:
 
 
 def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
+    """Return the quantity that a parameter of the matrices has in SI, in whatever unit it stands.
+
+    Raises:
+        RefusedError: The value is no quantity.
+    """
     try:
         number, _ = parse_fuzzy_in_any_unit(value)
     except ValueError as error:
@@ -113,9 +134,22 @@ class MatricesSection(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """Return the structure; `modulus` takes the place of parameter E, if there is one.
+        """Return the structure with its fuzzy parameters.
 
-        See `StructureSection.structure`.
+        Args:
+            modulus: Young's modulus in Pa that takes the place of parameter "E", if there is one;
+                None to keep what the case states.
+            loss: Loss factor of the material, for `damping_ratio` "material"; None for a stand-in
+                of 2 %. It is ignored otherwise.
+
+        Returns:
+            The model at the nominal values, and its parameters by name, crisp or fuzzy, with
+            damping ratios as "zeta" or "zeta1", "zeta2" …
+
+        Raises:
+            RefusedError: An output or the direction of the ground names an unknown that is not
+                there, or the matrices make no structure, for example because M is not positive
+                definite.
         """
         damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
         ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
@@ -139,7 +173,9 @@ class MatricesSection(StructureSection):
                 ratios=tuple(ratios),
                 row_factors={name: output.factor for name, output in self.outputs.items()},
             )
-            # the fractions of energy by which the material damps modes need the modes of the model
+            # Where the material makes up a part of the stiffness only, it damps each mode by its
+            # fraction of the strain energy. These fractions need the modes, and so a first model
+            # without damping ratios.
             if damping is not None:
                 ratios = self._material_damping_ratios(damping, model, loss or LOSS_STAND_IN)
                 numbers |= ratios
@@ -156,13 +192,14 @@ class MatricesSection(StructureSection):
         """Return the damping ratios that the loss factor of the material of E gives, by name.
 
         Args:
-            damping: Has the ratio of joints, which is added.
-            model: The structure without these ratios.
+            damping: Has the damping ratio of joints, which is added to each.
+            model: The structure without these ratios, at its nominal values.
             loss: Loss factor of the material.
 
         Returns:
-            "zeta" of all modes if E is in every term of K; else "zeta1" … of each mode, by the
-            fraction of its strain energy in the terms with E.
+            "zeta" of all modes if E is in every term of the stiffness matrix K; else "zeta1",
+            "zeta2" … of each mode in the order of rising frequency, by the fraction of its strain
+            energy in the terms with E. The fractions are those of the nominal model.
 
         Raises:
             RefusedError: E is in no term of K.
@@ -192,7 +229,12 @@ class MatricesSection(StructureSection):
         return np.array([float(direction == self.direction) for direction in directions])
 
     def require_consistent(self) -> None:
-        """Refuse names out of alphabet, no outputs, and a record without a direction."""
+        """Refuse outputs and parameters without usable names, and a record without a direction.
+
+        Raises:
+            RefusedError: There is no output, a name is not of letters, digits and underscores, the
+                ground moves but moves no unknown, or the matrices make no structure.
+        """
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         require_names("matrices.parameters", self.parameters)
         outputs = [Output(name, output.unit) for name, output in self.outputs.items()]
@@ -202,7 +244,15 @@ class MatricesSection(StructureSection):
         _ = self.nominal  # refuses matrices that do not fit together
 
     def require_pattern(self) -> None:
-        """Refuse a direction in which the ground moves no unknown."""
+        """Refuse a direction of the ground in which it moves no unknown.
+
+        Unknowns are named NODE.DIRECTION, such as "5.x". The ground in direction "x" moves all
+        unknowns whose name ends in ".x"; a table gives the displacement of each unknown for a unit
+        displacement of the ground.
+
+        Raises:
+            RefusedError: The direction is missing, or no unknown moves.
+        """
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
         is_moved = bool(self._ground_pattern().any())

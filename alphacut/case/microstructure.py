@@ -50,7 +50,15 @@ class PackingSection(Section):
         return LogNormalRadii(self.smallest_radius, self.largest_radius)
 
     def require_readable(self, *, spheres: bool) -> None:
-        """Refuse a fraction that does not pack, and radii that are none."""
+        """Refuse a fraction too dense for a random packing, and a file of radii that is not read.
+
+        Args:
+            spheres: Whether the particles are spheres, which pack less densely than discs.
+
+        Raises:
+            RefusedError: The fraction is above that of the densest random packing, or the radii of
+                the file or the two limits make no distribution.
+        """
         shape = SPHERES if spheres else DISCS
         fits = self.fraction <= shape.densest
         key = "microstructure.packing.fraction"
@@ -62,7 +70,18 @@ class PackingSection(Section):
     def pack(
         self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
     ) -> Packings:
-        """The packings: of spheres, or else of discs."""
+        """Return independent random packings of particles in a periodic box.
+
+        Args:
+            spheres: Whether to pack spheres in space instead of discs in the plane.
+            seed: Seed of the random numbers.
+            workers: Number of processes; the packings do not depend on it.
+            progress: Called with the completed fraction of the work.
+
+        Raises:
+            RefusedError: As `require_readable`: the fraction is too dense, or there are no radii.
+            FailedError: Particles still overlap after all steps of the packing.
+        """
         self.require_readable(spheres=spheres)
         return pack(
             self.particles,
@@ -76,13 +95,17 @@ class PackingSection(Section):
         )
 
     def require_consistent(self) -> None:
-        """Refuse a file of radii beside their ends, and one end alone or none without a file."""
+        """Refuse radii from two sources or none.
+
+        The radii come from `file`, or from a distribution between `smallest_radius` and
+        `largest_radius`, of which both must then be there.
+        """
         ends = (self.smallest_radius, self.largest_radius)
         fits = None not in ends
         if self.file is not None:
             fits = ends == (None, None)
-        key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
-        require(fits, key, "beside or without ends", allowed)
+        key = "microstructure.packing.file"
+        require(fits, key, "beside or without ends", "a file, or both ends of the radii")
 
 
 class Circles(Section):
@@ -125,7 +148,17 @@ class MicrostructureSection(Section):
         return None
 
     def particles(self, *, spheres: bool, workers: int, progress: Progress) -> Sequence[Particles]:
-        """The packings, or the one section that was measured."""
+        """Return the packings, or the one section of a material whose circles were measured.
+
+        Args:
+            spheres: Whether packed particles are spheres instead of discs. Measured ones are discs.
+            workers: Number of processes that pack.
+            progress: Called with the completed fraction of the packing; never for measured circles.
+
+        Raises:
+            RefusedError: The fraction does not pack, or a file is not read.
+            FailedError: Particles still overlap after all steps of the packing.
+        """
         if self.packing is None:
             measured = self.measured
             assert measured is not None  # one of the three is there

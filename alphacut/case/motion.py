@@ -23,9 +23,6 @@ from alphacut.case.types import (
 )
 from alphacut.io import quantity
 
-MOST_STEPS = 1_000_000
-"""Steps of a simulation; more do not fit into memory."""
-
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -36,6 +33,15 @@ class Tolerance:
 
 
 def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
+    """Return the allowed error that "0.2 mm", "0.05 N" or "0.1 %" states.
+
+    A length or a force is an absolute error in m or N; a number without a unit is a fraction of
+    each peak.
+
+    Raises:
+        RefusedError: The value is another quantity, is fuzzy or not positive, or is a fraction of 1
+            or more.
+    """
     allowed = 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
     try:
         tolerance, unit = quantity.parse_fuzzy_in_any_unit(value, ("m", "N", ""))
@@ -85,18 +91,32 @@ class EnvelopeSection(Section):
     step: Time = Field(description="time step")
 
     def require_steps(self, key: str, duration: float) -> None:
-        """Refuse a duration in s that is no whole number of steps, or more than `MOST_STEPS`."""
+        """Refuse a duration that is no whole number of time steps, or of too many.
+
+        Args:
+            key: Key of the duration, such as "envelope.duration"; "KEY of NAME" for that of a
+                record, which the case cannot change.
+            duration: Length of the simulation in s.
+
+        Raises:
+            RefusedError: The duration is shorter than one step, no multiple of it to 1e-9, or has
+                more than a million steps, which do not fit into memory. The message has a step that
+                fits.
+        """
+        # Envelopes of all outputs on all levels are kept at each step: more do not fit into memory.
+        max_steps = 1_000_000
         steps = duration / self.step
-        is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps  # round-off
-        if not is_multiple or steps > MOST_STEPS:
-            allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
+        # 0.3 s in steps of 0.1 s are 2.9999999999999996 steps: rounding alone is forgiven.
+        is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
+        if not is_multiple or steps > max_steps:
+            allowed = f"whole multiples of envelope.step, up to {max_steps:,} steps"
             if steps < 1:
                 cure = f"envelope.step is longer, {self.step:g} s: mend the unit of either"
                 raise RefusedError(key, f"{duration:g} s", allowed, cure)
             count = round(steps)
             cure = f'write envelope.step = "{duration / count:.9g} s"'
-            if count > MOST_STEPS:
-                cure = f'write envelope.step = "{duration / MOST_STEPS:.3g} s" or more'
+            if count > max_steps:
+                cure = f'write envelope.step = "{duration / max_steps:.3g} s" or more'
             elif " of " not in key:  # the duration of a record is the record's
                 cure += f' or {key} = "{count * self.step:.9g} s"'
             raise RefusedError(key, f"{duration:g} s", allowed, cure)

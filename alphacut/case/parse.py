@@ -19,20 +19,7 @@ from alphacut.case.types import Quantity, Section
 from alphacut.io.files import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
-KINDS = {
-    "bool_type": "true or false",
-    "string_type": "text in quotes",
-    "dict_type": "a table",
-    "model_type": "a section",
-    "model_attributes_type": "a section",
-}
-"""What a key takes, by Pydantic's name of the error."""
 C = TypeVar("C", bound=Section)
-TOML_CURES = {
-    r"=\s*[-+]?[\d.]+\s*[A-Za-z%°µμ±]": 'quantities stand in quotes, as "0.01 s"',
-    r"=\s*(?!true|false|inf|nan)[A-Za-z]": 'texts stand in quotes, as "auto"',
-}
-"""Cure by a pattern in a line that is not TOML."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +38,16 @@ class ParsedCase(Generic[C]):
 
 
 def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> ParsedCase[C]:
-    """Read a TOML case file as the content `model`, with changes ``KEY=VALUE``.
+    """Read a TOML case file as the content `model`, with changes of the command line.
+
+    Args:
+        model: Class of the content; its fields are the sections and keys that are allowed.
+        path: The file. Files that the case names are looked for in its folder.
+        changes: Texts "KEY=VALUE" that replace keys of the file.
 
     Raises:
-        BadInput: With every problem of the case.
+        BadInput: With every problem of the case at once.
+        RefusedError: A change is no "KEY=VALUE", or its key is unknown or given twice.
     """
     path = Path(path)
     text = text_of(path)
@@ -66,7 +59,9 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
         # Pydantic tries each member of a union, whose errors may be the same: each is told once.
         problems: dict[str, RefusedError] = {}
         for x in _refusals(model, error):
-            place = "command line" if _is_below(x.key, changed) else str(path)
+            place = str(path)
+            if _is_below(x.key, changed):
+                place = "command line"
             problem = RefusedError(x.key, x.value, x.allowed, x.cure, place)
             problems[str(problem)] = problem
         raise BadInput(problems.values()) from None
@@ -79,30 +74,48 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
     Raises:
         BadInput: The text is not TOML; it names the file and the line.
     """
-    # tomllib calls itself for nested brackets, of which a text may have more than the stack holds
+    # tomllib calls itself for nested brackets, of which a text may have more than the stack holds:
+    # that is RecursionError, and means bad input here.
     try:
         return tomllib.loads(text)
     except (RecursionError, ValueError) as error:
-        shown, place = "the file", str(path)
+        shown = "the file"
+        place = str(path)
         # an integer of too many digits has no line
         if match := re.search(r"\(at line (\d+), column \d+\)", str(error)):
             place += f":{match[1]}"
             shown = text.splitlines()[int(match[1]) - 1].strip() or shown
         what = str(error).partition(" (at")[0].lower()
-        cure = cure_of(shown, TOML_CURES)
+        # The two mistakes that TOML's own messages do not name: a quantity and a text unquoted.
+        cures = {
+            r"=\s*[-+]?[\d.]+\s*[A-Za-z%°µμ±]": 'quantities stand in quotes, as "0.01 s"',
+            r"=\s*(?!true|false|inf|nan)[A-Za-z]": 'texts stand in quotes, as "auto"',
+        }
+        cure = cure_of(shown, cures)
         problem = RefusedError(shown, f"not TOML: {what}", "", cure, place)
         raise BadInput([problem]) from None
 
 
 def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedError]:
-    """Yield what is wrong by each error of Pydantic; a misspelt key is not missing as well."""
-    # A misspelt key is two errors of Pydantic: an unknown key, and the right one that is missing.
+    """Yield a problem for each error of Pydantic, by the key that has it.
+
+    A misspelt key makes two errors of Pydantic: an unknown key, and the right one that is missing.
+    They become one problem, that of the unknown key, which names the key that may be meant. If no
+    known key is near, it lists the keys of the section.
+
+    Args:
+        model: Class of the content that was validated.
+        error: Its errors.
+    """
     details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
     for key, detail in details:
         if key in suggested:
-            kind = "section" if isinstance(detail["input"], dict) else "key"
+            kind = "key"
+            if isinstance(detail["input"], dict):
+                kind = "section"
+            # A near key of the same section is shown by its last name alone.
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
             if close:
                 yield RefusedError(key, f"an unknown {kind}", "", f"did you mean {close}?")
@@ -139,7 +152,19 @@ def _suggested_key(model: type[Section], key: str) -> str:
 
 
 def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedError:
-    """Return what is wrong with a key whose value is wrong or missing, by the error of Pydantic."""
+    """Return the problem of a key whose value is wrong or missing.
+
+    Args:
+        model: Class of the content that was validated.
+        key: Full name of the key, such as "study[2].fuzzy".
+        detail: Pydantic's error: its kind, the input, and in "ctx" the exception that a validator
+            raised.
+
+    Returns:
+        RefusedError: The one that a validator of this project raised, with `key` where it names
+        none; else one with the value, the allowed values or the description of a missing key, and a
+        hint.
+    """
     context = detail.get("ctx", {})
     cause = context.get("error")
     kind = detail["type"]
@@ -149,16 +174,27 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
         about = keys_of(model).get(_without_indices(key))
         words = about.description if about is not None else None
         return RefusedError(key, None, words or "a section")
-    given = detail["input"]  # as it stood in the file, near enough
-    value = f'"{given}"' if isinstance(given, str) else printable(given).replace("'", '"')
+    given = detail["input"]
+    # The value is shown as TOML has it, which is near enough to how it stood in the file.
+    value = printable(given).replace("'", '"')
+    if isinstance(given, str):
+        value = f'"{given}"'
     if kind == "literal_error":
         allowed = str(context["expected"]).replace("'", '"')
         names = re.findall(r'"([^"]+)"', allowed)
         return RefusedError(key, value, allowed, suggestion(str(given), names))
-    if kind == "tuple_type":
+    if kind == "tuple_type":  # one entry without the brackets of an array
         cure = f"write {key.rpartition('.')[2]} = [{value}]"
         return RefusedError(key, value, "an array", cure)
-    return RefusedError(key, value, str(cause or KINDS.get(kind, detail["msg"])))
+    # What a key takes, by the kind of Pydantic's error; its own messages speak of Python's types.
+    allowed_kinds = {
+        "bool_type": "true or false",
+        "string_type": "text in quotes",
+        "dict_type": "a table",
+        "model_type": "a section",
+        "model_attributes_type": "a section",
+    }
+    return RefusedError(key, value, str(cause or allowed_kinds.get(kind, detail["msg"])))
 
 
 def _full_key(location: tuple[int | str, ...]) -> str:
@@ -183,7 +219,14 @@ def _is_below(key: str, changed: Sequence[str]) -> bool:
 def apply_changes(
     model: type[Section], table: dict[str, object], changes: Sequence[str]
 ) -> tuple[str, ...]:
-    """Put every change KEY=VALUE into the table of a case, in place, and return the keys.
+    """Put every change KEY=VALUE into the table of a case, in place, and return the changed keys.
+
+    Args:
+        model: Class of the content, for the known keys.
+        table: The parsed case. Sections that a key needs are added.
+        changes: Texts "KEY=VALUE" with full keys such as "cell.matrix_modulus". VALUE is TOML,
+            words separated by commas, or a text without quotes. Keys of [[study]] cannot be
+            changed.
 
     Raises:
         RefusedError: A change has no value, or its key is unknown or given before.
@@ -207,7 +250,11 @@ def apply_changes(
 
 
 def _set_key(table: object, key: str, value: object) -> None:
-    """Set a key by its full name in place; nothing is set below a value that is no table."""
+    """Set a key by its full name, such as "cell.fraction", in a table, in place.
+
+    Missing tables are added. If an outer name has a value that is no table, nothing is set:
+    validation refuses that value.
+    """
     *outer, last = key.split(".")
     for name in outer:
         if not isinstance(table, dict):
@@ -218,11 +265,16 @@ def _set_key(table: object, key: str, value: object) -> None:
 
 
 def _parse_value(text: str) -> object:
-    """Return the value of a text: of TOML, an array of words with commas, or the text itself."""
+    """Return the value of a text of the command line.
+
+    It is the TOML value that the text is, such as 0.5, true or [1, 2]; else a list if the text is
+    words separated by commas, such as "E,m1"; else the text itself.
+    """
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (RecursionError, ValueError):
         pass
+    # Quantities with brackets or quotes in them are no lists of words: "[75, 80] GPa" stays a text.
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):
         return [_parse_value(part.strip()) for part in text.split(",")]
     return text
@@ -235,7 +287,15 @@ def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
 
 
 def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
-    """Yield full name, field, and whether it is a section, of each key below a class."""
+    """Yield the keys below a class of sections, each before the keys inside it.
+
+    Args:
+        prefix: Beginning of the full names, empty or with its dot, such as "cell.".
+        model: The class. A key may take sections of several classes: their keys all follow.
+
+    Yields:
+        Full name such as "cell.fraction", Pydantic's field, and whether the key takes a section.
+    """
     for key, info in model.described_fields().items():
         name = f"{prefix}{key}"
         parts = [info.annotation, *_annotation_parts(info.annotation)]

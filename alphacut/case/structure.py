@@ -49,9 +49,6 @@ STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 LOSS_STAND_IN = Crisp(0.02)
 """Loss factor of a material whose own is yet to be computed."""
-MAX_RATIO_OF_STOREYS = 300.0
-"""Ratio of masses, stiffnesses … of two storeys up to which no unit is doubted; k, M and G of units
-are thousands, and an isolator is some 50 times softer than a storey."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +59,26 @@ class MaterialDamping:
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
-    """Return one ratio of all modes or one of each; or "material", with the ratio of joints."""
+    """Return the damping ratios over the critical one that a value of a case states.
+
+    Args:
+        value: A ratio of all modes, such as "2 %"; a list with a text for each mode from the
+            slowest on; or "material", to take the ratios from the loss factor of the material, or
+            "material + 1 %" with the ratio of the joints added.
+
+    Returns:
+        MaterialDamping for "material"; else one fuzzy ratio, or one for each mode.
+
+    Raises:
+        RefusedError: A ratio is no number from 0 to below 1.
+    """
     if isinstance(value, str):
         word, plus, joints = value.partition("+")
         if word.strip() == "material":
             if plus:
                 return MaterialDamping(_ratio(joints.strip()))
             return MaterialDamping()
+    # A list of numbers alone is one fuzzy ratio, such as the triangle [0.01, 0.02, 0.03].
     if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
         return tuple(_ratio(entry) for entry in value)
     return (_ratio(value),)
@@ -172,11 +182,13 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
 def damping_ratios_by_name(
     ratios: MaterialDamping | tuple[FuzzyNumber, ...], loss: FuzzyNumber | None
 ) -> dict[str, FuzzyNumber]:
-    """Return damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
+    """Return damping ratios by the names of parameters: "zeta", or "zeta1", "zeta2" … of each mode.
 
     Args:
-        ratios: The ratios of the case.
-        loss: Loss factor of the material, for damping by it; a stand-in if None.
+        ratios: One ratio of all modes, one for each mode from the slowest on, none, or the ratio of
+            the joints that is added to the damping by the material.
+        loss: Loss factor η of the material, from which the ratio sin(½ arctan η) of all modes
+            follows; None for a stand-in of 2 %. It is used for damping by the material only.
     """
     if isinstance(ratios, MaterialDamping):
         ratios = (damping_from_loss(loss or LOSS_STAND_IN, joints=ratios.joints),)
@@ -296,10 +308,22 @@ class Frame(StructureSection):
         return any(any(start.support) for start in (*self.displacements, *self.velocities))
 
     def warnings(self, structure: Structure | None) -> Iterator[str]:
-        """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta)."""
+        """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta).
+
+        Doubtful are masses, lengths, second moments, stiffnesses or yield forces of two storeys
+        that differ more than 300-fold, and a storey above 100 m.
+
+        Args:
+            structure: The frame with its fuzzy parameters; None while its modulus is unknown, when
+                nothing is said of weights. If gravity is part of the frame, nothing is said of them
+                either.
+        """
+        # Wrong prefixes k, M and G are factors of a thousand and more, while an isolator is some 50
+        # times softer than a storey: 300 lies between both.
+        max_ratio = 300.0
         for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
             sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
-            if max(sizes) > MAX_RATIO_OF_STOREYS * min(sizes):
+            if max(sizes) > max_ratio * min(sizes):
                 ratio = max(sizes) / min(sizes)
                 yield f"frame.{key} of two storeys differ {ratio:,.0f}-fold: is a unit wrong?"
         tallest = max((height.nominal for height in self.lengths or ()), default=0.0)
@@ -308,6 +332,8 @@ class Frame(StructureSection):
             return
         if self.gravity or self.lengths is None or structure is None:
             return
+        # The coefficients are the largest in the supports of all parameters: if they are small,
+        # the weights may be left out at every value that the inputs may have.
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
         yield from self._weight_warnings(frame.stability_coefficients(ends))
@@ -344,16 +370,32 @@ class Frame(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """Return the frame with its fuzzy parameters, and the heights of storeys by their drifts.
+        """Return the frame with its fuzzy parameters, and the heights of its storeys.
 
-        See `StructureSection.structure`.
+        Args:
+            modulus: Young's modulus in Pa; None for that of the section, or a stand-in of 20 GPa
+                where the section has none. It is ignored if stiffnesses are given.
+            loss: Loss factor of the material, for `damping_ratio` "material"; None for a stand-in
+                of 2 %. It is ignored otherwise.
+
+        Returns:
+            The model at the nominal values; its parameters by name, such as "m1" or "q3_0"; and the
+            heights in m by the names of the drifts and residual drifts of the storeys.
+
+        Raises:
+            RefusedError: The values make no frame, for example because a number of values does not
+                fit the number of floors, or a storey buckles under its weight. The key is that of
+                the case.
         """
-        # numbers by floor or storey, by the names of the frame's own arguments
+        # One number for each floor or storey, by the names of the arguments of `StoreyFrame`.
         lists = {name: self.per_floor(getattr(self, NAMES.get(name, name))) for name in SYMBOLS}
-        lists["second_moment"] = self.second_moment or ()  # of all storeys, where it is one
-        # given stiffnesses need neither columns nor a modulus
+        # A single second moment is one parameter "I" of all storeys, so it is not repeated.
+        lists["second_moment"] = self.second_moment or ()
+        # The stiffness of a storey follows from columns and modulus, 12 c E I / l³ of c columns
+        # clamped at both ends; where it is given, it needs neither.
         if self.stiffness:
-            lists["columns"], young = (), self.modulus
+            lists["columns"] = ()
+            young = self.modulus
         else:
             young = modulus or self.modulus or STAND_IN
         ratios = damping_ratios_by_name(self.damping_ratio, loss)
@@ -373,7 +415,8 @@ class Frame(StructureSection):
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
-                # whether a storey buckles under its weight is not to be judged by a stand-in
+                # A storey may buckle under its weight with the modulus of a stand-in, and stand
+                # with that which a stage computes.
                 gravity=0.0 if young is STAND_IN else self.gravity,
             )
         except RefusedError as error:
@@ -390,7 +433,7 @@ class Frame(StructureSection):
         for name, numbers in lists.items():
             for z, number in enumerate(numbers, start=1):
                 stated[SYMBOLS[name].format(z)] = number
-        # what the case leaves out has the frame's default, such as q1_0 = 0
+        # What the case leaves out has the frame's own default, such as q1_0 = 0.
         by_name = {name: stated.get(name) or Crisp(x) for name, x in model.parameters.items()}
         heights: dict[str, FuzzyNumber] = {}
         for z, height in enumerate(lists["lengths"], start=1):
@@ -398,13 +441,21 @@ class Frame(StructureSection):
         return Structure(model, by_name, heights)
 
     def require_consistent(self) -> None:
-        """Refuse a frame without damping, with contradictory damping or impossible values."""
-        # ζ of the material is that of a frame whose strain energy is all in its columns
+        """Refuse a frame without a word on damping, or with contradictory or impossible values.
+
+        Raises:
+            RefusedError: Damping by the material stands beside given stiffnesses; dampers and
+                `damper_placement` do not stand together; no key of damping is there, not even with
+                0; or the values make no frame.
+        """
+        # The damping ratio that follows from the loss factor of the material is that of a frame
+        # whose strain energy is all in columns of this material: given stiffnesses do not tell.
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"
         require(has_columns, "frame.damping_ratio", value, allowed)
-        # undamped responses are unusual: whoever wants one says so, as "0 %"
+        # Undamped responses are unusual, and a forgotten key would make them: whoever wants one
+        # says so, as "0 %".
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
         keys = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
@@ -426,7 +477,13 @@ class Pendulum(StructureSection):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The pendulum; see `StructureSection`."""
+        """Return the pendulum, whose one output is the force in the bar in N.
+
+        Both arguments are ignored: a pendulum takes no modulus and no loss factor.
+
+        Raises:
+            RefusedError: The values make no pendulum.
+        """
         keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
         arguments = (*keys[:4], "phi0", "omega0")
         numbers = [getattr(self, key) for key in keys]

@@ -24,19 +24,32 @@ STRUCTURES = {
 
 
 def with_structures(content: type[C], *, built: bool) -> type[C]:
-    """Return a class of cases with a field for the section of each kind of structure.
+    """Return a class of cases that also has a field for the section of each kind of structure.
 
     Args:
-        content: The class without them. They stand after the fields that it inherits.
-        built: Whether sections are built, or kept as they stand in the file.
+        content: The class without them.
+        built: Whether the sections are validated and built, for which the modules of the structures
+            are imported; otherwise they are kept as the tables that stand in the file.
+
+    Returns:
+        The class. The new fields stand after those that `content` inherits and before its own;
+        errors are told in this order.
     """
     return cast("type[C]", _whole_case(content, tuple(STRUCTURES.items()), built=built))
 
 
-@cache  # the class takes 50 ms, and tests read many cases
+@cache  # Pydantic takes 50 ms for the class, and tests read many cases
 def _whole_case(
     content: type[CellContent], structures: tuple[tuple[str, str], ...], *, built: bool
 ) -> type[CellContent]:
+    """Return the class of `with_structures`, which is created once for each set of arguments.
+
+    Args:
+        content: Class of cases without sections of structures.
+        structures: Pairs of the name of a section, such as "frame", and of the place "module:Class"
+            of its class.
+        built: Whether the fields take sections of these classes, or any value.
+    """
     fields: dict[str, Any] = {}
     for name, place in structures:
         fields[name] = (resolve_name(place) | None if built else object, None)

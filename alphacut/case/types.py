@@ -71,12 +71,17 @@ class Section(BaseModel):
 
 
 def _lines_below_keys(section: type) -> dict[str, str]:
-    """Return the text below each key of a section's class that has one, by key."""
+    """Return the text that stands below each key in the source of a section's class, by key.
+
+    The text is a string that follows the annotated assignment of the key, without its indentation.
+    Keys without such a text are left out. There is none if the class is no section or has no source
+    file.
+    """
     if not issubclass(section, Section):
         return {}
     try:
         [definition] = ast.parse(textwrap.dedent(inspect.getsource(section))).body
-    except (OSError, TypeError):  # of a class that no file defines
+    except (OSError, TypeError):  # of a class that no file defines, as `create_model` makes them
         return {}
     lines: dict[str, str] = {}
     assert isinstance(definition, ast.ClassDef)
@@ -133,15 +138,23 @@ class Quantity:
     def parse(self, value: object) -> FuzzyNumber | float | int:
         """Return the quantity in SI that a value of the case states, such as "80 GPa ± 5 %".
 
+        Returns:
+            A fuzzy number if `fuzzy` is set, an int if `is_integer` is, else a float.
+
         Raises:
-            RefusedError: The value is no such quantity, or leaves the range.
+            RefusedError: The value is no such quantity, or it leaves the range at either end of its
+                support.
         """
         try:
             number = self._parsed(value)
         except ValueError as error:
             cure = f"{error}; {self.cure}" if self.cure else str(error)
             raise RefusedError("", value, self.allowed, cure) from None
-        ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
+        ends: list[float] = []
+        if isinstance(number, FuzzyNumber):
+            ends.extend(number.support)
+        else:
+            ends.append(number)
         is_inside = all(self._contains(end) for end in ends)
         require(is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value))
         return number
@@ -159,7 +172,14 @@ class Quantity:
         return f'write "{value} %" or {ratio:g}' if is_meant else ""
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
-        """Return the quantity of any size that a value states, in SI, or raise ValueError."""
+        """Return the quantity that a value states, in SI, whether or not it lies in the range.
+
+        Raises:
+            ValueError: The value is no such quantity. An integer is a number without quotes; a
+                number without a unit is one without quotes, a percentage, or a fuzzy number in
+                brackets.
+        """
+        # True is an int in Python, but no number in TOML.
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
             return value
         reason = "write a number without quotes and without a unit"
@@ -204,13 +224,22 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def case_file(value: object, info: ValidationInfo) -> Path:
-    """Path of a file that the case names, relative to the folder of the case."""
+    """Return the path of a file that the case names, relative to the folder of the case.
+
+    Args:
+        value: Name of the file as the case has it.
+        info: Context of the validation, whose "folder" is the folder of the case.
+
+    Raises:
+        RefusedError: The value is no text, or names no file that can be reached.
+    """
     folder: Path = (info.context or {}).get("folder", Path())
     reason = ""
     try:
         is_file = isinstance(value, str) and (folder / value).is_file()
     except OSError as error:  # of a name that is too long, or a folder that may not be entered
-        is_file, reason = False, (error.strerror or str(error)).lower()
+        is_file = False
+        reason = (error.strerror or str(error)).lower()
     if not isinstance(value, str) or not is_file:
         raise RefusedError("", value, f"a file, from the folder {folder.absolute()}", reason)
     return folder / value
