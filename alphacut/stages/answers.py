@@ -75,8 +75,18 @@ class Response:
 
 
 def decision(section: DecisionSection, response: Response, _: Progress) -> Decision:
-    """Return the answer to [decision]."""
-    structure, found = response.structure, response.suite or response.peaks
+    """Return the answer to [decision]: possibility and necessity that each limit is exceeded.
+
+    Args:
+        section: Its limits.
+        response: Its `suite` is judged if there is one, else its `peaks`, which must be there.
+        _: Progress, which is not reported: the answer follows from known peaks.
+
+    Raises:
+        RefusedError: A limit does not fit the structure.
+    """
+    structure = response.structure
+    found = response.suite or response.peaks
     assert found is not None
     limits = section.limits_of(structure)
     return decide(
@@ -88,7 +98,20 @@ def decision(section: DecisionSection, response: Response, _: Progress) -> Decis
 
 
 def probability_of(section: ProbabilitySection, response: Response, tick: Progress) -> Probability:
-    """Return the answer to [probability]."""
+    """Return the answer to [probability]: bounds of the probability that limits are exceeded.
+
+    Args:
+        section: Its limits, the number of samples, and the names of the inputs that are random. The
+            membership function of a random input gives the shape of its density; all other fuzzy
+            inputs of the envelope stay fuzzy.
+        response: The structure, and the α-levels, duration and time step of its response. Its peaks
+            are not used, since samples are computed anew.
+        tick: Called with the completed fraction of the work.
+
+    Raises:
+        RefusedError: A limit or a random input does not fit the structure.
+        FailedError: A response could not be computed.
+    """
     structure = response.structure
     random = structure.inputs(section.random, "probability.random")
     return probability(
@@ -104,7 +127,18 @@ def probability_of(section: ProbabilitySection, response: Response, tick: Progre
 
 
 def tolerances_of(section: TolerancesSection, response: Response, tick: Progress) -> Tolerances:
-    """Return the answer to [tolerances]."""
+    """Return the answer to [tolerances]: the largest scale of the supports that keeps the limits.
+
+    Args:
+        section: Its limits, and the largest scale that is tried; scale 1 is the supports of the
+            case.
+        response: The structure, its inputs, and the peaks that are known at scale 1.
+        tick: Called with the completed fraction of the work.
+
+    Raises:
+        RefusedError: A limit does not fit the structure, or an input is inadmissible at a scale.
+    """
+    # The known peaks hold for the lowest α-cut, which is the support only at α = 0.
     is_known = response.task.section.alpha[0] == 0
     return tolerances(
         response.structure.model,
@@ -118,7 +152,17 @@ def tolerances_of(section: TolerancesSection, response: Response, tick: Progress
 
 
 def fragility_answer(section: FragilitySection, response: Response, _: Progress) -> Fragility:
-    """Return the answer to [fragility]; refuse a question without records."""
+    """Return the answer to [fragility]: the fraction of records that exceed limits, over intensity.
+
+    Args:
+        section: Its limits and the intensity measure.
+        response: The peaks under each record in `suite` and, of a frame that yields, `increments`.
+        _: Progress, which is not reported: all responses are known.
+
+    Raises:
+        RefusedError: The case has no suite of records or no linear structure, or a limit does not
+            fit.
+    """
     linear = response.structure.linear
     if response.suite is None or linear is None:
         raise RefusedError("fragility", "without records", "a section [records]")

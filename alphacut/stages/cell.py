@@ -28,8 +28,6 @@ from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import FractionMap, RadiusMap, ThetaDistribution, gauss_rule
 
 GPA = 1e9
-BOUNDS_SLACK = 5e-3
-"""Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
 
 
 class References(TypedDict, total=False):
@@ -87,12 +85,17 @@ class CellProblem:
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
-        """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
+        """Return the fuzzy parameters of the cell by name, in SI units.
+
+        If all are crisp, a single crisp one stands for them: the modulus of the inclusion, else of
+        the matrix, else any. There is none at all only of a mesh whose phases have no fuzzy
+        numbers.
+        """
         numbers = self.numbers
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         if fuzzy:
             return fuzzy
-        # a campaign has one input at least; of crisp cells it is a modulus at one value
+        # A campaign of samples has one input at least; of crisp cells it is one at a single value.
         for name in ("inclusion_modulus", "matrix_modulus", *numbers):
             if name in numbers:
                 return {name: numbers[name]}
@@ -133,7 +136,7 @@ class CellProblem:
         return AVERAGES[self.average]
 
     def model(self, *, estimate: bool = True, parallel: bool = False) -> AnyModel:
-        """Return the model that the sections name.
+        """Return the model that the sections name: prisms, slices or series, or an own mesh.
 
         Args:
             estimate: Whether it declares errors, if need be by a reference solution.
@@ -147,15 +150,29 @@ class CellProblem:
                 return self._round_model(self.cell, estimate=estimate, parallel=parallel)
             from alphacut.rve.prism.own_mesh import MeshModel
 
-            assert self.mesh.file is not None
+            assert self.mesh.file is not None  # the only other kind of cell is one of a mesh file
             options: Any = {"petsc": self.petsc, "parallel": parallel}
             return MeshModel(self.mesh.file, refine=self.mesh.refine, **options)
         except ImportError as error:
-            value, cure = self.modulus.method, missing(error)
+            value = self.modulus.method
+            cure = missing(error)
             raise RefusedError("modulus.method", value, "series", cure) from None
 
     def _round_model(self, cell: RoundCell, *, estimate: bool, parallel: bool) -> AnyModel:
-        """Return the model of a cell with one particle; raise ImportError as `ModelEntry.load`."""
+        """Return the model of a cell with one particle, at the resolution that the case states.
+
+        Args:
+            cell: Shape of the particle and phases.
+            estimate: Whether it declares errors.
+            parallel: Whether all MPI ranks work on one cell together.
+
+        Returns:
+            The model of the name `modulus.method`; of "auto" the preferred one of those that can
+            solve this kind of particle, which is the analytic series where there is one.
+
+        Raises:
+            ImportError: The model needs a library that is not installed.
+        """
         fitting = fitting_models(cell.particle_kind, is_isotropic=cell.stiffness is None)
         name = self.modulus.method
         if name == "auto":
@@ -174,11 +191,23 @@ class CellProblem:
         return fitting[name].load().with_resolution(resolution)
 
     def solve(self, **options: bool) -> HomogenisedStiffness:
-        """Return the homogenised stiffness at the nominal values; `options` as of `model`."""
+        """Return the homogenised stiffness at the nominal values of all parameters.
+
+        Its E and ν are those of the average that the case asks for.
+
+        Args:
+            options: `estimate`, whether errors are declared, and `parallel`, whether all MPI ranks
+                work on one cell together; as of `model`.
+
+        Raises:
+            RefusedError: The model needs a library that is not installed, or cannot solve the cell.
+            FailedError: A linear system was not solved.
+        """
         model: Any = self.model(**options)
         if isinstance(self.cell, MeshedCell):
             result: HomogenisedStiffness = model.solve(self.nominal_radius, self.nominal_phases)[0]
         else:
+            # Models solve cells with several inclusions of the same geometry at once: here is one.
             cell = self.nominal
             result = model.solve(cell.radius_map, cell.matrix, [cell.inclusion])[0]
         if self.average is None:
@@ -186,15 +215,20 @@ class CellProblem:
         return result.with_average(self.average)
 
     def references(self) -> References:
-        """Return the particle fraction and Hashin–Shtrikman bounds of E at the nominal inputs.
+        """Return the particle fraction and the Hashin–Shtrikman bounds of E at the nominal inputs.
 
-        The bounds are at the stated fraction, else at the mean fraction of the radius map. Of
-        anisotropic phases there is `fraction` alone; nothing of a mesh from a file.
+        Returns:
+            `fraction`, the mean over θ of the fraction of the radius map: of the volume for
+            spheres, else of the area. `fraction_of_case`, if the case states one.
+            `hashin_shtrikman_E_GPa`, the lower and upper bound of E in GPa at the stated fraction,
+            else at the mean one; missing if a phase is anisotropic. Nothing at all for a mesh from
+            a file.
         """
         if isinstance(self.cell, MeshedCell):
             return {}
         radius_map = self.nominal.radius_map
-        # the mean over θ of a fraction that is smooth in θ: Gauss quadrature with its distribution
+        # The fraction is smooth in θ, so that Gauss quadrature with the density of θ as its weight
+        # converges exponentially: 40 nodes give the mean to rounding.
         rule = gauss_rule(radius_map.distribution, points=40)
         is_space = self.cell.particles == "spheres"
         if is_space:
@@ -208,14 +242,22 @@ class CellProblem:
             return found
         if self.stated_fraction is not None:
             fraction = found["fraction_of_case"] = self.stated_fraction
-        # Hashin and Shtrikman (1963) of space; Hashin (1965) of the plane across fibres
+        # These bounds are by Hashin and Shtrikman (1963) in space, and by Hashin (1965) in the
+        # plane across fibres. Both hold for isotropic composites.
         bounds = reference_bounds(phases, fractions=[1 - fraction, fraction], space=is_space)
         lower, upper = bounds.young
         found["hashin_shtrikman_E_GPa"] = lower / GPA, upper / GPA
         return found
 
     def require_mesh(self) -> None:
-        """Refuse a mesh file that is no periodic cell of prisms, or does not fit [cell.phases]."""
+        """Refuse a mesh file that is no periodic cell of prisms, or does not fit [cell.phases].
+
+        Without `mesh.file` there is nothing to refuse.
+
+        Raises:
+            RefusedError: The file is not read or no such mesh, a physical group has no phase, the
+                range of θ is not that of the case, or a library for meshes is missing.
+        """
         if self.mesh.file is None:
             return
         try:
@@ -227,7 +269,8 @@ class CellProblem:
         try:
             grid = read_grid(self.mesh.file)
         except MeshError as error:
-            value, allowed = f"{self.mesh.file.name}: {error.what}", "a periodic cell of prisms"
+            value = f"{self.mesh.file.name}: {error.what}"
+            allowed = "a periodic cell of prisms"
             raise RefusedError("mesh.file", value, allowed, error.cure) from None
         try:
             mesh_law(grid, self.nominal_radius)  # both refuse what does not fit
@@ -261,16 +304,18 @@ def isotropic_label(average: str) -> str:
 
 
 def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:
-    """Refuse E of spheres outside the Hashin–Shtrikman bounds of the fraction that a case states.
+    """Refuse E of spheres outside the Hashin–Shtrikman bounds at the fraction that a case states.
 
-    E is outside by more than `BOUNDS_SLACK` where the radius map holds another fraction, since
-    cells denser than any cube are cut off, or because the mean over cells with different spheres
-    need not obey the bounds.
+    E can lie outside because the radius map holds another fraction than the case states, since
+    cells denser than any cube are cut off; or because the mean over cells with different spheres
+    need not obey the bounds. Half a per cent is forgiven: packings meet a fraction no better.
 
     Args:
         young: Lower and upper bound of E at the nominal inputs, in GPa.
-        references: The bounds.
-        particles: Particles as the case has them.
+        references: Bounds of E in GPa as `hashin_shtrikman_E_GPa`; the stated fraction as
+            `fraction_of_case`, without which nothing is checked; and that of the radius map as
+            `fraction`.
+        particles: Particles as the case has them; nothing is checked unless they are "spheres".
 
     Raises:
         RefusedError: E is outside.
@@ -279,7 +324,8 @@ def require_bounds(young: tuple[float, float], references: References, particles
         return
     low, high = references["hashin_shtrikman_E_GPa"]
     fraction = references["fraction_of_case"]
-    if young[1] < low * (1 - BOUNDS_SLACK) or young[0] > high * (1 + BOUNDS_SLACK):
+    slack = 5e-3
+    if young[1] < low * (1 - slack) or young[0] > high * (1 + slack):
         value = f"{young[0]:.5g} GPa, of a map that holds {references['fraction']:.4g}"
         limits = f"Hashin–Shtrikman's {low:.5g} … {high:.5g} GPa at {fraction:g}"
         cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"

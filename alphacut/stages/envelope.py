@@ -91,7 +91,7 @@ class EnvelopeTask:
     limited: tuple[str, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
-        """Return the error of the envelope that the case allows.
+        """Return the error of the envelope that the case allows, or a thousandth of each peak.
 
         Raises:
             RefusedError: It is in the unit of no output.
@@ -109,12 +109,29 @@ class EnvelopeTask:
         return same_inputs and self.duration == section.duration
 
     def compute(self, structure: Structure, context: StageContext) -> StageResult[EnvelopeResult]:
-        """Compute the envelope as a dataset, and the peaks of its outputs."""
-        end = 0.5 if self.limited else 1.0  # a second analysis is that of limited peaks
+        """Compute the envelope of the outputs over time, and the bounds of their peaks.
+
+        Args:
+            structure: The structure with its fuzzy parameters.
+            context: Its `tick` is called with the completed fraction of the work.
+
+        Returns:
+            The numbers of the envelope as `EnvelopeResult`, in SI units, and the dataset with its
+            axes alpha, output and time.
+
+        Raises:
+            RefusedError: An input, an output or the tolerance does not fit the structure.
+            FailedError: A response could not be computed.
+        """
+        # The peaks that questions limit may take a second analysis, for about the same time.
+        end = 1.0
+        if self.limited:
+            end = 0.5
         arguments = self.arguments(structure) | {"progress": subprogress(context.tick, 0.0, end)}
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
-        # the lowest level contains all others, so its extremes are those of the envelope
+        # α-cuts are nested: the lowest level contains all others, so that its extremes and its
+        # largest error are those of the whole envelope.
         data = result.to_dataset()
         lowest = data.isel(alpha=0)
         names = [str(name) for name in data["output"].values]
@@ -141,14 +158,29 @@ class EnvelopeTask:
     def _peaks(
         self, structure: Structure, envelope: frame.Envelope, progress: Progress
     ) -> dict[str, Peak]:
-        """Return the peaks of an envelope; those of limited outputs by a second proof if loose."""
-        outputs = [str(name) for name in envelope.outputs]  # of others `close_peaks` has the peaks
+        """Return the bounds of the peaks over time, by name.
+
+        All outputs of the envelope have the peak of their magnitude, such as "q3". Those that
+        questions limit may also be "max q3" or "min q3", the largest and the smallest value. If a
+        limited peak is not guaranteed within `PEAK_ERROR`, it is bounded again by a proof for these
+        peaks alone, and the tighter of both bounds is returned.
+
+        Args:
+            structure: The structure with its fuzzy parameters.
+            envelope: Its envelope.
+            progress: Called with the completed fraction of the second proof.
+        """
+        # Limited outputs that are not observed have no envelope: their peaks come from the proof.
+        outputs = [str(name) for name in envelope.outputs]
         signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
         found = peaks(envelope, [*outputs, *signed])
-        # a second proof of many inputs is hardly tighter: the number of its sub-boxes ends it
-        has_many_inputs = len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS
-        gap = np.inf if has_many_inputs else PEAK_ERROR
-        is_searched = envelope.searched_peaks is not None  # a second search finds no more
+        # A second proof of many inputs is hardly tighter, since the largest number of sub-boxes
+        # ends it: with an infinite gap any guaranteed peak is taken as it is.
+        gap = PEAK_ERROR
+        if len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS:
+            gap = np.inf
+        # Where the method has searched the peaks themselves, a second search finds no more.
+        is_searched = envelope.searched_peaks is not None
         limited = [x for x in self.limited if not is_searched or x not in found]
         if loose := loose_peaks(found, limited, gap):
             found = tightest(found, replace(self, limited=loose).close_peaks(structure, progress))
@@ -161,16 +193,34 @@ class EnvelopeTask:
         return StageResult(self.close_peaks(structure, context.tick))
 
     def arguments(self, structure: Structure) -> Document:
-        """Return the arguments of `frame.envelope` and `frame.require_envelope` from the case."""
-        section, method = self.section, self.section.method
+        """Return the arguments of `frame.envelope` and `frame.require_envelope`, by name.
+
+        Args:
+            structure: The structure with its fuzzy parameters, which must have the inputs of the
+                task.
+
+        Returns:
+            Model, fuzzy inputs, duration and time step in s, α-levels, method and integrator; and
+            the tolerance as a number, if the method takes one.
+
+        Raises:
+            RefusedError: An input is unknown or crisp, or the tolerance is in the unit of no
+                output.
+        """
+        section = self.section
+        method = self.section.method
         arguments = {**self._response(structure), "model": structure.model, "method": method}
         arguments["integrator"] = section.integrator
-        # without a tolerance in the case, method auto takes any guaranteed gap
+        # Without a tolerance in the case, method auto takes any guaranteed bounds as they are: a
+        # tolerance that nobody asked for would make it search on.
         takes_any_gap = method == "auto" and section.tolerance is None
         if not takes_any_gap and hasattr(frame.METHODS[method], "tolerance"):
             tolerance = self.tolerance(structure).value
-            # a follower takes it as the smallest gain for which it computes a trajectory
-            arguments["tolerance"] = tolerance * section.gain if method in FOLLOWERS else tolerance
+            # A follower takes it as the smallest gain for which it computes a trajectory. Gains of
+            # several trajectories add up, so that each may be a fraction of the tolerance only.
+            if method in FOLLOWERS:
+                tolerance *= section.gain
+            arguments["tolerance"] = tolerance
         return arguments
 
     def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
@@ -180,7 +230,14 @@ class EnvelopeTask:
         return close_peaks(structure.model, names=self.limited, progress=progress, **response)
 
     def _response(self, structure: Structure) -> dict[str, Any]:
-        """Return the arguments that say which response is meant, by name."""
+        """Return the arguments that say which response is meant, by name.
+
+        These are the fuzzy parameters as `inputs`, in SI units, `duration` and `step` in s, and the
+        levels `alpha`.
+
+        Raises:
+            RefusedError: An input is unknown or crisp.
+        """
         return {
             "inputs": structure.inputs(self.fuzzy),
             "duration": self.duration,
@@ -223,17 +280,25 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
 def require_tolerance(
     result: StageResult[EnvelopeResult], task: EnvelopeTask, structure: Structure
 ) -> None:
-    """Require the declared errors of an envelope within the tolerance, where the case names one.
+    """Require that the declared errors of an envelope are within the tolerance of the case.
 
-    A larger error of a Graph Follower is a warning: it takes the tolerance only as the smallest
-    gain for which it computes a trajectory. So is one of a nonlinear system.
+    Without a tolerance there is nothing to require. A tolerance in m or N applies to the outputs in
+    this unit; one without a unit is a fraction of the largest peak of each output. A larger error
+    of a Graph Follower is a warning only, since it takes the tolerance as the smallest gain for
+    which it computes a trajectory, and so is one of a nonlinear system.
+
+    Args:
+        result: Its `arrays` have the error of each output, over α and time, in SI units, and its
+            `numbers` the peaks with theirs.
+        task: The tolerance and the method.
+        structure: The structure, for the units of its outputs.
 
     Raises:
         FailedError: An error of another method is larger.
+        RefusedError: The tolerance is in the unit of no output.
     """
     if task.section.tolerance is None:
         return
-    # 1e-9 of the tolerance is left to the rounding of the errors' own computation
     allowed = task.tolerance(structure)
     data = result.arrays
     errors = data["error"].max(("alpha", "time")).values
@@ -244,6 +309,7 @@ def require_tolerance(
         if not allowed.unit:
             error = error / peak.upper.max()
         has_unit = allowed.unit in ("", result.numbers.units[name])
+        # 1e-9 of the tolerance is left to the rounding of the errors' own computation.
         if not has_unit or error <= allowed.value * (1 + 1e-9):
             continue
         what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"

@@ -31,12 +31,17 @@ class Material(NamedTuple):
 
 
 def foreseen_material(content: Content) -> Material | None:
-    """Return what the structure takes from the cell at the cell's nominal values.
+    """Return the material of the structure at the nominal values of the cell, from a fast model.
 
-    It comes from the series, which takes milliseconds.
+    The analytic series solves the cell in milliseconds, so that `check` can use it.
 
     Returns:
-        The material; None where the series does not solve the cell.
+        Young's modulus in Pa and the loss factor, each None where the structure does not take it
+        from the cell; or None alone where the series does not solve the cell, or the radius map is
+        yet to be computed.
+
+    Raises:
+        RefusedError: The cell cannot be solved.
     """
     if content.has_stated_modulus and not content.has_material_damping:
         return Material()
@@ -44,12 +49,14 @@ def foreseen_material(content: Content) -> Material | None:
     has_map = cell is not None and bool(content.radius_map or cell.fraction_map)
     if cell is None or "series" not in cell.methods or not has_map:
         return None
-    # an error of E of 1e-4 is far below what a period or a step is judged by
+    # A period, or whether a time step is fine enough, is judged by two digits: an error of E of
+    # 1e-4 is far below that.
     section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
     result = replace(CellProblem.of(content), modulus=section).solve()
     loss = None
     if content.has_material_damping:
-        # the loss factor of a phase's Young's modulus is that of its K and of its G
+        # The case states one loss factor for each phase, of its Young's modulus at a real ν. It is
+        # then that of both the bulk and the shear modulus: losses has the shape (phases, 2).
         losses = np.array([[number.nominal] * 2 for number in cell.losses])
         loss = Crisp(loss_factors(result, losses).values["E"])
     if content.has_stated_modulus:
@@ -77,15 +84,26 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
     known = foreseen_material(content)
     if known is not None:
         return (known,)
-    small_loss, large_loss = Crisp(1e-3), Crisp(0.3)  # steel, rubber
+    # steel, rubber
+    small_loss = Crisp(1e-3)
+    large_loss = Crisp(0.3)
     if content.has_stated_modulus:
         return Material(loss=small_loss), Material(loss=large_loss)
-    diamond, polymer = Crisp(1e12), Crisp(1e9)
+    diamond = Crisp(1e12)
+    polymer = Crisp(1e9)
     return Material(diamond, small_loss), Material(polymer, large_loss)
 
 
 def structure_as_computed(content: Content, material: Material) -> Structure:
-    """Return the structure of a material, with numbers as fuzzy as stage modulus will make them.
+    """Return the structure of a material, with as many fuzzy numbers as stage modulus will make.
+
+    Young's modulus E and the damping ratios zeta, zeta1 … become fuzzy where the α-cuts of the
+    stage will have a width. Their own widths are not known yet: E gets 1 % and the damping ratios
+    10 % to either side of the nominal value.
+
+    Args:
+        content: The case.
+        material: Young's modulus in Pa and loss factor, None for what the case states.
 
     Raises:
         RefusedError: There is no such structure.
@@ -93,9 +111,8 @@ def structure_as_computed(content: Content, material: Material) -> Structure:
     structure = content.structure_of(material.modulus, material.loss)
     if "modulus" not in content.stages:
         return structure
-    # Which inputs are fuzzy decides on the method and its cost, how wide they are does not: widths
-    # of 1 % and 10 % stand for those that the stage will find.
-    has_cuts = content.modulus.alpha != (1.0,)
+    # Which inputs are fuzzy decides on the method and its cost; how wide they are does not.
+    has_cuts = content.modulus.alpha != (1.0,)  # at α = 1 alone everything is crisp
     is_fuzzy = has_cuts
     if has_cuts and content.image_cell is None and "microstructure" not in content.stages:
         inputs = CellProblem.of(content).inputs.values()
@@ -103,8 +120,14 @@ def structure_as_computed(content: Content, material: Material) -> Structure:
     numbers: dict[str, FuzzyNumber] = dict(structure.numbers)
     if "E" in numbers:
         young = numbers["E"].nominal
-        numbers["E"] = Triangular(0.99 * young, young, 1.01 * young) if is_fuzzy else Crisp(young)
-    losses = content.cell.losses if content.cell else ()
+        numbers["E"] = Crisp(young)
+        if is_fuzzy:
+            numbers["E"] = Triangular(0.99 * young, young, 1.01 * young)
+    losses: tuple[FuzzyNumber, ...] = ()
+    if content.cell is not None:
+        losses = content.cell.losses
+    # The loss factor of the cell is a mean of those of its phases, weighted by energies that depend
+    # on the elastic inputs: it is fuzzy if either are.
     has_fuzzy_losses = has_cuts and any(loss.support.width > 0 for loss in losses)
     if content.has_material_damping and (is_fuzzy or has_fuzzy_losses):
         for name, number in structure.numbers.items():

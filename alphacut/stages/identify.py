@@ -17,7 +17,19 @@ def identify_inputs(
 ) -> tuple[LearnedInputs, Structure]:
     """Return what measured modes teach about the inputs, and the structure with the learned ones.
 
-    Where the measurement refutes the frame, the answer says so and the structure is as before.
+    Args:
+        section: File of the measured modes, their scatter, and the inputs to be identified.
+        structure: The structure, whose fuzzy inputs are what is known before.
+        alpha: Rising α-levels above 0 of the learned inputs.
+
+    Returns:
+        The answer, and the structure with the learned fuzzy numbers in place of the former ones. If
+        no inputs within the supports agree with the measurement, the answer says that the structure
+        is refuted, and the structure is returned as it was.
+
+    Raises:
+        RefusedError: α = 0 is among the levels, the file is not read, an input is unknown or crisp,
+            or measurement and structure do not fit.
     """
     learned = identify(**_arguments(section, structure, alpha))
     if learned.is_refuted:
@@ -32,7 +44,14 @@ def require_learnable(section: Identify, structure: Structure, alpha: tuple[floa
 
 
 def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> dict[str, Any]:
-    """Return the arguments of `identify` for a section; refuse one that makes none."""
+    """Return the arguments of `frame.identify` for a section, by name.
+
+    Raises:
+        RefusedError: A level is not above 0, the file of the measured modes is not read, or an
+            input is unknown or crisp.
+    """
+    # A level α is the probability that the scatter of a measurement alone takes it as far from the
+    # truth. Normal scatter is unbounded, so that a level of 0 would exclude nothing.
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     try:
         modes = read_modes(

@@ -77,9 +77,21 @@ class ImageResult:
 def stage(
     cell: ImageCell, alpha: tuple[float, ...], average: str, device: str
 ) -> Stage[ImageResult]:
-    """Return the stage of an image on some levels; E and ν are of an average of its stiffness."""
+    """Return the stage that bounds the stiffness of an image or a volume.
+
+    Args:
+        cell: Files of the image, and its phases.
+        alpha: Rising α-levels.
+        average: Average of the plane stiffness whose E and ν are bounded: "isotropic", over all
+            directions, or "axes", from C11 + C12 and C33. A volume has one average only.
+        device: Where linear systems are solved, "cpu" or "cuda". The bounds are the same, so that
+            it is no input of the stage: results of one device are up to date on the other.
+
+    Raises:
+        OSError: A file of the image cannot be read.
+    """
     digests = [file_digest(file) for file in files_of(cell.image)]
-    inputs = [cell, alpha, average, digests]  # bounds are the same on every device
+    inputs = [cell, alpha, average, digests]
     compute = partial(compute_cuts, cell, alpha, average, device)
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
@@ -102,7 +114,19 @@ def study_of(cell: ImageCell) -> ImageStudy:
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, device: str, context: StageContext
 ) -> StageResult[ImageResult]:
-    """Compute α-cuts of E and of the stiffness of an image, and how its sources widen E."""
+    """Compute α-cuts of the stiffness of an image, and by how much each source widens those of E.
+
+    Args:
+        cell: Files of the image, and its phases.
+        alpha: Rising α-levels.
+        average: "isotropic" or "axes", the average of the plane stiffness that E and ν belong to.
+        device: "cpu" or "cuda".
+        context: Its `tick` is called with the completed fraction of the work.
+
+    Raises:
+        RefusedError: The image is not read, or the phases do not fit it.
+        FailedError: A linear system was not solved.
+    """
     found = solve_study(
         study_of(cell), alpha=alpha, average=average, device=device, tick=context.tick
     )
@@ -110,9 +134,21 @@ def compute_cuts(
 
 
 def image_result(found: FuzzyImageStiffness) -> ImageResult:
-    """Return the numbers of a fuzzy stiffness in the units of results."""
-    # the whole matrices are of the highest level alone, where the phases are crisp or nearly so
-    top, is_space = found.cuts[-1], len(found.lengths) == 3
+    """Return the numbers of a fuzzy stiffness in the units of results: moduli in GPa.
+
+    The whole stiffness matrices, and the bounds of ν and of the shear modulus, are those of the
+    highest level alone. `plane` has the constants along the axes under "along the axes" for a
+    volume, "plane strain" for an image; the matrices are 6×6 or 3×3 in Voigt's notation. Bounds
+    that pores or rigid phases leave unknown are 0 or infinite, as in `found`.
+    """
+    # On the highest level the phases are crisp or nearly so: there matrices are close bounds, while
+    # below they would tell the width of the inputs rather than the stiffness.
+    top = found.cuts[-1]
+    average = AVERAGES[found.average]
+    definition = PLANE_STRAIN
+    if len(found.lengths) == 3:  # pixels of an image have two sides, voxels of a volume three
+        average = HILL
+        definition = SPACE
     along_axes = in_units_of_results(found.constants)
     references = References()
     if found.references is not None:
@@ -126,8 +162,8 @@ def image_result(found: FuzzyImageStiffness) -> ImageResult:
         upper_GPa=np.asarray(top.bounds.upper / GPA, float),
         nu=dict(zip(SIDES, top.poisson, strict=True)),
         shear_GPa=dict(zip(SIDES, shear, strict=True)),
-        average=HILL if is_space else AVERAGES[found.average],
-        plane={SPACE if is_space else PLANE_STRAIN: along_axes},
+        average=average,
+        plane={definition: along_axes},
         nature=GUARANTEE,
         seconds=found.seconds,
         widths_GPa={cause: width / GPA for cause, width in found.widths.items()},

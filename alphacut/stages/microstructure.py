@@ -16,10 +16,6 @@ from alphacut.io.files import Document
 from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic import FittedRadiusMap, fit_radius_map
 
-PACKED = 0.35
-"""Fraction of the work that packing takes, for the progress; measured on cases/concrete.toml."""
-
-
 Draw = Callable[[FittedRadiusMap, Path, MicrostructureSection], None]
 """Draws the figures of a radius map into a folder."""
 
@@ -29,9 +25,18 @@ def stage(
 ) -> Stage[Document]:
     """Return the stage that computes the fuzzy radius map of particles.
 
-    If there is a folder, it gets radius.toml, a section of a case, figures if there is what draws
-    them, and circles.csv of an image.
+    If results are kept, its folder gets radius.toml, the section [radius] of a case; circles.csv
+    with the circles of an image; and what `draw` writes.
+
+    Args:
+        section: The particles, and the seed of all random numbers.
+        spheres: Whether the particles are spheres; they are discs otherwise.
+        draw: Function that draws figures of the fitted map into a folder; None for no figures.
+
+    Raises:
+        OSError: The file of particles, if there is one, cannot be read.
     """
+    # The section holds the name of a file only: its digest makes the stage new if the content is.
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
     compute = partial(_computed, section, spheres, draw)
@@ -41,19 +46,37 @@ def stage(
 def _computed(
     section: MicrostructureSection, spheres: bool, draw: Draw | None, context: StageContext
 ) -> StageResult[Document]:
+    """Compute the radius map of particles and, if the context has a folder, write its files.
+
+    Args:
+        section: The particles, and the seed of all random numbers.
+        spheres: Whether the particles are spheres.
+        draw: Function that draws figures into a folder, or None.
+        context: Folder for files, number of processes, and the function that takes the progress.
+
+    Returns:
+        The parameters and fractions of the map as a document, and a dataset with the distribution
+        of the reduced radius and its bounds.
+
+    Raises:
+        RefusedError: The particles are too dense, or a file is not read.
+        FailedError: Particles still overlap after all steps of the packing, or no map fits.
+    """
+    packed = 0.35  # fraction of the time that packing takes, measured on cases/concrete.toml
     particles = section.particles(
         spheres=spheres,
         workers=context.workers,
-        progress=subprogress(context.tick, 0.0, PACKED),
+        progress=subprogress(context.tick, 0.0, packed),
     )
     fitted = fit_radius_map(
         particles,
         limits=section.limits,
         seed=section.seed,
         workers=context.workers,
-        progress=subprogress(context.tick, PACKED, 1.0),
+        progress=subprogress(context.tick, packed, 1.0),
     )
-    numbers, folder = fitted.numbers(), context.folder
+    numbers = fitted.numbers()
+    folder = context.folder
     if folder is not None:
         write_text(folder / "radius.toml", fragment(numbers))
         if draw is not None:
@@ -66,10 +89,18 @@ def _computed(
 
 
 def fragment(numbers: Mapping[str, Any]) -> str:
-    """Return the section [radius] of a case as TOML text, with fractions as comments.
+    """Return the section [radius] of a case as TOML text, with the fractions as comments.
 
     Args:
-        numbers: Of `FittedRadiusMap.numbers`.
+        numbers: Results of a fitted radius map. `radius` has a1 … a4, each a number or the three
+            corners of a triangular one; `mean_area_fraction_of_map`, or volume, is the fraction
+            that the map holds; `area_fraction`, or volume, that of the particles;
+            `fraction_of_case` that of the case or None; `cells` the number of fitted cells, and
+            `share_kept` the fraction of their area or volume in cells within the limits.
+
+    Returns:
+        Lines that end with a newline: the head [radius] with a comment, then "NAME = VALUE" for
+        each parameter with ten digits.
     """
     measure = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
     map_fraction = numbers[f"mean_{measure}_fraction_of_map"]

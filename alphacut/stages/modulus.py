@@ -91,10 +91,14 @@ class ModulusResult:
 
 
 def in_units_of_results(constants: Mapping[str, Array]) -> dict[str, Ends]:
-    """Return the α-cuts of constants as results have them: moduli in GPa, by NAME_GPa.
+    """Return the α-cuts of elastic constants in the units and by the keys of results.
 
     Args:
-        constants: Lower and upper bounds in SI by the name of the constant, shape (levels, 2) each.
+        constants: Lower and upper bounds in SI units by the name of the constant, such as "E_x" or
+            "nu_xy", shape (levels, 2) each.
+
+    Returns:
+        The cuts of moduli in GPa by NAME_GPa, those of Poisson's ratios by their own names.
     """
     cuts: dict[str, Ends] = {}
     for name, bounds in constants.items():
@@ -110,8 +114,20 @@ def infinite_if_unknown(cuts: Ends) -> Ends:
 
 
 def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusResult:
-    """Return the numbers of a fuzzy stiffness in the units of results."""
-    # results have moduli in GPa, the dataset beside them has SI units
+    """Return the numbers of a fuzzy stiffness in the units of results: moduli in GPa.
+
+    Args:
+        problem: The cell, for its references and the words of its method.
+        stiffness: α-cuts of its constants in SI units.
+
+    Returns:
+        `plane` has the constants along the axes by definition, "plane strain" or "no stress along
+        the fibres", and by name; definitions without constants are left out. `fibres` has those
+        across and along fibres, empty where they are not known. `error` is the largest relative
+        error of E of all samples by source.
+    """
+    # Results have moduli in GPa, while the dataset beside them has SI units. The names of constants
+    # without stress along the fibres end in a suffix.
     bounds = stiffness.bounds
     known = {name: stiffness.cuts(name) for name in stiffness.constants}
     plane: dict[str, dict[str, Ends]] = {}
@@ -149,7 +165,21 @@ def solved(
     alpha: Sequence[float] | None = None,
     **campaign: Unpack[CampaignOptions],
 ) -> FuzzyStiffness:
-    """Return the fuzzy stiffness of a cell; `campaign` goes to `fuzzy_stiffness`."""
+    """Return the fuzzy stiffness of a cell by a campaign of samples.
+
+    Args:
+        problem: The cell.
+        plan: Plan of the samples; None for that of the case.
+        inputs: Fuzzy inputs by name, in SI units; None for those of the case. Loss factors are
+            added.
+        alpha: α-levels; None for those of the case.
+        campaign: Options of the campaign: `workers`, `progress`, and the `store` of samples with
+            the `identity` that they belong to.
+
+    Raises:
+        CampaignError: Samples failed. The others are kept if there is a store.
+        RefusedError: The model cannot solve the cell, or a library is missing.
+    """
     losses = dict(zip(problem.cell.loss_names, problem.cell.losses, strict=True))
     return fuzzy_stiffness(
         problem.model(),
@@ -164,8 +194,14 @@ def solved(
 
 
 def identity(problem: CellProblem) -> Document:
-    """Return all but the fuzzy inputs that a sample depends on, which is the key of its store."""
-    cell, modulus = problem.cell, problem.modulus
+    """Return everything but the fuzzy inputs that a sample depends on: the key of its store.
+
+    A stored sample is taken if its inputs and this document are equal. Plan, α-levels and the
+    supports of inputs are left out, so that a campaign with other ones finds the samples that it
+    shares.
+    """
+    cell = problem.cell
+    modulus = problem.modulus
     return {
         "modulus": modulus.model_dump(exclude={"plan", "alpha"}),
         "mesh": problem.mesh.model_dump(exclude={"file"}),
@@ -175,6 +211,7 @@ def identity(problem: CellProblem) -> Document:
         "inputs": {name: repr(x) for name, x in problem.numbers.items()},
         "theta": repr(getattr(problem.nominal_radius, "distribution", problem.nominal_radius)),
         "stiffness": repr(cell.model_dump(include={"inclusion_modulus", "phases"})),
+        # Loss factors are computed from all samples together, on all levels.
         "losses": repr((cell.losses, modulus.alpha)) if cell.losses else "",
         "source": source_digest(("stochastic", "rve")),
         "versions": versions(),
@@ -182,7 +219,16 @@ def identity(problem: CellProblem) -> Document:
 
 
 def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusResult]:
-    """Compute all samples and the α-cuts; stored samples of an interrupted run are taken."""
+    """Compute all samples and the α-cuts of the constants.
+
+    Args:
+        problem: The cell.
+        context: Number of processes, progress, and the store `samples`, from which samples of an
+            interrupted run are taken and to which new ones are added; None to store none.
+
+    Raises:
+        CampaignError: Samples failed. The others are kept if there is a store.
+    """
     stiffness = solved(
         problem,
         workers=context.workers,
@@ -195,9 +241,11 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
 
 def stage(problem: CellProblem) -> Stage[ModulusResult]:
     """Return the stage that computes the α-cuts of a cell by samples."""
-    plan, alpha = problem.modulus.plan, problem.modulus.alpha
+    plan = problem.modulus.plan
+    alpha = problem.modulus.alpha
     inputs = [identity(problem), problem.inputs, problem.stated_fraction, plan, alpha]
-    packages, run = ("stochastic", "rve", "fuzzy"), partial(compute, problem)
+    packages = ("stochastic", "rve", "fuzzy")
+    run = partial(compute, problem)
     return Stage("modulus", inputs, packages, ModulusResult, run, has_samples=True)
 
 
@@ -215,10 +263,13 @@ def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
 
 
 def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:
-    """Return the fuzzy Young's modulus in Pa that α-cuts with levels from 0 to 1 make.
+    """Return the fuzzy Young's modulus in Pa that the α-cuts in a dataset make.
+
+    Args:
+        data: Dataset with "E" over the axes alpha and bound (lower, upper), in Pa.
 
     Raises:
-        RefusedError: It is not positive, or the levels are others.
+        RefusedError: It is not positive, or its levels neither go from 0 to 1 nor are 1 alone.
     """
     minimum = float(data["E"].min())
     require(minimum > 0, "modulus", value=f"{minimum / GPA:.3g} GPa", allowed="a modulus above 0")

@@ -27,18 +27,23 @@ def stage(
     task: EnvelopeTask | None,
     peaks: Mapping[str, Peak],
 ) -> Stage[ShareTable]:
-    """Return the stage of how much each input widens E, ν and peaks on the lowest level.
+    """Return the stage that computes by how much each input widens E, ν and the peaks.
 
     Args:
-        campaign: The cell; None without one.
-        structure: The structure; None without one.
-        task: The study with the most inputs.
-        peaks: Peaks of the study, at which searches begin.
+        campaign: The cell, for E and ν; None without one.
+        structure: The structure, for its peaks; None without one.
+        task: The study with the most inputs; None without a structure.
+        peaks: Peaks of the study by output. Searches begin at the inputs that attain them.
+
+    Returns:
+        Stage of a table by result and input, of the fraction by which the width of the result on
+        the lowest level falls if the input is fixed at its nominal value.
     """
     compute = partial(_fractions_of_widths, campaign, structure, task, peaks)
     of_cell = campaign and [identity(campaign), campaign.inputs, campaign.modulus.alpha]
     of_structure = structure and [structure.model, structure.numbers, task, peaks]
-    inputs, packages = [of_cell, of_structure], (*NESTED, "alphacut")
+    inputs = [of_cell, of_structure]
+    packages = (*NESTED, "alphacut")
     return Stage("shares", inputs, packages, ShareTable, compute)
 
 
@@ -49,7 +54,16 @@ def _fractions_of_widths(
     peaks: Mapping[str, Peak],
     _: StageContext,
 ) -> StageResult[ShareTable]:
-    """Return the table; a result with one input has no row, and only frames have rows of peaks."""
+    """Compute the table of fractions of widths, by result and then by input.
+
+    A fraction is that by which the width of a result on the lowest α-level falls if one input is
+    fixed at its nominal value. Results that depend on a single fuzzy input have no row, and only
+    frames with floors have rows of peaks. The arguments are those of `stage`.
+
+    Raises:
+        CampaignError: Samples of the cell failed.
+        FailedError: A response could not be computed.
+    """
     table: ShareTable = {}
     if campaign is not None and len(campaign.inputs) > 1:
         shares = cell_shares(campaign)
@@ -72,13 +86,21 @@ def _fractions_of_widths(
 
 
 def cell_shares(campaign: CellProblem) -> WidthFractions:
-    """Return the fractions of the widths of E and ν that each input causes, shape (inputs, 2).
+    """Return the fraction of the widths of E and ν that each input of a cell causes.
 
-    Whatever the case uses, the cell is solved by `auto`, which is the series where it has a
-    formula, with a reduced plan.
+    It is the reduction of the width when the input is fixed at its nominal value, over the whole
+    width, on the lowest level. The cell is solved by the fastest model whatever the case uses,
+    since ratios of widths need few digits.
+
+    Returns:
+        The names of the inputs, and the fractions, shape (inputs, 2) for E and ν.
+
+    Raises:
+        CampaignError: Samples failed.
     """
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
-    problem, alpha = replace(campaign, modulus=modulus), modulus.alpha[:1]
+    problem = replace(campaign, modulus=modulus)
+    alpha = modulus.alpha[:1]
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         """Return the lower and upper bounds of E and ν on the lowest level, shape (2,) each."""

@@ -29,18 +29,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
-SECONDS = {
-    "modulus": 10.0,
-    "image": 10.0,
-    "envelope": 10.0,
-    "record": 3.0,
-    "incremental": 5.0,
-    "probability": 5.0,
-    "tolerances": 30.0,
-    "figures": 6.0,
-}
-"""Rough seconds of a stage by the first word of its name, 1 of others. They are measured on shipped
-cases, and only divide the progress bar among the stages."""
 
 T = TypeVar("T")
 
@@ -124,7 +112,7 @@ class Stage(Generic[T]):
 
 @dataclass
 class RunProgress:
-    """Progress of a run in one bar, of which each stage takes a part by its `SECONDS`.
+    """Progress of a run in one bar, of which each stage takes a part by its rough seconds.
 
     Args:
         show: Takes the completed fraction of the run.
@@ -141,17 +129,41 @@ class RunProgress:
         self.seconds_left = self._seconds_of(names)
 
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
-        """Return the progress of the next stages by their names; `skipped` are up to date."""
+        """Return the function that takes the progress of the next stages, and reserve their part.
+
+        The rest of the bar is divided by the rough seconds of the stages to come; `seconds_left`
+        and `done` are changed.
+
+        Args:
+            names: Names of the stages that will be computed next.
+            skipped: Names of stages that are up to date; they take nothing of the bar.
+
+        Returns:
+            Function of the completed fraction, 0 to 1, of these stages together.
+        """
         self.seconds_left -= self._seconds_of(skipped)
         seconds = self._seconds_of(names)
         first = self.done
+        # The maximum keeps the bar within its end where stages come that nobody foresaw.
         if seconds:
             self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
         self.seconds_left -= seconds
         return subprogress(self.show, first, self.done)
 
     def _seconds_of(self, names: Iterable[str]) -> float:
-        return sum(SECONDS.get(name.partition("_")[0], 1.0) for name in names)
+        """Return the rough seconds of stages by the first words of their names, 1 by default."""
+        # They are measured on shipped cases, and only divide the progress bar among the stages.
+        measured = {
+            "modulus": 10.0,
+            "image": 10.0,
+            "envelope": 10.0,
+            "record": 3.0,
+            "incremental": 5.0,
+            "probability": 5.0,
+            "tolerances": 30.0,
+            "figures": 6.0,
+        }
+        return sum(measured.get(name.partition("_")[0], 1.0) for name in names)
 
 
 @dataclass(frozen=True)
@@ -181,12 +193,20 @@ class StageStore:
     def take_all(
         self, stages: Sequence[Stage[T]], executor: Executor | None
     ) -> dict[str, StageResult[T]]:
-        """Return the results of stages by their names, as `take` does.
+        """Return the results of stages by their names, from files or computed and then kept.
+
+        A result is taken from the files of its stage if these are unchanged and were made from
+        equal inputs by the same source and libraries.
 
         Args:
-            stages: The stages, those that take longest first.
-            executor: Computes them side by side, in other processes, without further files; this
-                process computes them if it is None, or if there is one stage or no folder.
+            stages: The stages, those that take longest first; their names are distinct.
+            executor: Computes them side by side, in other processes, without figures and other
+                files; this process computes them if it is None, or if there is one stage or no
+                folder.
+
+        Raises:
+            FailedError: A worker process died. Whatever else a stage raises leaves this function as
+                well; the results before it are kept.
         """
         results: dict[str, StageResult[T]] = {}
         for stage in stages:
@@ -195,7 +215,7 @@ class StageStore:
                 results[stage.name] = found
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
-        # a stage alone may use all workers itself, and further files need this process
+        # A stage alone may use all workers itself, and further files need this process.
         total = sum(stage.work for stage in stale)
         done = 0.0
         if executor is None or self.folder is None or len(stale) == 1:
@@ -219,7 +239,8 @@ class StageStore:
         None where these are missing, changed, or made from something else; the stage's name is
         added to `up_to_date` otherwise.
         """
-        folder, key = self.folder, stage.key
+        folder = self.folder
+        key = stage.key
         if folder is None or self.fresh:
             return None
         numbers_file = f"{stage.name}.json"
@@ -244,13 +265,24 @@ class StageStore:
         return StageResult(numbers, data, files, key)
 
     def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
-        """Return the result of a stage, computed and, if there is a folder, written."""
+        """Compute a stage and, if there is a folder, write its files.
+
+        Args:
+            stage: The stage.
+            tick: Called with the completed fraction of its work.
+
+        Raises:
+            RefusedError: The folder has files under the names of the result that no run has
+                written.
+            FailedError: A worker process died. Whatever the stage raises leaves this function as
+                well.
+        """
         LOG.info("stage %s is computed", stage.name)
         folder = self.folder
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:
             if folder is None:
                 return stage.run(StageContext(workers=self.workers, tick=tick))
-            # refused before hours of work, not after them
+            # Files of others under these names are refused before hours of work, not after them.
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
             samples = self._sample_store(folder) if stage.has_samples else None
@@ -258,10 +290,14 @@ class StageStore:
             return self._write(stage, stage.run(context), Path(temporary))
 
     def _sample_store(self, folder: ResultsFolder) -> Path:
-        """Return the path of the store of samples.
+        """Return the path of the database of samples in the folder; list it if it is new.
+
+        Listed files belong to the runs in this folder, so that a later run may continue or clear
+        them.
 
         Raises:
-            RefusedError: The run is fresh, and no manifest lists the store that is there.
+            RefusedError: The run is to compute everything anew, and the database that is there is
+                listed in no manifest, so that it may be somebody else's.
         """
         path = folder.path / SAMPLES
         is_listed = SAMPLES in folder.files
@@ -270,14 +306,30 @@ class StageStore:
         cure = "move it away, or leave out --fresh"
         require(is_allowed, str(path), value="listed in no manifest", allowed="none", cure=cure)
         if rank() == 0 and is_new:
-            # listed now, so that an interrupted run owns it; without digests, since it changes
+            # It is listed now and not at the end, so that an interrupted run owns it; and without
+            # a digest, since it changes with each sample. SQLite keeps a journal beside it.
             folder.add_to_list(dict.fromkeys((SAMPLES, f"{SAMPLES}-journal"), Listed("", "")))
         return path
 
     def _write(self, stage: Stage[T], computed: StageResult[T], files: Path) -> StageResult[T]:
-        """Write a result into the folder, beside the other files of its stage in `files`."""
+        """Write a result into the folder, beside the other files of its stage.
+
+        Args:
+            stage: The stage.
+            computed: Its numbers, and a dataset if it has one.
+            files: Temporary folder in which the stage has left other files. NAME.json and NAME.nc
+                are added to it, and all are copied into the folder of results, which replaces an
+                earlier result.
+
+        Returns:
+            The result with the names of its files and its digest; under MPI all but the first rank
+            write nothing and return it without files.
+
+        Raises:
+            RefusedError: Something else is in the place of a file.
+        """
         assert self.folder is not None
-        # all ranks compute the same result, and the first one writes it
+        # All MPI ranks compute the same result, and the first one writes it.
         name = f"{stage.name}.json"
         key = stage.key
         if rank() != 0:

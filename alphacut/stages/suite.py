@@ -31,8 +31,16 @@ def suite_records(
 ) -> tuple[ScaledRecord, ...]:
     """Return the records of a suite as they move the structure, in the order of the case.
 
+    Each is corrected by a baseline and scaled; its response ends five natural periods after it.
+
+    Args:
+        section: Recordings, baseline correction, and the scale or the intensity to be reached.
+        envelope: Longest duration and the time step in s.
+        structure: The structure, whose first mode determines "Sa(T1)".
+
     Raises:
-        RefusedError: The structure is not linear, or a record lasts no whole number of steps.
+        RefusedError: The structure is not linear, a record is zero throughout, or a response lasts
+            no whole number of steps.
     """
     records = scaled_records(
         structure.model,
@@ -42,7 +50,8 @@ def suite_records(
         scale=section.scale.value,
         measure=section.scale.measure,
     )
-    # each response ends some periods after its record, at a time of its own
+    # Each response ends some periods after its record, at a time of its own: that of [envelope],
+    # which the case has been checked for, is only the longest.
     for record in records:
         envelope.require_steps(f"envelope.duration of {record.name}", record.duration)
     return records
@@ -62,7 +71,8 @@ def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
     """Return the stage that computes the peaks of a structure under a record."""
     inputs = [structure.model, structure.numbers, record, task]
-    compute, packages = partial(_peaks, structure, task, record), ("fuzzy", "frame")
+    compute = partial(_peaks, structure, task, record)
+    packages = ("fuzzy", "frame")
     name = f"record_{record.name}"
     return Stage(name, inputs, packages, dict[str, Peak], compute, work=record.duration)
 
@@ -70,6 +80,18 @@ def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Sta
 def _peaks(
     structure: Structure, task: EnvelopeTask, record: ScaledRecord, context: StageContext
 ) -> StageResult[dict[str, Peak]]:
+    """Compute the bounds of the peaks of a structure under one record, by name.
+
+    Args:
+        structure: A linear structure, or a frame that yields.
+        task: Names of the fuzzy inputs and of the peaks, time step and α-levels.
+        record: The scaled record, which replaces any other load.
+        context: Its `tick` is called with the completed fraction of the work.
+
+    Raises:
+        RefusedError: An input is unknown or crisp.
+        FailedError: A response could not be computed.
+    """
     peaks = record_peaks(
         linear_model(structure),
         structure.inputs(task.fuzzy),
@@ -88,7 +110,18 @@ def suite_peaks(
     records: Sequence[ScaledRecord],
     peaks: Mapping[str, Mapping[str, Peak]],
 ) -> SuitePeaks:
-    """Return worst, mean and statistics over the records, from the peaks under each by its name."""
+    """Return the largest peaks over the records of a suite, their means and other statistics.
+
+    Args:
+        structure: The structure that the records move.
+        task: Names of the fuzzy inputs, time step and α-levels.
+        records: The scaled records.
+        peaks: Bounds of the peaks by the name of the record and of the peak; one entry for each
+            record.
+
+    Raises:
+        RefusedError: An input is unknown or crisp.
+    """
     return summarised(
         linear_model(structure),
         structure.inputs(task.fuzzy),
@@ -105,7 +138,19 @@ def analyses_of(
     task: EnvelopeTask,
     records: Sequence[ScaledRecord],
 ) -> dict[str, IncrementalAnalysis]:
-    """Return analyses of a frame that yields, over the intensity measure, by the record's name."""
+    """Return the incremental dynamic analysis of a frame that yields, for each record by its name.
+
+    An analysis moves the frame by its record at rising intensities.
+
+    Args:
+        section: Question: its limits, intensity measure, and largest intensity.
+        structure: A frame whose columns yield.
+        task: Names of the fuzzy inputs, time step and α-levels.
+        records: The scaled records.
+
+    Raises:
+        RefusedError: An input or a limit does not fit the structure.
+    """
     frame = structure.model
     assert isinstance(frame, StoreyFrame)
     return incremental_analyses(
@@ -123,19 +168,26 @@ def analyses_of(
 def incremental_stage(
     section: FragilitySection, structure: Structure, name: str, analysis: IncrementalAnalysis
 ) -> Stage[Increments]:
-    """Return the stage that moves a frame that yields by a record at several scales.
+    """Return the stage that moves a frame that yields by a record at rising intensities.
 
     Args:
-        section: The question.
-        structure: The structure.
-        name: Name of the record.
-        analysis: Its analysis, of `analyses_of`.
+        section: The question, whose limits name the outputs.
+        structure: The frame.
+        name: Name of the record; that of the stage is "incremental_NAME".
+        analysis: The analysis of this record, of `analyses_of`.
+
+    Returns:
+        Stage of the bounds of the peaks over the intensity, for each limit.
+
+    Raises:
+        RefusedError: A limit does not fit the structure.
     """
     limits = limits_by_name(section.limits_of(structure), ())
 
     def compute(context: StageContext) -> StageResult[Increments]:
         return StageResult(increments_of(analysis, limits, context.tick))
 
-    inputs, packages = [analysis, list(limits.values())], ("fuzzy", "frame")
+    inputs = [analysis, list(limits.values())]
+    packages = ("fuzzy", "frame")
     work = analysis.duration
     return Stage(f"incremental_{name}", inputs, packages, Increments, compute, work=work)

@@ -99,7 +99,13 @@ class Results:
 
     @property
     def frame_result(self) -> FrameResult | None:
-        """Frequencies, first period, weight and heights of a frame; None of another structure."""
+        """Return frequencies, weight and heights of the frame at its nominal inputs.
+
+        Returns:
+            Undamped angular frequencies in rad/s, rising; the first period in s; the weight of all
+            floors in N; and the heights in m of the storeys whose drifts are observed. None without
+            a structure, and of structures without floors.
+        """
         structure = self.structure
         if structure is None or structure.linear is None or not structure.floor_masses:
             return None
@@ -115,7 +121,12 @@ class Results:
 
     @property
     def damping(self) -> dict[str, tuple[float, float, float]]:
-        """Smallest, nominal and largest damping ratios that the material gives, by name."""
+        """Return the damping ratios that the loss factor of the material gives, by name.
+
+        Returns:
+            Lower end of the support, nominal value and upper end of "zeta", or of "zeta1", "zeta2"
+            … of each mode. Empty where the case states the damping itself.
+        """
         if self.structure is None or not self.content.has_material_damping:
             return {}
         return {
@@ -145,7 +156,17 @@ class Parts:
 
     @classmethod
     def of(cls, results: Results, **further: object) -> Self:
-        """Return the numbers of results, with further fields of this class."""
+        """Return the numbers of all results of a run.
+
+        Args:
+            results: The results. Stages that the case does not have leave their parts None or
+                empty.
+            further: Values of further fields of this class, such as the title and the case of a
+                summary.
+
+        Raises:
+            TypeError: A name in `further` is no field, or a field without a default is missing.
+        """
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
         parts: dict[str, Any] = {
             **{name: x.numbers for name, x in results.single.items()},
@@ -175,10 +196,12 @@ class Parts:
 
     @property
     def shown_units(self) -> dict[str, ShownUnit]:
-        """The unit in which each output is shown, wherever it is.
+        """Return the unit in which each output is shown, wherever it is.
 
-        It is that of its first limit with a unit; else g of accelerations, and of others the SI
-        unit with a prefix that fits the largest peak.
+        Returns:
+            Label and factor from SI by output. The unit is that of the first limit of the output
+            that states one; else g for accelerations, and for others the SI unit with a prefix that
+            fits the largest peak. Outputs that no study has are left out.
         """
         units: dict[str, str] = {}
         largest: dict[str, float] = {}
@@ -191,7 +214,7 @@ class Parts:
                 size = max(abs(float(peak.lower[0])), abs(float(peak.upper[0])))
                 output = output_of(name)
                 largest[output] = max(largest.get(output, 0.0), size)
-        # outputs without a peak have the extremes of their envelope
+        # Outputs without a peak have the extremes of their envelope.
         for envelope in self.envelopes.values():
             for output in envelope.min:
                 size = max(abs(envelope.min[output]), abs(envelope.max[output]))
@@ -204,7 +227,8 @@ class Parts:
             else:
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
                 found[output] = ShownUnit(label, factor)
-        # of several limits of an output the first one stays
+        # Later entries replace earlier ones, so the limits are taken in reversed order: of several
+        # limits of an output the first one of the case stays.
         limits: list[LimitResult] = []
         if self.probability is not None:
             limits += reversed(self.probability.events.values())
@@ -245,7 +269,12 @@ class Summary(Parts):
 
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
-        """Return the summary in a folder of results; refuse one that is missing or damaged."""
+        """Return the summary in a folder of results.
+
+        Raises:
+            RefusedError: The file is missing, changed, no JSON, or of another version of this
+                class.
+        """
         content = folder.content(SUMMARY)
         try:
             return from_document(cls, json.loads(content))
@@ -255,7 +284,15 @@ class Summary(Parts):
             raise RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN) from None
 
     def require_run_of(self, folder: ResultsFolder) -> None:
-        """Refuse a folder with files of another run than that of this summary."""
+        """Refuse a folder in which a result file is of another run than this summary.
+
+        The summary lists a digest of what each result was made from, and the manifest of the folder
+        lists the same digest with each file. They differ where a later run was interrupted before
+        its summary.
+
+        Raises:
+            RefusedError: Naming the results of another run.
+        """
         changed = [
             name
             for name, source in self.fingerprints.items()
