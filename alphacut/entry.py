@@ -113,7 +113,8 @@ def main(
                 say(line)
             return 2
         except KeyboardInterrupt:
-            number, cause = int(signal.SIGINT), "interrupted"
+            number = int(signal.SIGINT)
+            cause = "interrupted"
             if signals:
                 number = signals[0]
                 cause = f"ended by {signal.Signals(number).name}"
@@ -152,10 +153,19 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
     handlers = {}
     if threading.current_thread() is threading.main_thread():
         handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
-    # None: a handler that was not set by Python, and that Python could not set again.
+    # A handler of None was not set by Python, which could not set it again. An ignored signal is
+    # one that a caller such as nohup wants ignored.
     previous = {k: x for k, x in handlers.items() if x not in (None, signal.SIG_IGN)}
 
     def stop(number: int, frame: FrameType | None) -> None:
+        """Note a signal, and call the handler of SIGINT unless one came within the last second.
+
+        The handler of SIGINT raises KeyboardInterrupt, unless somebody has set another one.
+
+        Args:
+            number: Number of the signal.
+            frame: Frame that it interrupted, for the handler.
+        """
         nonlocal last_time
         received.append(number)
         now = time.monotonic()
@@ -176,8 +186,12 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
 
 @contextmanager
 def show_log(is_on: bool) -> Iterator[None]:
-    """Show the log of the block, with the traceback of its error, on standard error if `is_on`."""
-    logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
+    """Show the log of the block, with the traceback of its error, on standard error if `is_on`.
+
+    The logger "alphacut" is as before after the block. Errors leave the block unchanged.
+    """
+    logger = logging.getLogger("alphacut")
+    handler = logging.StreamHandler()
     if is_on:
         logger.addHandler(handler)
         logger.setLevel(logging.DEBUG)
@@ -194,16 +208,24 @@ def show_log(is_on: bool) -> Iterator[None]:
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
     """Read a command line and run its command; return the exit status.
 
+    Args:
+        arguments: The command line after the program's name.
+        program: The program's name, for messages.
+        names: File in `alphacut.commands` of each command, by the command's name.
+
     Raises:
-        RefusedError: An option is unknown or does not fit, or a file cannot be written.
+        RefusedError: An option is unknown or does not fit, or a file cannot be written. Errors of
+            the command itself leave this function as well.
     """
     words, petsc = split_petsc(arguments)
     # The parser of the named command alone saves the imports of the others.
     named = {name: names[name] for name in words[:1] if name in names}
-    with uninterrupted():  # a signal amid imports is not lost to what they run
+    # An exception raised amid imports could be swallowed by the code that they run: a signal waits.
+    with uninterrupted():
         parser, by_name = build_parsers(program, named or names)
     options, unknown = parser.parse_known_args(words)
     if unknown:
+        # Values of an unknown option are unknown words as well: the option is what to tell.
         first = next((word for word in unknown if word.startswith("-")), unknown[0])
         by_name[options.command].refuse(first)
     if "case" not in options:  # no prisms are solved

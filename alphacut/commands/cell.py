@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.base.arrays import Array
 from alphacut.base.kept_files import whole_file
 from alphacut.base.number_text import text_table
 from alphacut.case.cell import CellCase
@@ -38,13 +40,16 @@ from alphacut.stochastic import ThetaDistribution
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `alphacut cell`."""
+    """Add the options of `alphacut cell` to its parser.
+
+    They are those of every command on a case, --method and --export.
+    """
     add_common(parser)
     parser.add_argument(
         "--method",
         dest="set",
         action="append",
-        type="modulus.method={}".format,
+        type="modulus.method={}".format,  # --method is a short form of --set: it is checked there
         help="prism, slices, series or auto; short for --set",
     )
     parser.add_argument(
@@ -53,7 +58,23 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Solve the cell at the nominal values, check and write its result; return exit status 0."""
+    """Solve the cell of a case at its nominal values, check the result, and write it.
+
+    Args:
+        options: Of the command line: the case file `case` with its changes `set`, PETSc's options
+            `petsc`, the file `export` for fields or None, `json` and `quiet`.
+        out: Takes the table, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        BadInput: The case is not valid.
+        RefusedError: The cell does not fit its method, or E of spheres is outside its bounds.
+        FailedError: The cell was not solved, or the declared error exceeds the tolerance of the
+            case.
+    """
+    # The section of the structure is not built: a cell is solved whatever its frame is like.
     kind = with_structures(CellCase, built=False)
     content = parse(kind, options.case, options.set).content
     require_petsc(options.petsc, content)
@@ -77,11 +98,27 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def export(problem: CellProblem, path: Path) -> Document:
-    """Write the mesh with displacements and stresses; return the file and its number of nodes."""
+    """Write the mesh of prisms with displacements and stresses at the nominal values.
+
+    The fields are those of finite elements on prisms, whatever model the case names.
+
+    Args:
+        problem: The cell.
+        path: File whose ending names the format: .msh, .vtu or .xdmf.
+
+    Returns:
+        Document with the "file" and the number of its "nodes".
+
+    Raises:
+        RefusedError: The ending is another one, or a library is missing.
+        OSError: The file cannot be written.
+    """
+    # DOLFINx takes seconds to import, and only this option needs it here.
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.own_mesh import MeshModel
 
-    mesh, cell = problem.mesh, problem.cell
+    mesh = problem.mesh
+    cell = problem.cell
     if isinstance(cell, MeshedCell):
         assert mesh.file is not None  # a cell of phases is one of a mesh from a file
         law = cast("ThetaDistribution", problem.nominal_radius)
@@ -96,9 +133,18 @@ def export(problem: CellProblem, path: Path) -> Document:
 
 
 def document_of(result: HomogenisedStiffness) -> Document:
-    """Return the result of a cell as a JSON document: moduli and stresses in GPa, with errors.
+    """Return the result of a cell as a JSON document, moduli and stresses in GPa.
 
-    Numbers and errors that a result does not have, or does not declare, are None.
+    Args:
+        result: Homogenised stiffness of the cell, in SI units.
+
+    Returns:
+        "E_GPa" and "nu", None where no isotropic solid has these moduli; "stress_GPa", the mean σ11
+        and σ12; "fibres", the constants of a transversely isotropic cell with their errors, else
+        empty; "stiffness_GPa", the plane stiffness, shape (3, 3), and its absolute errors, None
+        where there are none; "plane", E_x, E_y, ν_xy and G_xy by definition; "curve", the stresses
+        over θ with the weights of the mean; the facts of the computation; and the declared errors,
+        None without any.
     """
     curve = result.curve
     document: Document = {"E_GPa": None, "nu": None}
@@ -109,9 +155,11 @@ def document_of(result: HomogenisedStiffness) -> Document:
     if result.is_of_fibres:
         fibres = fibre_constants(result)
         document["fibres"] = _constants(fibres.values, fibres.errors)
-    stiffness, errors = result.stiffness, result.stiffness_errors if result.errors else None
-    document["stiffness_GPa"] = None if stiffness is None else stiffness / GPA
-    document["stiffness_error_GPa"] = None if errors is None else errors / GPA
+    errors = None  # unless the model declares some
+    if result.errors:
+        errors = result.stiffness_errors
+    document["stiffness_GPa"] = _in_gpa(result.stiffness)
+    document["stiffness_error_GPa"] = _in_gpa(errors)
     document["plane"] = {
         definition: _constants(
             dict(zip(NAMES, constants.values, strict=True)),
@@ -132,12 +180,26 @@ def document_of(result: HomogenisedStiffness) -> Document:
     return document
 
 
+def _in_gpa(moduli: Array | None) -> Array | None:
+    """Return moduli in GPa from those in Pa; None where there are none."""
+    if moduli is None:
+        return None
+    return np.asarray(moduli / GPA, float)
+
+
 def _constants(values: Mapping[str, float], errors: Mapping[str, float]) -> Document:
-    """Return value and error of each constant by its key: moduli in GPa, ratios as they are."""
+    """Return value and error of each constant by its key: moduli in GPa, ratios as they are.
+
+    Args:
+        values: Values in SI units by name, such as "E_T" and "nu_LT".
+        errors: Absolute errors by the same names, NaN where unknown, which becomes None.
+    """
     found: Document = {}
     for name, value in values.items():
         key, unit = key_and_unit(name)
-        error = None if np.isnan(errors[name]) else errors[name] / unit
+        error = None  # JSON has no NaN
+        if not np.isnan(errors[name]):
+            error = errors[name] / unit
         found[key] = {"value": value / unit, "error": error}
     return found
 
@@ -148,27 +210,46 @@ def _stresses(values: ArrayLike) -> Document:
 
 
 def declared_errors(result: HomogenisedStiffness) -> Document | None:
-    """Return the declared absolute errors of E, ν and the mean stresses; None without any."""
+    """Return the declared absolute errors of E, ν and the mean stresses.
+
+    Returns:
+        "E_GPa" and "stress_GPa" with s11 and s12 in GPa, and "nu"; None if the model declares no
+        errors.
+    """
     if not result.errors:
         return None
     if isinstance(result, HomogenisedSpheres):
         modulus, nu = result.error_of(hill_average)
-        # Of the moduli m = (K, (C11 − C12)/2, C44) of the cube are the stresses
-        # σ11 = ε (C11 + C12) = ε (2 K + 2/3 m_1) under ε11 = ε22 = ε, and σ12 = 2 ε C44.
+        # The cube has the three moduli m = (K, (C11 − C12)/2, C44). Under ε11 = ε22 = ε the stress
+        # is σ11 = ε (C11 + C12) = ε (2 K + 2/3 m_1), and under the shear ε12 = ε it is
+        # σ12 = 2 ε C44. Both rise with each modulus, as `error_of` needs.
         stresses = result.error_of(lambda m: STRAIN * np.array([2 * m[0] + 2 / 3 * m[1], 2 * m[2]]))
     else:
-        modulus, nu = result.estimated_error * result.modulus, result.poisson_error
+        modulus = result.estimated_error * result.modulus
+        nu = result.poisson_error
         # The mean σ11 is proportional to C11 + C12, and σ12 to C33: moduli 0 and 2 of the plane.
         stresses = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": _stresses(stresses)}
 
 
 def summary(document: Document, convention: str) -> str:
-    """Return the result as a table, each number with its declared error."""
-    rows = [
-        (label, value, "not declared" if error is None else f"{error:.1e}")
-        for label, value, error in table_rows(document)
-    ]
+    """Return the result of a cell as a text table, each number with its declared error.
+
+    Args:
+        document: The document of `document_of`, and the "references" of the cell, whose
+            "hashin_shtrikman_E_GPa" is shown if it is there.
+        convention: Average of the stiffness that E and ν belong to, in words.
+
+    Returns:
+        Lines that end with a newline: the table, the method with its cost, and a warning where the
+        error is not declared.
+    """
+    rows: list[tuple[str, str, str]] = []
+    for label, value, error in table_rows(document):
+        error_words = "not declared"
+        if error is not None:
+            error_words = f"{error:.1e}"
+        rows.append((label, value, error_words))
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
         lower, upper = bounds
         rows.append((f"{isotropic_label(convention)}, GPa", f"{lower:.4f} … {upper:.4f}", ""))
@@ -190,11 +271,24 @@ class Row(NamedTuple):
 
 
 def table_rows(document: Document) -> Iterator[Row]:
-    """Yield the rows of E, ν, mean stresses, constants of fibres, and those of the plane."""
+    """Yield the rows of a cell's table.
+
+    Args:
+        document: The document of `document_of`.
+
+    Yields:
+        Label, text and declared error in the unit of the label: of E, ν and the mean stresses; of
+        the constants of fibres; and, if the cell has a plane stiffness, of its entries C11, C12,
+        C16, C22, C26 and C66 and of the constants along x and y.
+    """
     errors = document["declared_error"] or {"stress_GPa": {}}
     for key, digits in (("E_GPa", "#.8g"), ("nu", ".6f")):
         number = document[key]
-        text = "none: 2 G_T > 3 (C11 + C12)" if number is None else f"{number:{digits}}"
+        # In plane strain E = G (3 − G/k) with the shear modulus G = G_T of the average and the
+        # bulk modulus k = (C11 + C12)/2 of the plane: it is positive for G < 3 k alone.
+        text = "none: 2 G_T > 3 (C11 + C12)"
+        if number is not None:
+            text = f"{number:{digits}}"
         yield Row(constant_label(key), text, errors.get(key))
     for key, stress in document["stress_GPa"].items():
         label = f"mean {key.replace('s', 'σ')}, GPa"
@@ -204,9 +298,12 @@ def table_rows(document: Document) -> Iterator[Row]:
     if not document["plane"]:
         return
     indices = "126"  # of Voigt's order for the components 11, 22 and 12 of the plane
-    stiffness, stiffness_errors = document["stiffness_GPa"], document["stiffness_error_GPa"]
-    for i, j in zip(*np.triu_indices(3), strict=True):
-        error = None if stiffness_errors is None else stiffness_errors[i, j]
+    stiffness = document["stiffness_GPa"]
+    stiffness_errors = document["stiffness_error_GPa"]
+    for i, j in combinations_with_replacement(range(3), 2):  # the upper triangle, row by row
+        error = None
+        if stiffness_errors is not None:
+            error = stiffness_errors[i, j]
         yield Row(f"C{indices[i]}{indices[j]}, GPa", f"{stiffness[i, j]:.6g}", error)
     for definition, constants in document["plane"].items():
         for key, constant in constants.items():
@@ -214,5 +311,7 @@ def table_rows(document: Document) -> Iterator[Row]:
             yield Row(label, f"{constant['value']:.6g}", constant["error"])
 
 
-ABOUT = "effective modulus and stresses of the cell at the nominal values"
-COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))
+COMMANDS = dict.fromkeys(
+    ("cell", "solve"),
+    Command("effective modulus and stresses of the cell at the nominal values", arguments, run),
+)

@@ -49,23 +49,36 @@ if TYPE_CHECKING:
 
     from alphacut.commands.foresee import Foreseen
 
-LEAST_MODES, MAX_MODES = 3, 8
-"""Modes that are shown, if the structure has as many."""
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
-KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
 
 def check(options: argparse.Namespace, out: TextIO) -> int:
-    """Check a case, show how it was read and what a run of it will take; return exit status 0."""
+    """Check a case, show how it was read, and foresee what a run of it will take.
+
+    All that stages need is read and built, and small parts of their work are timed.
+
+    Args:
+        options: Of the command line: the case file `case` with its changes `set`, PETSc's options
+            `petsc`, `json` and `quiet`.
+        out: Takes the text, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        BadInput: The case is not valid.
+        RefusedError: What a stage needs does not fit.
+        FailedError: What a stage needs cannot be built.
+    """
     content = read_case(options).content
     rows = list(rows_of("", content))
     try:
         study = require_runnable(content)
-        structure = foreseen_structure(content) if "envelope" in content.stages else None
+        structure = _structure_of_envelope(content)
     except RefusedError:
-        # a wrong unit may be the cause of what is refused, and is told before it
+        # A wrong unit may be the cause of what is refused, and is told before it.
         for doubt in doubts_before_refusal(content, rows):
             say(f"warning: {doubt}")
         raise
@@ -89,7 +102,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
     if not options.quiet and options.json != "-":
-        # all that is known at once, before parts of the work are timed, which may take seconds
+        # All that is known at once is shown before parts of the work are timed for seconds.
         out.write(text)
         out.flush()
     else:
@@ -106,12 +119,16 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -> Iterator[str]:
-    """Yield a sentence for each size that suggests a wrong unit.
+    """Yield a sentence for each quantity and limit whose size suggests a wrong unit.
 
     Args:
         content: The case.
-        rows: Rows of its quantities, as of `rows_of`.
-        structure: The structure of the case; None if there is none, or it cannot be built.
+        rows: Key, value and kind of each quantity in it, as `rows_of` gives them.
+        structure: The structure of the case; None if there is none, or it cannot be built, when
+            limits are not judged.
+
+    Raises:
+        RefusedError: A limit does not fit the structure.
     """
     for key, value, kind in rows:
         if kind.endswith(UNUSUAL):
@@ -120,7 +137,7 @@ def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -
         yield from content.structure_section.warnings(structure)
     if structure is None:
         return
-    # towers sway by some 2 m, and floors move at less than 10 g: more is a slip of a unit
+    # Towers sway by some 2 m, and floors move at less than 10 g: more is a slip of a unit.
     largest = {"m": 5.0, "m/s": 50.0, "m/s^2": 500.0}
     for key, question in content.questions.items():
         for limit in question.with_storeys(structure).limits:
@@ -132,22 +149,46 @@ def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -
                 )
 
 
+def _structure_of_envelope(content: Content) -> Structure | None:
+    """Return the structure at its nominal values; None if no stage needs it or it is unknown."""
+    if "envelope" not in content.stages:
+        return None
+    return foreseen_structure(content)
+
+
 def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
     """Return the sentences of `doubts` on a case that is refused, as far as it can be read."""
     try:
-        structure = foreseen_structure(content) if "envelope" in content.stages else None
-        return list(doubts(content, rows, structure))
+        return list(doubts(content, rows, _structure_of_envelope(content)))
     except RefusedError:
         return list(doubts(content, rows, None))
 
 
 def motion_text(content: Content, structure: Structure) -> str:
-    """Return lines on the records of the ground, and warnings of a step that misses peaks."""
-    section, linear = content.envelope, structure.linear
+    """Return lines on what moves the structure, and warnings of a time step that misses peaks.
+
+    Args:
+        content: The case.
+        structure: Its structure at the nominal values of the material.
+
+    Returns:
+        Lines that end with a newline: the record of the ground or the records of a suite, and
+        "warning: …" lines. Empty without [envelope], and of a structure that is not linear.
+
+    Raises:
+        RefusedError: The records of a suite do not fit the structure.
+    """
+    section = content.envelope
+    linear = structure.linear
     if section is None or linear is None:
         return ""
-    text, duration, step, moved = "", section.duration, section.step, linear
+    text = ""
+    duration = section.duration
+    step = section.step
+    moved = linear
     for name, history in histories(linear).items():
+        # A load history whose first step is longer than the simulation acts as one straight line.
+        # This happens if its times are in another unit, such as ms.
         if len(history.samples) > 2 and history.step > duration:
             text += (
                 f"warning: {name}: the motion ends before the second sample, at {history.step:g}"
@@ -161,24 +202,36 @@ def motion_text(content: Content, structure: Structure) -> str:
     if content.records is not None:
         records = suite_records(content.records, section, structure)
         text += records_text(content.records, records, nominal_mode(linear))
-        if not yields(linear):  # peaks under records are found with nodes of their own
+        # Of a linear structure peaks under records are found with time nodes of their own, finer
+        # than the step of the case. Where columns yield, the step must be fine enough for the
+        # strongest record.
+        if not yields(linear):
             return text
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
         duration = step * round(strongest.duration / step)
         moved = linear.moved_by(strongest.ground)
-    # of a very long motion the first steps tell enough, and `check` ends in seconds
+    # Of a very long response the first steps tell enough, and `check` is to end in seconds.
     duration = min(duration, MOST_TIMED_STEPS * step)
     return text + "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
 
 
 def foreseen_stages(content: Content, petsc: Mapping[str, str]) -> tuple[list[Foreseen], str]:
-    """Return what stages of a run will take, and a warning if a part that was tried failed."""
-    from alphacut.commands.foresee import foresee  # whose work imports much
+    """Return what the stages of a run will take, and a warning if a part that was tried failed.
+
+    Args:
+        content: The case.
+        petsc: PETSc's options without their prefix.
+
+    Returns:
+        An entry for each stage until the first one that fails; and the warning as a line, else "".
+    """
+    from alphacut.commands.foresee import foresee  # it imports all stages, which takes a second
 
     found: list[Foreseen] = []
     try:
         found.extend(foresee(content, petsc))
     except (FailedError, RefusedError, CampaignError) as error:
+        # The case is valid: a shortened part of the work may fail where the whole does not.
         return found, f"warning: work that was begun to foresee its time failed: {error}\n"
     return found, ""
 
@@ -197,7 +250,12 @@ def foreseen_text(foreseen: Sequence[Foreseen]) -> str:
 
 
 def modes_document(modes: NominalModes) -> dict[str, object]:
-    """Return periods in s, damping ratios, effective masses in kg and the moved mass, for JSON."""
+    """Return the natural modes of a structure as a JSON document, by rising frequency.
+
+    "periods_s", "damping_ratios" and "effective_masses_kg" are lists with an entry for each mode;
+    "moved_mass_kg" is the mass that moves with the ground. Only the lowest frequencies can be zero:
+    the period of such a mode is above 1e300 s, since JSON has no infinity.
+    """
     return {
         "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),
         "damping_ratios": modes.damping_ratios.tolist(),
@@ -207,29 +265,40 @@ def modes_document(modes: NominalModes) -> dict[str, object]:
 
 
 def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
-    """Return the first period, a table of the first modes, and the weight that moves.
+    """Return the first period, a table of the lowest modes, and the weight that moves.
 
-    Modes are shown up to 90 % of the moved mass, but not more than `MAX_MODES`.
+    Modes are shown until their effective masses add up to 90 % of the mass that moves with the
+    ground, but three at least and eight at most, if the structure has as many. Without such a mass
+    eight are shown.
 
     Args:
-        modes: The modes.
+        modes: Undamped modes by rising frequency, at the most plausible values.
         is_shaken: Whether the ground moves, as under buildings, whose first periods are longer than
             those of parts of machines.
+
+    Returns:
+        Lines that end with a newline, with a warning if the first period is unusual.
     """
     periods = 2 * pi / np.maximum(modes.frequencies, 1e-300)
     first = float(2 * pi / modes.frequencies[0])
     text = f"first natural period: {first:.4g} s, at the most plausible values\n"
-    # parts of machines have some 1 ms, one-storey buildings .05 s, the highest towers 10 s
-    shortest = 0.02 if is_shaken else 1e-3
+    # Parts of machines have periods of some 1 ms, one-storey buildings 0.05 s, the highest towers
+    # 10 s.
+    shortest = 1e-3
+    if is_shaken:
+        shortest = 0.02
     if not shortest <= first <= 10.0:
         text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
         text += " not exchanged?\n"
     moved = modes.moved_mass
     fractions = modes.effective_masses / (moved or np.inf)
+    # Building codes ask for the modes that have 90 % of the mass (EN 1998-1, 4.3.3.3.1).
     needed = int(np.searchsorted(np.cumsum(fractions), 0.9)) + 1
     rows = []
-    for k in range(min(max(needed, LEAST_MODES), MAX_MODES, len(fractions))):
-        mass = percent_text(float(fractions[k])) if moved else "–"
+    for k in range(min(max(needed, 3), 8, len(fractions))):
+        mass = "–"
+        if moved:
+            mass = percent_text(float(fractions[k]))
         damping = percent_text(modes.damping_ratios[k], 2)
         rows.append((f"{k + 1}", f"{engineering(float(periods[k]), '')} s", damping, mass))
     text += text_table(("mode", "period", "damping ratio", "effective mass"), rows)
@@ -240,16 +309,19 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
 
 
 def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
-    """Yield a sentence for each output whose peak may rise much between nodes a step apart.
+    """Yield a sentence for each output whose peak may rise much between time nodes.
 
-    The peak and what motions add to it between nodes are those of the most plausible structure. Of
-    columns that yield all peaks but those of accelerations are found between nodes as well; these
-    are judged by the motion of the initial stiffness.
+    The peak, and what responses add to it between nodes, are those of the most plausible structure.
+    Where columns yield, all peaks but those of accelerations are found between nodes as well; these
+    are judged by the response with the initial stiffness.
 
     Args:
         linear: A linear structure, or a frame that yields.
-        duration: Length of the motion, in s.
+        duration: Length of the response, in s.
         step: Distance of the nodes, in s.
+
+    Raises:
+        FailedError: The response could not be computed.
     """
     has_events = yields(linear)
     if has_events:
@@ -261,7 +333,8 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     nominal = np.zeros((1, 0))  # the one structure without fuzzy inputs
     at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
     between = node_deviation(flow, nominal).T
-    # At rest rounding alone moves a structure: its peak is no measure of what is between nodes.
+    # At rest rounding alone moves a structure, and its peak is no measure of what is between nodes.
+    # `reach` is the size of each output that the energy of the response allows, shape (outputs,).
     peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
     widening = within_steps(at_nodes, between).max(axis=1) / peaks - 1
     for name, fraction in zip(linear.outputs, widening, strict=True):
@@ -269,10 +342,13 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
             continue
         if has_events:
             what = f"the step of {step:g} s is too coarse: its peak may be missed"
-            most = "altogether" if fraction >= 1 else f"by about {fraction:.1%}"
+            most = f"by about {fraction:.1%}"
+            if fraction >= 1:
+                most = "altogether"
             yield f"{name}: {what} {most} between nodes"
         else:
-            # What motions add between nodes falls with the square of the step.
+            # A curve is farthest from its chord by h²/8 max |q''|: the distance falls with the
+            # square of the step h, and half a step leaves a quarter.
             what = f"the step of {step:g} s widens its bound by about {fraction:.1%}"
             yield f"{name}: {what} between nodes, one of {step / 2:g} s by {fraction / 4:.1%}"
 
@@ -280,17 +356,22 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
 def records_text(
     section: RecordsSection, records: Sequence[ScaledRecord], mode: NominalMode
 ) -> str:
-    """Return a table of a suite's records, as files hold them and as they are used, and warnings.
+    """Return a table of the ground motion records of a suite, and their warnings.
+
+    The left columns describe each record as its file holds it, the columns "PGA used", "Sa(T1)
+    used" and "motion" as it moves the structure, after correction and scaling. Accelerations are in
+    g.
 
     Args:
         section: The records of the case, as their files hold them.
-        records: The same records as they move the structure.
-        mode: First mode of the structure, of whose period and damping ratio Sa(T1) is.
+        records: The same records in the same order, as they move the structure.
+        mode: First mode of the structure, whose period and damping ratio Sa(T1) is for.
+
+    Returns:
+        Lines that end with a newline, with "warning: …" lines at the end.
     """
     rows = []
     for raw, record in zip(section.recordings, records, strict=True):
-        peaks = raw.peak, record.measures["PGA"], record.measures["Sa(T1)"]
-        peak, used_peak, spectral = (f"{x / STANDARD_GRAVITY:.3g} g" for x in peaks)
         rows.append(
             (
                 raw.name,
@@ -299,30 +380,48 @@ def records_text(
                 f"{raw.step:g} s",
                 f"{len(raw.samples)}",
                 percent_text(raw.mean_to_peak_ratio, 2),
-                peak,
-                used_peak,
-                spectral,
+                _in_g(raw.peak),
+                _in_g(record.measures["PGA"]),
+                _in_g(record.measures["Sa(T1)"]),
                 f"{record.duration:.4g} s",
             )
         )
-    head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
-    text = text_table((*head, "Sa(T1) used", "motion"), rows)
+    head = ["record", "format", "unit", "step", "samples", "mean/peak", "peak"]
+    head += ["PGA used", "Sa(T1) used", "motion"]
+    text = text_table(head, rows)
     of_mode = f"T1 = {mode.period:.4g} s with the structure's own damping ratio"
     text += f"Sa(T1): pseudo-acceleration ω² max |u| at {of_mode}, {percent_text(mode.ratio)}\n"
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
 
 
-def rows_of(prefix: str, section: Section) -> Iterator[Row]:
-    """Yield a row of each quantity of a section, and of the sections below it.
+def _in_g(acceleration: float) -> str:
+    """Return an acceleration in m/s² as text in g with three digits."""
+    return f"{acceleration / STANDARD_GRAVITY:.3g} g"
 
-    A row has the key with `prefix` before it, the value in SI units with prefixes, and the kind of
-    number. Quantities that the case leaves out are not shown, but columns that are computed.
+
+def rows_of(prefix: str, section: Section) -> Iterator[Row]:
+    """Yield a row of each quantity in a section of a case, and in the sections below it.
+
+    Quantities that the case leaves out have no row, except columns of frames, whose default
+    matters. Texts and other values that are no quantities have none either.
+
+    Args:
+        prefix: Beginning of the keys, empty or with its dot, such as "cell.".
+        section: The validated section.
+
+    Yields:
+        The full key, with "[2]" for the second entry of an array; the value in SI units with
+        prefixes; and the kind of number: "crisp", "interval", "triangle", "trapezoid", "fuzzy",
+        "number", or "default" where the case leaves it out; ", unusual" is added to quantities of
+        unusual size.
     """
     for key, info in type(section).model_fields.items():
         is_stated = section.has_key(key)
         is_default = key == "columns" and getattr(section, "stiffness", None) is None
         unit = quantity_of(info)
-        si = unit.si if unit else ""
+        si = ""
+        if unit:
+            si = unit.si
         for index, entry in _entries(getattr(section, key)).items():
             row_key = f"{prefix}{key}{index}"
             if isinstance(entry, Section):
@@ -330,14 +429,26 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
             elif isinstance(entry, FuzzyNumber):
                 if is_stated or is_default:
                     # Parameters of matrices have any unit, which is converted when it is read.
-                    words = _numbers(entry, si) + (" in SI" if key == "parameters" else "")
-                    kind = KINDS.get(type(entry), "fuzzy") if is_stated else "default"
-                    yield row_key, words, kind + (_mark_of_size(entry, si) if unit else "")
+                    words = _numbers(entry, si)
+                    if key == "parameters":
+                        words += " in SI"
+                    kind = "default"
+                    if is_stated:
+                        kind = _kind_of(entry)
+                    if unit:
+                        kind += _mark_of_size(entry, si)
+                    yield row_key, words, kind
             elif isinstance(entry, float):
                 if si and (is_stated or is_default):
                     yield row_key, engineering(entry, si), "number"
             else:
                 yield from ((row_key, words, kind) for words, kind in _words_and_kind(entry))
+
+
+def _kind_of(number: FuzzyNumber) -> str:
+    """Return the kind of a fuzzy number in a word, "fuzzy" of those that no word tells."""
+    kinds = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
+    return kinds.get(type(number), "fuzzy")
 
 
 def _entries(value: object) -> dict[str, object]:
@@ -352,11 +463,19 @@ def _entries(value: object) -> dict[str, object]:
 
 
 def _words_and_kind(entry: object) -> Iterator[tuple[str, str]]:
-    """Yield text and kind of a quantity that is no single number; nothing of what is none."""
+    """Yield text and kind of a quantity that is no single number; nothing of any other value.
+
+    Args:
+        entry: An amplitude with its SI unit; a harmonic history; a factor with its matrix; the
+            damping of the material; or the plane stiffness of a phase.
+
+    Yields:
+        The text, in SI units with prefixes or in GPa, and the kind in a word or two.
+    """
     match entry:
         case (FuzzyNumber() as force, str(si)):
-            yield _numbers(force, si), KINDS.get(type(force), "fuzzy") + _mark_of_size(force, si)
-        case ForceHistory(History(frequency=omega)) if omega:
+            yield _numbers(force, si), _kind_of(force) + _mark_of_size(force, si)
+        case ForceHistory(History(frequency=omega)) if omega:  # in rad/s; 0 of other histories
             hertz = engineering(omega / (2 * pi), "")
             yield f"{hertz} Hz, period {engineering(2 * pi / omega, '')} s", "harmonic"
         case (Monomial() as factor, np.ndarray() as array):
@@ -374,12 +493,15 @@ def _mark_of_size(number: FuzzyNumber, si: str) -> str:
     smallest, largest = QUANTITIES[si].usual
     sizes = [abs(end) for end in number.support]
     is_usual = min(sizes) == 0 or (smallest <= min(sizes) and max(sizes) <= largest)
-    return "" if is_usual else UNUSUAL
+    if is_usual:
+        return ""
+    return UNUSUAL
 
 
 def _numbers(number: FuzzyNumber, si: str) -> str:
     """Return the ends of the support and of the highest cut of a number, each once, rising."""
-    support, core = number.support, number.cut(1.0)
+    support = number.support
+    core = number.cut(1.0)
     corners = dict.fromkeys((support.lower, core.lower, core.upper, support.upper))
     return " … ".join(engineering(corner, si) for corner in corners)
 
@@ -391,11 +513,21 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
 
 
 def verify(options: argparse.Namespace, out: TextIO) -> int:
-    """Test all proved envelopes in a folder by exact motions; return exit status 0.
+    """Test all guaranteed envelopes in a folder of results by exact responses.
+
+    A run stores with each guaranteed envelope the inputs of some structures and their exact
+    responses. They are compared with the stored bounds, without the proof.
+
+    Args:
+        options: Of the command line: `folder`, `json` and `quiet`.
+        out: Takes a line for each envelope, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
 
     Raises:
-        RefusedError: The folder holds no envelope.
-        ContradictionError: A motion lies outside an envelope that is proved.
+        RefusedError: The folder holds no envelope, or its files are damaged.
+        ContradictionError: A response lies outside an envelope that is guaranteed.
     """
     folder = ResultsFolder.read(Path(options.folder))
     names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
@@ -408,8 +540,9 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     for name in names:
         data = folder.dataset(f"{name}.nc")
         peaks = json.loads(folder.content(f"{name}.json"))["result"]["peak"].values()
-        nature, n_motions = str(data.attrs["nature"]), 0
-        if "motion_inputs" in data:  # which proved envelopes alone store
+        nature = str(data.attrs["nature"])
+        n_motions = 0
+        if "motion_inputs" in data:  # which guaranteed envelopes alone store
             points, motions = stored_motions(data)
             lower, upper = np.moveaxis(data["cut"].values, -1, 0)
             Trial(envelope_of(data), lower, upper).require_agreement(points, motions)
@@ -426,13 +559,25 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def envelope_of(data: xarray.Dataset) -> Envelope:
-    """Return the envelope in a dataset, with the supports of its fuzzy inputs as intervals."""
+    """Return the envelope that a dataset of a run holds.
+
+    Args:
+        data: Dataset of an envelope file, in SI units, with the axes alpha, time, output and
+            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2).
+
+    Returns:
+        The envelope. Its fuzzy inputs are only known as intervals, their supports or lowest cuts.
+
+    Raises:
+        KeyError: The dataset is no envelope.
+    """
     values = {name: variable.values for name, variable in data.data_vars.items()}
     names = ("lower", "upper", "lower_at", "upper_at", "error", "between", "attained_error")
     arguments: dict[str, Any] = {name: values[name] for name in names if name in values}
     for side, name in (("inner", "inner"), ("outer", "proved")):
         if f"{name}_lower" in values:
             arguments[side] = Ends(values[f"{name}_lower"], values[f"{name}_upper"])
+    # The lowest α-cut contains all others: as an interval it has the bounds of this level.
     supports = zip(data["parameter"].values, values["cut"][0], strict=True)
     return Envelope(
         alpha=data["alpha"].values,

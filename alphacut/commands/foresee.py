@@ -43,17 +43,10 @@ from alphacut.stages.foreseen import MOST_TIMED_STEPS, Material, possible_materi
 from alphacut.stages.image import study_of
 from alphacut.stages.store import Stage, StageContext, no_progress
 
-PARTS = (1 / 64, 1 / 64, 1 / 32, 1 / 16)
-"""Fractions of a work that are timed, one after the other; the first part compiles as well."""
 T = TypeVar("T")
 LONG_ENOUGH = 2.0
 """Seconds of parts, or of work that was begun, after which no more is timed: more of it would tell
 more, but let the user of `check` wait."""
-FEWEST = 5
-"""Packings that tell how far their statistics vary, the fewest that a case may have."""
-FOLLOWED = 1.7
-"""Power of the nodes done to which the time of a Graph Follower grows, as measured: 1.2 where few
-trajectories are computed, 2 where their number grows with the nodes."""
 
 
 class Foreseen(NamedTuple):
@@ -73,12 +66,20 @@ class Foreseen(NamedTuple):
 
 
 def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
-    """Yield what the stages of a run of a case will take, but the shares of inputs and figures.
+    """Yield what each stage of a run of a case will take, but the shares of inputs and the figures.
+
+    The stages are begun or computed in part, one after the other as the entries are taken.
+
+    Args:
+        content: The case.
+        petsc: PETSc's options without their prefix.
 
     Raises:
         FailedError: A part of the work fails, as the whole may.
         RefusedError: A part of the work is refused, as the whole may be.
     """
+    # What one stage finds is the input of the next: a radius map from few packings, and the modulus
+    # of a part of an image, stand for those of the run.
     material = None
     if "microstructure" in content.stages and content.microstructure is not None:
         found, radius = _particles(content.microstructure, spheres=content.has_spheres)
@@ -99,27 +100,41 @@ def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
 def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
     """Return about how many seconds a work takes, from the times of small parts of it.
 
-    The time of a part x of the work is taken as a + b x, where a is what every part takes once.
-    Both are fitted to the times of parts by least squares of the relative errors.
+    The parts are 1/64, 1/64, 1/32 and 1/16 of the work, until they have taken two seconds together.
+    The time of a part x is taken as a + b x, where a is what every part takes once; a and b are
+    fitted by least squares of the relative errors. The first part also compiles kernels: what it
+    takes longer than its repetition is added once.
 
     Args:
-        run: Function that does about a fraction of the work, and returns the fraction done.
-        fewest: Number of parts that are timed, however long they take.
+        run: Function that does about a given fraction of the work, and returns the fraction done.
+        fewest: Number of parts that are timed at least, however long they take.
+
+    Returns:
+        a + b with the time of compiling, in s; not less than the longest part took. If all parts
+        did the same fraction, the time of the last one over its fraction. If one or two parts took
+        the two seconds, the time of the last one, since such parts consist of what every part takes
+        once.
     """
-    parts, seconds = list[float](), list[float]()
-    for fraction in PARTS:
+    parts = list[float]()
+    seconds = list[float]()
+    # After two seconds no more is timed: it would tell more, but let the user of `check` wait.
+    for fraction in (1 / 64, 1 / 64, 1 / 32, 1 / 16):
         start = perf_counter()
         parts.append(run(fraction))
         seconds.append(perf_counter() - start)
         is_long = sum(seconds[1:]) > LONG_ENOUGH or seconds[0] > 2 * LONG_ENOUGH
         if is_long and len(parts) >= fewest:
             break
-    compiling = max(0.0, seconds[0] - seconds[:2][-1])  # of the same part, done once more
+    # The second part is the same as the first: it shows what compiling took. If it was left out,
+    # the slice has the first time alone, and the difference is 0.
+    compiling = max(0.0, seconds[0] - seconds[:2][-1])
     # A work that has no smaller parts is timed by equal ones.
     if len(parts) > 2 and len(set(parts)) == 1:
         return compiling + seconds[-1] / parts[-1]
     if len(parts) < 3:  # parts so long consist of what every part takes once
         return compiling + seconds[-1]
+    # The weights 1/t make the least squares those of the relative errors: the short parts would
+    # else not count, and they tell a.
     timed = np.array(seconds[1:])
     slope, constant = np.polyfit(parts[1:], timed, 1, w=1 / timed)
     return compiling + float(max(slope + constant, timed.max()))
@@ -132,16 +147,27 @@ class InterruptedWorkError(Exception):
 def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.0) -> float:
     """Return about how many seconds a stage takes: it is begun, and interrupted by its progress.
 
+    The stage reports the completed fraction p of its work. Once it has worked for two seconds, its
+    whole time is reckoned as t / p^power from the time t until then, and it is interrupted. A stage
+    that ends before is timed as it is.
+
     Args:
-        stage: A stage that reports its progress evenly.
-        has_setup: Whether the first piece builds what all share. The time of others is then
-            reckoned from its end on.
+        stage: A stage that reports its progress evenly. Its result is not kept.
+        has_setup: Whether the first piece builds what all others share. Its time then counts once,
+            and only the time and progress after its end are extrapolated.
         power: Power of the progress to which the time grows.
+
+    Raises:
+        FailedError: The stage fails. Whatever else it raises leaves this function as well.
     """
     start = perf_counter()
     setup_end = list[tuple[float, float]]()
 
     def tick(done: float) -> None:
+        """Raise InterruptedWorkError with the time of the whole stage, as soon as it is known.
+
+        Called with the completed fraction; the first call above 0 is the end of the setup.
+        """
         seconds = perf_counter() - start
         if not done:
             return
@@ -162,10 +188,32 @@ def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.
 def _particles(
     section: MicrostructureSection, *, spheres: bool
 ) -> tuple[Foreseen, RadiusMapSection]:
-    """Return what the radius map of particles takes, and the one of the fewest packings allowed."""
-    part, number, fewest, pieces = section, 1, 1, "sections"
+    """Return what the radius map of particles will take, and such a map from few packings.
+
+    The fewest packings that a case may have are made, with the particles of the case; the time is
+    taken as proportional to their number. Measured circles are computed as they are.
+
+    Args:
+        section: The particles.
+        spheres: Whether they are spheres.
+
+    Returns:
+        The entry of stage microstructure, and the section [radius] of the fitted map.
+
+    Raises:
+        RefusedError: The particles are too dense, or a file is not read.
+        FailedError: Particles still overlap after all steps of the packing, or no map fits.
+    """
+    part = section
+    number = 1
+    fewest = 1
+    pieces = "sections"
     if (packing := section.packing) is not None:
-        number, fewest, pieces = packing.packings, min(packing.packings, FEWEST), "packings"
+        number = packing.packings
+        # Five packings are the fewest that a case may have: they tell how far statistics vary,
+        # without which no map is fitted.
+        fewest = min(packing.packings, 5)
+        pieces = "packings"
         fewer = packing.model_copy(update={"packings": fewest})
         part = section.model_copy(update={"packing": fewer})
     start = perf_counter()
@@ -176,8 +224,17 @@ def _particles(
 
 
 def sample_count(problem: CellProblem) -> int:
-    """Return how many samples the plan of a cell takes, where no results lead to further ones."""
+    """Return how many samples the plan of a cell takes.
+
+    The plan is run with a function that returns 1 for all outputs. Plans that add samples where
+    results ask for it add none then.
+
+    Raises:
+        RefusedError: The model of the cell needs a library that is missing, or the plan does not
+            fit.
+    """
     cell = FuzzyCell.of(problem.nominal_radius, problem.nominal_phases, problem.inputs)
+    # The signs that mechanics proves shorten a plan: they are found from the model as in a run.
     bounds = propagate(
         lambda **_: dict.fromkeys(modulus.OUTPUTS, 1.0),
         cell.inputs,
@@ -190,15 +247,30 @@ def sample_count(problem: CellProblem) -> int:
 
 
 def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
-    """Return what the bounds of an image or a volume take, and the material of a part of it."""
-    study, section, solved = study_of(cell), content.modulus, list[FuzzyImageStiffness]()
-    alpha, average = section.alpha, section.average
+    """Return what the bounds of an image or a volume will take, and the material of a part of it.
+
+    Args:
+        cell: The image and its phases.
+        content: The case, for the α-levels and for what the structure takes from the image.
+
+    Returns:
+        The entry of the stage; and Young's modulus and the loss factor, as fuzzy numbers, of the
+        largest part that was solved. Both are None if the structure takes nothing from the image.
+
+    Raises:
+        RefusedError: The image is not read, or the phases do not fit it.
+        FailedError: A linear system was not solved.
+    """
+    study = study_of(cell)
+    section = content.modulus
+    solved = list[FuzzyImageStiffness]()
+    alpha = section.alpha
+    average = section.average
 
     def run(fraction: float) -> float:
         part = cropped(study, fraction)
-        solved.append(
-            solve_study(part, alpha=alpha, average=average, device="cpu", tick=no_progress)
-        )
+        found = solve_study(part, alpha=alpha, average=average, device="cpu", tick=no_progress)
+        solved.append(found)
         return float(part.image.values.size / study.image.values.size)
 
     found = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
@@ -209,7 +281,15 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
 
 
 def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
-    """Return the study of about a fraction of the pixels, around the middle of the image."""
+    """Return the study of about a fraction of an image, around its middle.
+
+    Args:
+        study: The image, its phases and their ranges on each level.
+        fraction: Fraction of the pixels or voxels, in (0, 1].
+
+    Returns:
+        Study whose sides are scaled alike and have four pixels at least, if the image has as many.
+    """
     values = study.image.values
     window = []
     for length in values.shape:
@@ -229,7 +309,20 @@ def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
 def _motion(
     content: Content, section: EnvelopeSection, material: Material | None
 ) -> Iterator[Foreseen]:
-    """Yield what motions take, of a structure of the material of its cell, if that is known."""
+    """Yield what the responses of the structure will take.
+
+    These are the identification of inputs, then either the records of a suite or the envelopes of
+    all studies and the questions.
+
+    Args:
+        content: The case.
+        section: Its section [envelope].
+        material: Material of the cell as far as it was computed for this; None if it was not.
+
+    Raises:
+        RefusedError: A part of the work is refused.
+        FailedError: A part of the work fails.
+    """
     structure = _structure(content, material)
     if content.identify is not None:
         start = perf_counter()
@@ -248,10 +341,20 @@ def _motion(
 def _structure(content: Content, material: Material | None) -> Structure:
     """Return the structure with a fuzzy modulus where stage modulus will give one.
 
-    Where neither the case nor a part of stage modulus says how fuzzy it is, it is taken a tenth to
-    either side.
+    Args:
+        content: The case.
+        material: Young's modulus in Pa and loss factor from a part of the stage; None if unknown.
+
+    Returns:
+        The structure. If neither the case nor `material` says how fuzzy Young's modulus E and the
+        damping ratios are that the stage computes, they become triangular, a tenth to either side.
+
+    Raises:
+        RefusedError: There is no such structure.
     """
     structure = content.structure_of(*(material or possible_materials(content)[0]))
+    # Envelopes of crisp structures take much less time, so that a stand-in must be fuzzy. How wide
+    # it is matters less: a tenth is as much as cases usually have.
     if "modulus" not in content.stages or content.modulus.alpha == (1.0,):
         return structure
     numbers = dict(structure.numbers)
@@ -274,9 +377,18 @@ def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]
 
 
 def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
-    """Return what the envelope of a study takes, in s."""
+    """Return about how many seconds the envelope of a study takes.
+
+    A Graph Follower is begun and interrupted; other methods are timed on short durations.
+
+    Raises:
+        RefusedError: An input or an output does not fit the structure.
+        FailedError: A response could not be computed.
+    """
     if task.section.method in FOLLOWERS:
-        return begun_seconds(envelope.stage(structure, task), power=FOLLOWED)
+        # Its time grows as a power of the time nodes done. Measured were 1.2 where few trajectories
+        # are computed, and 2 where their number grows with the nodes; 1.7 lies between.
+        return begun_seconds(envelope.stage(structure, task), power=1.7)
 
     def run(fraction: float) -> float:
         part, done = shortened(task, fraction)
@@ -287,7 +399,20 @@ def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
 
 
 def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
-    """Yield what the peaks under the records of a suite take, from those under one of them."""
+    """Yield what the peaks under the records of a suite, and fragility over intensities, will take.
+
+    The peaks under the record of median duration are computed; the time is taken as proportional to
+    the durations. Of a frame that yields, some responses at two intensities are timed.
+
+    Args:
+        content: The case, which has a suite.
+        structure: The structure.
+        task: The response of [envelope].
+
+    Raises:
+        RefusedError: The records or the limits do not fit the structure.
+        FailedError: A response could not be computed.
+    """
     assert content.records is not None
     records = suite.suite_records(content.records, task.section, structure)
     limited = tuple(dict.fromkeys((*structure.outputs, *content.limited_outputs)))
@@ -307,7 +432,19 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
 
 
 def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
-    """Yield what the questions take that compute motions of their own."""
+    """Yield what the questions will take that compute responses of their own.
+
+    These are [probability] and [tolerances]; the others follow from known peaks.
+
+    Args:
+        content: The case.
+        structure: The structure.
+        task: The response of [envelope].
+
+    Raises:
+        RefusedError: Limits or random inputs do not fit the structure.
+        FailedError: A response could not be computed.
+    """
     if (section := content.questions.get("probability")) is not None:
         stage = answers.stage(Probability, section, Response(structure, task))
         yield Foreseen("probability", 1, "campaigns", begun_seconds(stage))
@@ -315,7 +452,8 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
         assert content.tolerances is not None
         inputs = scale_supports(structure.inputs(task.fuzzy), content.tolerances.most)
         names = [limit.output for limit in section.limits_of(structure)]
-        model, method = structure.model.with_outputs(names), Auto(PEAK_ERROR, peaks=True)
+        model = structure.model.with_outputs(names)
+        method = Auto(PEAK_ERROR, peaks=True)
 
         def run(fraction: float) -> float:
             part, done = shortened(task, fraction)
@@ -323,6 +461,7 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
             frame_envelope(model, inputs, method, **times, alpha=[0.0], progress=False)
             return done
 
-        # Two scales are tried first, then the interval between them is halved to a hundredth.
+        # Two scales are tried first, then the interval between them is halved until it is a
+        # hundredth of what it was.
         count = 2 + math.ceil(math.log2(100))
         yield Foreseen("tolerances", count, "envelopes", count * whole_seconds(run))

@@ -29,7 +29,15 @@ class Parser(argparse.ArgumentParser):
     """An argument parser that raises in place of printing its usage and leaving."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise a complaint of argparse as the refusal of an argument, with its value apart."""
+        """Raise a complaint of argparse as RefusedError, with the argument and its value apart.
+
+        Args:
+            message: Text of argparse, such as "argument --workers: invalid int value: 'x'".
+
+        Raises:
+            RefusedError: Always. A complaint of unknown form becomes "refused: …".
+        """
+        # argparse has texts only: the patterns are those of its messages in Python 3.11 to 3.13.
         argument, _, reason = message.removeprefix("argument ").partition(": ")
         cure = f"see {self.prog} --help"
         if match := re.fullmatch(r"invalid choice: '(.*?)' \(choose from (.*)\)", reason):
@@ -60,7 +68,9 @@ class CommandLine(NamedTuple):
 def split_petsc(arguments: Sequence[str]) -> CommandLine:
     """Return the words of a command line and the options of PETSc among them.
 
-    The word after an option of PETSc is its value, unless it begins as an option or is a case.
+    An option of PETSc begins with "-rve_"; its name is kept without this. The word after it is its
+    value, unless this begins as an option, such as "-x" or "--json", or ends in ".toml", as a case
+    does; then, and at the end, the value is empty. Negative numbers such as "-1" are values.
     """
     line = CommandLine([], {})
     option = ""  # whose value may follow
@@ -79,7 +89,15 @@ def split_petsc(arguments: Sequence[str]) -> CommandLine:
 
 
 def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) -> None:
-    """Refuse PETSc options, named without their prefix, where a case solves no prisms."""
+    """Refuse options of PETSc where a command solves no prisms, by which alone they are used.
+
+    Args:
+        petsc: The options without their prefix; if empty, nothing is refused.
+        content: The cell of the case; None for a command without a case.
+
+    Raises:
+        RefusedError: Naming the first option.
+    """
     has_prisms = content is not None and (
         content.mesh_cell is not None
         or (content.particle_cell is not None and content.modulus.method == "prism")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -76,7 +76,8 @@ def open_results(
         RefusedError: An option does not fit the case, or the folder holds other files.
     """
     require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
-    case, path = read_case(options), options.out or folder
+    case = read_case(options)
+    path = options.out or folder
     device = getattr(options, "device", "cpu")
     if device != "cpu":
         has_image = case.content.image_cell is not None
@@ -86,9 +87,13 @@ def open_results(
         require_writable("--out", path, folder=True)
     # Under MPI the first rank alone shows progress and writes; the others compute with it.
     is_first = rank() == 0
-    lock = locked("--out", Path(path)) if path and is_first else nullcontext()
+    lock: AbstractContextManager[object] = nullcontext()
+    if path and is_first:
+        lock = locked("--out", Path(path))
     with progress_reporter(not options.quiet and is_first) as tick, lock:
-        results, is_fresh = None, getattr(options, "fresh", False)
+        # The manifest is read under the lock, since another run may be writing it.
+        results = None
+        is_fresh = getattr(options, "fresh", False)
         if path:
             results = ResultsFolder.read(Path(path))
             results.require_own_files("--out")
@@ -131,8 +136,18 @@ class Pipeline:
         return CellProblem.of(self.content, self.petsc)
 
     def run(self) -> Results:
-        """Compute every stage of the case; return their results."""
-        results, stages = self.results, self.content.stages
+        """Compute every stage of the case that `stages` names, and what follows from them.
+
+        The order is microstructure, modulus, envelope with the answers to questions, and the shares
+        of inputs. Results are kept in the store and added to `results`, which is returned.
+
+        Raises:
+            RefusedError: A stage lacks what it needs.
+            FailedError: A computation failed, or an error exceeds a tolerance.
+            CampaignError: Samples of a cell failed.
+        """
+        results = self.results
+        stages = self.content.stages
         self.store.progress.foresee(self._kinds_of_stages())
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
@@ -175,8 +190,18 @@ class Pipeline:
         return self.store.take(stage)
 
     def compute_modulus(self) -> None:
-        """Compute stage modulus, of an image or of samples of a cell, and check its errors."""
-        results, section = self.results, self.content.modulus
+        """Compute stage modulus, of an image or of samples of a cell, and check its errors.
+
+        The result is kept in the store and put into `results.image` or `results.modulus`.
+
+        Raises:
+            RefusedError: The cell or its mesh does not fit, or E of spheres is outside its bounds.
+            FailedError: A linear system was not solved, or the error exceeds the tolerance of the
+                case.
+            CampaignError: Samples failed.
+        """
+        results = self.results
+        section = self.content.modulus
         if self.content.image_cell is not None:
             image_cell = self.content.image_cell
             stage = image.stage(image_cell, section.alpha, section.average, self.device)
@@ -186,21 +211,37 @@ class Pipeline:
         results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
         cell.require_tolerance(numbers.error, section.tolerance)
-        top = float(numbers.E_GPa.lower[-1]), float(numbers.E_GPa.upper[-1])
-        cell.require_bounds(top, numbers.references, numbers.particles)
+        # The classical bounds are those at the nominal inputs, as E of the highest level is.
+        highest = (float(numbers.E_GPa.lower[-1]), float(numbers.E_GPa.upper[-1]))
+        cell.require_bounds(highest, numbers.references, numbers.particles)
 
     def _compute_motion(self) -> None:
-        """Compute the identified inputs, then the suite of records or envelopes, and answers."""
-        results, content, section = self.results, self.content, self.content.envelope
+        """Compute what stage envelope asks for, and put it into `results`.
+
+        These are the inputs that measured modes identify, then the peaks under each record of a
+        suite or the envelopes of all studies, and at last the answers to the questions of the case.
+        The structure takes its material from `results.modulus` or `results.image`, if there is one.
+
+        Raises:
+            RefusedError: An input, record or limit does not fit the structure.
+            FailedError: A response could not be computed, or an error exceeds the tolerance of the
+                case.
+        """
+        results = self.results
+        content = self.content
+        section = self.content.envelope
         assert section is not None  # of stage envelope
-        material, structure = results.modulus or results.image, content.structure
+        material = results.modulus or results.image
+        structure = content.structure
         if material is not None:
-            young, loss = fuzzy_modulus(material.arrays), fuzzy_loss(material.arrays)
+            young = fuzzy_modulus(material.arrays)
+            loss = fuzzy_loss(material.arrays)
             structure = content.structure_of(young, loss)
         assert structure is not None
         if content.identify is not None:
-            learned = identify.identify_inputs(content.identify, structure, section.alpha)
-            results.learned, structure = learned
+            results.learned, structure = identify.identify_inputs(
+                content.identify, structure, section.alpha
+            )
         results.structure = structure
         (task,) = envelope.tasks(section, ())  # of [envelope] itself
         if content.records is not None:
@@ -215,12 +256,20 @@ class Pipeline:
                 results.answers[kind.key] = self.store.take(stage).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
-        """Compute the envelopes of all studies into the results, and check their errors."""
-        results, content = self.results, self.content
+        """Compute the envelopes of all studies into `results`, and check their errors.
+
+        Raises:
+            RefusedError: An input or an output does not fit the structure.
+            FailedError: A response could not be computed, or an error exceeds the tolerance of the
+                case.
+        """
+        results = self.results
+        content = self.content
         for warning in cut_record_warnings(content, structure):
             say(f"warning: {warning}")
         results.tasks = envelope.tasks(section, content.study, content.limited_outputs)
-        # Side by side the longest ones begin, so that none of them is left to the end alone.
+        # The longest tasks begin, so that none of them is left to the end alone. Their time grows
+        # about as inputs times duration.
         longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
@@ -232,11 +281,27 @@ class Pipeline:
     def _suite_response(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
     ) -> Response:
-        """Compute peaks under each record of a suite into the results; return the response."""
+        """Compute peaks under each record of a suite, and return what questions are asked about.
+
+        Args:
+            section: The records of the case.
+            structure: The structure that they move.
+            task: The response of [envelope]: names of the fuzzy inputs, time step and α-levels.
+
+        Returns:
+            The response with the peaks over the suite and, where columns yield and fragility is
+            asked for, those over the intensities of each record. The peaks are put into
+            `results.suite`.
+
+        Raises:
+            RefusedError: A record or a limit does not fit the structure.
+            FailedError: A response could not be computed.
+        """
         records = suite.suite_records(section, task.section, structure)
         for record in records:
             for warning in record.warnings:
                 say(f"warning: {warning}")
+        # All outputs have peaks in the results, and those that questions limit need not be outputs.
         limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
         task = replace(task, limited=limited)
         longest_first = sorted(records, key=lambda record: -record.duration)
@@ -257,7 +322,20 @@ class Pipeline:
         return Response(structure, task, found.peak, found, increments)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Return the peaks for questions: of the study with [envelope]'s motion, or computed."""
+        """Return the peaks that questions are asked about, by name.
+
+        Args:
+            task: The response of [envelope], with the names of the limited peaks.
+            structure: The structure.
+
+        Returns:
+            The peaks of the study that has just this response, if there is one; else they are
+            computed by a stage of their own. None if no question reads peaks.
+
+        Raises:
+            RefusedError: An input or an output does not fit the structure.
+            FailedError: A response could not be computed.
+        """
         for study in self.results.tasks:
             if study.has_response_of(task.section):
                 return self.results.envelopes[study.name].numbers.peak
@@ -269,10 +347,20 @@ class Pipeline:
         return self.store.take(stage).numbers
 
     def _compute_shares(self) -> None:
-        """Compute what each input contributes to the widths of E and of the richest study."""
+        """Compute by how much each input widens E, ν and the peaks, into `results.shares`.
+
+        The peaks are those of the study with the most fuzzy inputs, of several the longest.
+
+        Raises:
+            CampaignError: Samples of the cell failed.
+            FailedError: A response could not be computed.
+        """
         results = self.results
-        cells = None if results.modulus is None else self.campaign
-        task, peaks = None, dict[str, Peak]()
+        cells = None
+        if results.modulus is not None:
+            cells = self.campaign
+        task = None
+        peaks = dict[str, Peak]()
         if results.tasks:
             task = max(results.tasks, key=lambda task: (len(task.fuzzy), task.duration))
             peaks = results.envelopes[task.name].numbers.peak
@@ -292,6 +380,10 @@ def require_runnable(content: Content) -> ImageStudy | None:
 
     Returns:
         The study of the image that stage modulus takes; None where it takes none.
+
+    Raises:
+        RefusedError: A file is not read, or what a stage needs does not fit.
+        FailedError: What a stage needs cannot be built.
     """
     study_of_image = None
     if "microstructure" in content.stages and content.microstructure is not None:
@@ -304,7 +396,16 @@ def require_runnable(content: Content) -> ImageStudy | None:
 
 
 def _require_material(content: Content) -> ImageStudy | None:
-    """Require what stage modulus needs; return the study of the image that it takes, if any."""
+    """Refuse a cell, mesh or image that stage modulus cannot take.
+
+    Returns:
+        The study of the image, which was read for that; None for another cell.
+
+    Raises:
+        RefusedError: The cell, its mesh or its image does not fit the method; the α-levels make no
+            fuzzy modulus for a structure; or a structure would get its modulus from an image with
+            pores or rigid phases, of which one bound may be missing.
+    """
     has_motion = "envelope" in content.stages
     if has_motion and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
@@ -317,15 +418,22 @@ def _require_material(content: Content) -> ImageStudy | None:
         problem = CellProblem.of(content)
         problem.require_mesh()
         problem.model()
-    elif (particle := content.particle_cell) is not None:  # whose radius is not known yet
+    elif (particle := content.particle_cell) is not None:
+        # Its radius is not known yet. The model does not depend on it: building it shows whether
+        # its library is there and its resolution allowed.
         CellProblem(ThetaSection(), particle, content.mesh, content.modulus).model()
     return None
 
 
 def _require_motion(content: Content) -> None:
-    """Require that identification, each study's envelope and each question can be computed.
+    """Refuse a case whose identification, envelopes or questions cannot be computed.
 
-    Where the modulus is not known before a stage has run, that must be so for a possible one.
+    If the material is not known before a stage has run, two extremes of what it may be are tried,
+    and the case is refused only if neither works.
+
+    Raises:
+        RefusedError: Of the first material, if all are refused.
+        FailedError: Likewise, if the computation cannot be built with it.
     """
     if content.structure is None or content.envelope is None:
         return
@@ -341,6 +449,18 @@ def _require_motion(content: Content) -> None:
 
 
 def _require_motion_of(content: Content, section: EnvelopeSection, structure: Structure) -> None:
+    """Refuse identification, envelopes or tolerances that cannot be computed for a structure.
+
+    Args:
+        content: The case.
+        section: Its section [envelope].
+        structure: The structure, with numbers as fuzzy as they will be. The first record of a suite
+            moves it in place of all.
+
+    Raises:
+        RefusedError: An input, output, record, method or tolerance does not fit the structure.
+        FailedError: The method cannot be set up for it.
+    """
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, section.alpha)
     if content.records is not None:

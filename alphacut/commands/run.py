@@ -40,8 +40,6 @@ from alphacut.stages.microstructure import fragment
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.summary import SUMMARY, Parts, Results, Summary
 
-PAGE = "report.html"
-
 
 def add_modulus(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
     """Add the options of a command that computes stage modulus."""
@@ -58,17 +56,40 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Compute all stages of a case, draw figures, and show tables; return exit status 0."""
+    """Compute all stages of a case, keep results and figures in a folder, and show tables.
+
+    Args:
+        options: Of the command line: the case file `case` with its changes `set`, the folder `out`
+            (by default results/NAME of the case), `fresh` to compute everything anew, `no_figures`,
+            `workers`, `device`, PETSc's options `petsc`, `json` and `quiet`.
+        out: Takes the tables, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        BadInput: The case is not valid.
+        RefusedError: An option does not fit the case, or the folder holds other files.
+        FailedError: A computation failed, or an error exceeds a tolerance. Finished stages are
+            kept.
+        CampaignError: Samples of a cell failed. The others are kept.
+    """
     folder = options.out or f"results/{Path(options.case).stem}"
-    start, names = time.perf_counter(), list[str]()
+    start = time.perf_counter()
+    names = list[str]()
     has_figures = not options.no_figures
     with open_results(options, folder) as (case, store):
         with pool(store.workers) as executor:
             results = Pipeline(
-                Results(case.content), store, options.petsc, has_figures, executor, options.device
+                Results(case.content),
+                store,
+                petsc=options.petsc,
+                figures=has_figures,
+                executor=executor,
+                device=options.device,
             ).run()
         if has_figures:
-            from alphacut.figures.all import draw_figures  # whose libraries take time to import
+            from alphacut.figures.all import draw_figures  # Matplotlib takes a second to import
 
             names = draw_figures(results, store)
         summary = Summary.of(
@@ -109,30 +130,65 @@ def add_page(parser: argparse.ArgumentParser) -> None:
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
-    """Write the page of a run and the tables requested, or compare two; return exit status 0."""
+    """Write the HTML page of a run, and the tables requested; or compare two runs.
+
+    Args:
+        options: Of the command line: `folder`, a list with one folder of results, or two to
+            compare; the file `out` of the page or None; the folders `csv` and `tables` or None;
+            `json` and `quiet`.
+        out: Takes the names of the files, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        RefusedError: Results are missing, damaged or of different runs; or another process writes
+            into the folder.
+        OSError: A file cannot be written.
+    """
     if len(options.folder) > 1:
         return compare(options, out)
     folder = ResultsFolder.read(Path(options.folder[0]))
     page = render_page(folder)
-    path = Path(options.out) if options.out else folder.path / PAGE
-    if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
+    page_name = "report.html"
+    path = folder.path / page_name
+    if options.out:
+        path = Path(options.out)
+    if path.name == page_name and path.parent.resolve() == folder.path.resolve():
         # A page within the folder is listed among its files, which a run must not write meanwhile.
         with locked("FOLDER", folder.path):
-            ResultsFolder.read(folder.path).put_text(PAGE, page)
+            ResultsFolder.read(folder.path).put_text(page_name, page)
     else:
         write_text(path, page)
-    summary, files = Summary.read(folder), list[Path]()
+    summary = Summary.read(folder)
+    files = list[Path]()
     if options.csv:
         files = tables.write_tables(summary, folder, Path(options.csv))
     if options.tables:
         files += tables.write_markup(tables.tables(summary), Path(options.tables))
-    document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, files)]}
-    write_answer(options, document, out, "".join(f"{file}\n" for file in (path, *files)))
+    names = [str(file) for file in files]
+    document = {"file": str(path), "bytes": len(page.encode()), "tables": names}
+    write_answer(options, document, out, "".join(f"{file}\n" for file in [str(path), *names]))
     return 0
 
 
 def compare(options: argparse.Namespace, out: TextIO) -> int:
-    """Show two runs side by side, and write the files requested; return exit status 0."""
+    """Show two runs side by side, and write the files requested.
+
+    Args:
+        options: Of the command line: `folder`, a list that must have two folders of results; the
+            file `out` of an HTML page, and the folders `csv` and `tables`, or None; `json` and
+            `quiet`.
+        out: Takes the table and the names of the files, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        RefusedError: There are more than two folders, their results are missing or damaged, or they
+            have no quantity in common.
+        OSError: A file cannot be written.
+    """
     folders = options.folder
     require(len(folders) == 2, "FOLDER", f"{len(folders)} folders", "one or two")
     first, second = (Summary.read(ResultsFolder.read(Path(name))) for name in folders)
@@ -147,8 +203,9 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
         files += tables.write_csv({"comparison": pd.DataFrame(rows)}, Path(options.csv))
     if options.tables:
         files += tables.write_markup({"comparison": table}, Path(options.tables))
-    text = text_table(*table) + "".join(f"{file}\n" for file in files)
-    write_answer(options, {"rows": rows, "tables": [*map(str, files)]}, out, text)
+    names = [str(file) for file in files]
+    text = text_table(table.head, table.rows) + "".join(f"{name}\n" for name in names)
+    write_answer(options, {"rows": rows, "tables": names}, out, text)
     return 0
 
 
@@ -162,7 +219,24 @@ def microstructure(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def modulus(options: argparse.Namespace, out: TextIO) -> int:
-    """Compute the fuzzy modulus of the cell or image, print its tables; return exit status 0."""
+    """Compute the fuzzy modulus of the cell or image of a case, and show its tables.
+
+    Args:
+        options: Of the command line: the case file `case` with its changes `set`, the folder `out`
+            for results or None to keep none, `workers`, `device`, PETSc's options `petsc`, `json`
+            and `quiet`.
+        out: Takes the tables of α-cuts and of all constants, and sentences on them; or the JSON
+            document with ``--json -``.
+
+    Returns:
+        Exit status 0.
+
+    Raises:
+        BadInput: The case is not valid.
+        RefusedError: The case has no cell, or an option does not fit it.
+        FailedError: A linear system was not solved, or the error exceeds the tolerance of the case.
+        CampaignError: Samples failed.
+    """
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc, device=options.device).compute_modulus()
@@ -176,26 +250,48 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
         part = cell = results.modulus.numbers
         constants = material(Parts(modulus=cell), every_constant=True)
         cost = f"{cell.samples} samples, {cell.solves} linear systems, {cell.seconds:.1f} s"
-        lines = [UPPER_BOUND] if cell.particles == "mesh" else []
-        lines += [f"{cost}, {cell.method}"] + ([cell.solver] if cell.solver else [])
-        if [*cell.plane] == [PLANE_STRAIN]:
+        lines = []
+        # Constants without stress along the fibres need the stiffness along them, which follows
+        # from that of the plane for isotropic phases alone.
+        if list(cell.plane) == [PLANE_STRAIN]:
             why = "the other definition is for one particle of two isotropic phases"
-            lines.insert(0, f"Plane strain alone: {why}")
+            lines.append(f"Plane strain alone: {why}")
+        if cell.particles == "mesh":
+            lines.append(UPPER_BOUND)
+        lines.append(f"{cost}, {cell.method}")
+        if cell.solver:
+            lines.append(cell.solver)
     if bounds := part.references.get("hashin_shtrikman_E_GPa"):
         lower, upper = bounds
         lines.insert(0, f"{isotropic_label(part.average)}: {lower:.4f} … {upper:.4f} GPa")
-    text = text_table(*tables.shown(tables.modulus(part))) + text_table(*constants)
+    cuts = tables.shown(tables.modulus(part))
+    text = text_table(cuts.head, cuts.rows) + text_table(constants.head, constants.rows)
     write_answer(options, to_document(part), out, text + "".join(f"{line}\n" for line in lines))
     return 0
 
 
 def identify(options: argparse.Namespace, out: TextIO) -> int:
-    """Identify inputs from measured modes; return exit status 0 even if these refute the frame."""
+    """Identify inputs of a structure from measured modes, and show what was learned.
+
+    Args:
+        options: Of the command line: the case file `case` with its changes `set`, PETSc's options
+            `petsc`, `json` and `quiet`.
+        out: Takes the table, or the JSON document with ``--json -``.
+
+    Returns:
+        Exit status 0, even if the measurement refutes the structure: that is a result.
+
+    Raises:
+        BadInput: The case is not valid.
+        RefusedError: The case lacks [identify], a structure or [envelope]; the file of the modes is
+            not read; or measurement and structure do not fit.
+    """
     content = read_case(options).content
     section = content.structure_section
     if content.identify is None or section is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
-    alpha, structure = content.envelope.alpha, section.nominal
+    alpha = content.envelope.alpha
+    structure = section.nominal
     learned, _ = identify_inputs(content.identify, structure, alpha)
     write_answer(options, to_document(learned), out, run_text(Parts(update=learned)))
     return 0
