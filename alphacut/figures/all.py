@@ -18,7 +18,14 @@ from alphacut.stages.summary import Results
 
 
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
-    """Yield the name of each figure that the results allow, and the figure, which is drawn then."""
+    """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
+
+    The names are those of the files: "modulus", "image", "update-inputs", the key of each answered
+    question, "fragility-curves", and those of the envelopes of each study.
+
+    Args:
+        results: Results of a run; stages that are missing have no figures.
+    """
     if results.modulus is not None:
         stated = getattr(results.content.structure_section, "modulus", None)
         yield "modulus", material.fuzzy_modulus(results.modulus, stated)
@@ -28,16 +35,22 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         yield "update-inputs", answers.identified_inputs(results.learned)
     for key, answer in results.answers.items():
         yield key, answers.DRAWINGS[key](answer)
-        if isinstance(answer, Fragility) and answer.increments:
+        if isinstance(answer, Fragility) and answer.increments:  # of a frame that yields
             yield "fragility-curves", answers.draw_incremental(answer)
     for task in results.tasks:
         yield from envelope.drawings(task, results)
 
 
 def draw_figures(results: Results, store: StageStore) -> list[str]:
-    """Draw all figures, unless those in the folder of results show the same; return their paths.
+    """Draw all figures of a run, unless those in its folder show the same.
 
-    The paths are relative to the folder of results. Those of stage microstructure come first.
+    Args:
+        results: Results of the run.
+        store: Store of its results, which has a folder.
+
+    Returns:
+        Paths of the figures relative to the folder, those of stage microstructure first. It draws
+        its own, since they need the particles, which are not kept.
     """
 
     def compute(context: StageContext) -> StageResult[list[str]]:
@@ -48,10 +61,12 @@ def draw_figures(results: Results, store: StageStore) -> list[str]:
                 paths += save(figure, context.folder / "figures" / name)
         return StageResult(sorted(path.relative_to(context.folder).as_posix() for path in paths))
 
+    # The fingerprints stand for the results: figures are drawn anew where one of them is new.
     inputs = [results.content, results.answers, sorted(results.fingerprints.values())]
     inputs.append(version_of("matplotlib"))
     stage = Stage("figures", inputs, (*NESTED, "alphacut"), list[str], compute)
-    names = list(store.take(stage).files)
+    names: list[str] = []
     if results.microstructure is not None:
-        names = [*results.microstructure.files, *names]
+        names.extend(results.microstructure.files)
+    names.extend(store.take(stage).files)
     return [name for name in names if name.startswith("figures/")]

@@ -48,9 +48,14 @@ def draw_bars(bars: Sequence[tuple[Array, Look]], names: Iterable[str], label: s
 
 
 def identified_inputs(result: LearnedInputs) -> Figure:
-    """Draw each input's interval before the measurement and its α-cuts after it.
+    """Draw the interval of each input before the measurement, and its α-cuts after it.
 
-    All are divided by the middle of the interval before, so that inputs share one axis.
+    All are divided by the middle of the interval before, so that inputs share one axis. Higher
+    levels have darker and thinner bars.
+
+    Args:
+        result: What was learned. It must not be refuted, and an interval must not be centred at
+            zero.
     """
     alpha = result.alpha
     prior = np.array([result.prior[name] for name in result.inputs], float)  # (inputs, 2)
@@ -69,10 +74,13 @@ def identified_inputs(result: LearnedInputs) -> Figure:
 def draw_tolerances(answer: Tolerances) -> Figure:
     """Draw the supports of the inputs in the case, and those within which no limit is exceeded.
 
-    All are divided by the nominal value of the input.
+    All are divided by the nominal value of the input, or by 1 where this is zero.
+
+    Args:
+        answer: Admissible scale, with the own and the scaled support of each input.
     """
     supports = answer.supports.values()
-    nominal = np.array([[x.nominal or 1.0] for x in supports])
+    nominal = np.array([[x.nominal or 1.0] for x in supports])  # (inputs, 1)
     stated: Look = {"color": GREY, "height": 0.7, "label": "in the case"}
     admissible: Look = {"color": BLUE, "height": 0.35, "label": "no limit exceeded"}
     bars = [
@@ -85,7 +93,15 @@ def draw_tolerances(answer: Tolerances) -> Figure:
 
 
 def draw_decision(answer: Decision) -> Figure:
-    """Draw, of each limit, bars from the smallest to the largest peak over it on each level."""
+    """Draw a bar from the smallest to the largest peak over its limit, for each limit and α-level.
+
+    Bars of higher levels are darker and thinner. Above them stands the verdict with its guarantee
+    and the degrees to which exceeding the limit is possible and necessary. Events that any of
+    several limits is exceeded have no peak and are left out.
+
+    Args:
+        answer: Verdicts on the limits, the first of which is drawn on top.
+    """
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
     figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.85 * len(limits)))
     rows = np.arange(len(limits))[::-1]  # the first limit on top
@@ -97,7 +113,8 @@ def draw_decision(answer: Decision) -> Figure:
             f"possible to {degree_text(limit.possibility)},"
             f" necessary to {degree_text(limit.necessity)}"
         )
-        # Two lines of text have room between the bars of two limits.
+        # Two lines of 72 letters have room between the bars of two limits. Their place along the
+        # axis is a fraction of its length, 0.01, and not a value.
         text = fill(f"{limit.verdict_words} ({answer.nature_text(limit.nature)}): {degrees}", 72)
         place: Look = {"fontsize": 8, "linespacing": 1.0, "transform": axes.get_yaxis_transform()}
         axes.text(0.01, row + 0.37, text, **place)
@@ -149,17 +166,31 @@ def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: boo
 
 
 def draw_probability(answer: Probability) -> Figure:
-    """Draw the bounds of the exceedance probability of the last event over its limit, by level."""
-    event = [*answer.events.values()][-1]
+    """Draw bounds of the probability of exceeding a limit, over the limit, on each α-level.
+
+    The last entry of the answer is drawn: the event that any limit is exceeded, if there are
+    several, else the only limit. Over the horizontal axis stand limits in the unit of the output
+    or, for the event, factors of all limits at once.
+
+    Args:
+        answer: Probability of exceeding each limit.
+    """
+    event = list(answer.events.values())[-1]
     limits = event.curve.limit
+    # A limit far beyond all computed peaks would squeeze the curve into a corner.
     is_near = event.limit <= 2 * limits[-1]
+    place = "far off"
+    if is_near:
+        place = "dashed"
     figure, axes = plt.subplots()
     draw_bands(axes, limits, Ends(event.curve.lower, event.curve.upper), answer.alpha)
     style.alpha_legend(axes, answer.alpha)
-    limit_text, label = event.value_words, f"limit of |{event.output}|"
+    limit_text = event.value_words
+    label = f"limit of |{event.output}|"
     if event.is_event:
-        limit_text, label = "1", "all limits, over those of the case"
-    axes.set_title(f"limit {limit_text} ({'dashed' if is_near else 'far off'})".replace("^2", "²"))
+        limit_text = "1"
+        label = "all limits, over those of the case"
+    axes.set_title(f"limit {limit_text} ({place})".replace("^2", "²"))
     if is_near:
         axes.axvline(event.limit, **LIMIT)
     axes.set_ylabel("probability of exceeding it")
@@ -168,9 +199,13 @@ def draw_probability(answer: Probability) -> Figure:
 
 
 def draw_fragility(answer: Fragility) -> Figure:
-    """Draw bounds of the fraction of records that exceed each limit over the intensity measure.
+    """Draw bounds of the fraction of records that exceed each limit, over the intensity measure.
 
-    A limit of all storeys is drawn as the event that any storey exceeds it.
+    Each limit has a panel. Limits of single storeys that belong to one limit of all storeys are
+    drawn as the event that any storey exceeds it.
+
+    Args:
+        answer: Fragility of each limit and event.
     """
     shown = [part for part in answer.limits.values() if not part.event_name]
     size = WIDTH, 0.9 + 2.3 * len(shown)
@@ -183,13 +218,21 @@ def draw_fragility(answer: Fragility) -> Figure:
 
 
 def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> None:
-    """Draw the bands of one limit or event, and the lognormal fit on the highest level."""
+    """Draw the bands of one limit or event, and lognormal fits on the highest level.
+
+    Args:
+        axes: Axes that are drawn on.
+        answer: The answer, for its levels and intensity measure.
+        part: Bounds of the fraction of records on each level, and the limits of 95 % confidence,
+            which are drawn dashed for the lowest level if there are some.
+    """
     draw_bands(axes, part.measure, part.band, answer.alpha, in_steps=True)
-    for curve in part.lognormal_fit(-1):
+    for curve in part.lognormal_fit(-1):  # one or two curves, of the ends on the highest level
         axes.plot(part.measure, curve, **FIT)
     if part.confidence is not None:
+        lowest_level = 0
         for end in part.confidence:
-            axes.plot(part.measure, end[0], color=BLUE, lw=0.9, ls="--")
+            axes.plot(part.measure, end[lowest_level], color=BLUE, lw=0.9, ls="--")
     axes.set_title(part.words.replace("^2", "²"))
     axes.set_ylabel("fraction of records")
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
@@ -200,6 +243,10 @@ def draw_incremental(answer: Fragility) -> Figure:
 
     Each peak has a panel with all its limits, and each record a band for each level. In SVG the
     curves show the name of their record where a pointer rests on them.
+
+    Args:
+        answer: Fragility of a frame that yields, with the peaks under each record at rising
+            intensity.
     """
     demands = answer.limits_by_demand
     size = WIDTH, 0.6 + 1.9 * len(demands)
@@ -211,6 +258,8 @@ def draw_incremental(answer: Fragility) -> Figure:
             axes.axhline(limit.limit, **LIMIT)
             place: Look = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
             axes.annotate(limit.value_words, (1, limit.limit), fontsize=8, color=ORANGE, **place)
+        # Peaks far beyond the limits are cut off: frames that have nearly collapsed would hide
+        # everything else.
         values = [limit.limit for limit in limits]
         axes.set_xlim(0.0, max(limit.measure[-1] for limit in limits))
         axes.set_ylim(0.0, max(3 * min(values), 1.5 * max(values)))
@@ -223,13 +272,19 @@ def draw_incremental(answer: Fragility) -> Figure:
 
 
 def draw_demands(axes: Axes, answer: Fragility, names: Sequence[str]) -> None:
-    """Draw the peaks found under each record, of the peak that the limits `names` share."""
+    """Draw the bands of a peak over the intensity measure, one for each record and level.
+
+    Args:
+        axes: Axes that are drawn on.
+        answer: Fragility of a frame that yields, with the peaks under each record.
+        names: Names of limits of one and the same peak, whose bounds are then the same.
+    """
     for record, increment in answer.increments.items():
         high, low = answer.demand_curve(names[0], record)
         for level, shade in enumerate(style.colours(answer.alpha)):
             band: Look = {"color": shade, "lw": 0, "alpha": 0.7}
             filled = axes.fill_between(increment.measure, low[level], high[level], **band)
-            filled.set_gid(f"{style.HOVER}{record}")
+            filled.set_gid(f"{style.HOVER}{record}")  # for the pointer in SVG, see `style.save`
         (line,) = axes.plot(increment.measure, high[-1], color=INK, lw=0.7)
         line.set_gid(f"{style.HOVER}{record}")
 

@@ -23,17 +23,27 @@ from alphacut.stages.summary import Parts, Results
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Figure]]:
-    """Yield the name and the figure of each output of a study, or of those that the case names.
+    """Yield the name and the figure of each drawn output of a study.
 
-    Where the case gives a figure its number in the paper, the name of the figure begins with it.
+    Args:
+        task: The study. Its `figures` name the outputs to be drawn, each with the number of the
+            figure in the paper; if empty, all outputs are drawn.
+        results: Results of the run, with the envelope of this study.
+
+    Yields:
+        The name "envelope-STUDY-OUTPUT", with "figNUMBER-" before it if there is a number, and the
+        figure, drawn when it is taken.
     """
     structure = results.structure
     assert structure is not None  # of which the envelope is
     dataset = results.envelopes[task.name].arrays
     parts = Parts.of(results)
     peaks = parts.envelopes[task.name].peak
-    for name in task.figures or map(str, dataset["output"].values):
-        number = f"fig{task.figures[name]}-" if name in task.figures else ""
+    outputs = [str(name) for name in dataset["output"].values]
+    for name in task.figures or outputs:
+        number = ""
+        if name in task.figures:
+            number = f"fig{task.figures[name]}-"
         figure = envelope(
             dataset,
             Output(name, structure.unit(name)),
@@ -68,6 +78,8 @@ def envelope(
     for level, shade in enumerate(style.colours(alpha)[:-1]):
         band = shown.isel(alpha=level)
         axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
+    # The highest level has no area where the inputs are crisp there: it is drawn as lines. A thin
+    # line around the lowest level keeps pale bands visible in print.
     for side in ("lower", "upper"):
         axes.plot(time, shown.isel(alpha=-1)[side], color=INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=INK, lw=0.3)

@@ -22,20 +22,31 @@ from alphacut.stages.store import StageResult
 
 
 def fuzzy_modulus(result: StageResult[ModulusResult], stated: FuzzyNumber | None) -> Figure:
-    """Draw fuzzy Young's modulus beside the one that the case states, and Poisson's ratio below."""
+    """Draw fuzzy Young's modulus, with the one that the case states, and Poisson's ratio below.
+
+    Args:
+        result: α-cuts of the cell: "E" in Pa and "nu" over the axes alpha and bound (lower, upper).
+        stated: Young's modulus that the structure of the case states, in Pa; None without one.
+    """
     size = (WIDTH, 1.75 * HEIGHT)
     figure, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
-    dataset, average = result.arrays, result.numbers.average
+    dataset = result.arrays
+    average = result.numbers.average
     alpha = dataset["alpha"].values
-    style.shaded_cuts(axes, alpha, *(dataset["E"].values / GPA).T)
+    lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
+    style.shaded_cuts(axes, alpha, lower, upper)
     if stated is not None:
-        cuts = np.array([stated.cut(level) for level in (0.0, 1.0)]) / GPA
+        # Support and core are enough: the stated number is linear between both.
+        support = stated.support
+        core = stated.cut(1.0)
+        corners = np.array([support.lower, core.lower, core.upper, support.upper]) / GPA
         line: Look = {"color": BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
-        axes.plot(style.outline(*cuts.T), [0, 1, 1, 0], **line)
+        axes.plot(corners, [0, 1, 1, 0], **line)
         axes.plot([], [], color=INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
     style.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
-    style.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
+    smallest, largest = dataset["nu"].transpose("bound", "alpha").values
+    style.shaded_cuts(below, alpha, smallest, largest)
     style.membership_axes(below, "effective Poisson's ratio ν of the same")
     return figure
 
@@ -44,13 +55,27 @@ def image(dataset: xarray.Dataset) -> Figure:
     """Draw the phases of an image, or of a volume on three planes in its middle, and α-cuts of E.
 
     Pixels and voxels whose phase the fuzzy threshold leaves open on the lowest level are orange.
+
+    Args:
+        dataset: "phase", the index of the phase of each pixel over the axes (y, x), or of each
+            voxel over (z, y, x); "is_open" on the same axes; "E" in Pa over alpha and bound (lower,
+            upper); the names "phases" and the sides "lengths" of a pixel in m as attributes.
     """
     phase = dataset["phase"]
     is_volume = phase.ndim == 3
-    # One picture for each axis across it; of an image there is one picture, across no axis.
-    planes = [str(axis) for axis in phase.dims[::-1]] if is_volume else [""]
-    mosaic: Any = [planes, ["E"] * 3] if is_volume else [["", "E"]]
-    figure = plt.figure(figsize=(WIDTH, 5.6 if is_volume else 3.8))
+    # A volume has one picture for each axis across it; an image has one, across no axis.
+    planes = [""]
+    mosaic: list[Any] = [["", "E"]]
+    height = 3.8
+    kind = "pixels"
+    where = ", plane strain"
+    if is_volume:
+        planes = [str(axis) for axis in phase.dims[::-1]]
+        mosaic = [planes, ["E"] * 3]
+        height = 5.6
+        kind = "voxels"
+        where = ""
+    figure = plt.figure(figsize=(WIDTH, height))
     axes = figure.subplot_mosaic(mosaic)
     for across in planes:
         draw_plane(axes[across], dataset, across)
@@ -61,33 +86,44 @@ def image(dataset: xarray.Dataset) -> Figure:
         for grey, name in zip(phase_greys(dataset), names, strict=True)
     ]
     if dataset["is_open"].values.any():
-        level, fraction = dataset["alpha"].values[0], float(dataset["is_open"].mean())
-        kind = "voxels" if is_volume else "pixels"
+        level = dataset["alpha"].values[0]
+        fraction = float(dataset["is_open"].mean())
         label = f"open at α = {level:g}: {fraction:.2%} of the {kind}"
         patches.append(Patch(facecolor=ORANGE, label=label))
     figure.legend(handles=patches, loc="outside lower left", ncols=len(patches))
 
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
     style.shaded_cuts(axes["E"], dataset["alpha"].values, lower, upper)
-    where = "" if is_volume else ", plane strain"
     style.membership_axes(axes["E"], f"Young's modulus E{where} (GPa)")
     return figure
 
 
 def draw_plane(axes: Axes, dataset: xarray.Dataset, across: str) -> None:
-    """Draw the phases of an image, or of the plane of a volume in the middle of the axis `across`.
+    """Draw the phases of an image, or of the plane in the middle of a volume across an axis.
 
-    `across` is empty for an image. The axes are lengths with the prefix that fits all of the cell.
+    The axes show lengths, with the prefix that fits the longest side of the whole cell.
+
+    Args:
+        axes: Axes that are drawn on.
+        dataset: "phase" and "is_open" over (y, x), or (z, y, x) of a volume, and the attribute
+            "lengths", the sides of a pixel or voxel in m in this order.
+        across: Axis that the plane of a volume is perpendicular to, "x", "y" or "z"; empty for an
+            image.
     """
     phase = dataset["phase"]
     pixel = dict(zip(phase.dims, dataset.attrs["lengths"], strict=True))  # its sides in m
     factor, unit = axis_prefix(max(phase.sizes[axis] * pixel[axis] for axis in phase.dims), "m")
-    middle = {across: phase.sizes[across] // 2} if across else {}
+    middle = {}
+    if across:
+        middle = {across: phase.sizes[across] // 2}
     up, right = phase.isel(middle).dims
-    ends = [factor * pixel[axis] * phase.sizes[axis] for axis in (right, up)]
-    look: Look = {"origin": "lower", "extent": (0, ends[0], 0, ends[1]), "interpolation": "nearest"}
+    width = factor * pixel[right] * phase.sizes[right]
+    height = factor * pixel[up] * phase.sizes[up]
+    # Row 0 of the array is at y = 0, which "lower" draws at the bottom.
+    look: Look = {"origin": "lower", "extent": (0, width, 0, height), "interpolation": "nearest"}
     greys = ListedColormap(phase_greys(dataset))
     axes.imshow(phase.isel(middle).values, cmap=greys, vmin=-0.5, vmax=greys.N - 0.5, **look)
+    # NaN is transparent, so that only open pixels are painted over.
     open_pixels = np.where(dataset["is_open"].isel(middle).values, 1.0, np.nan)
     axes.imshow(open_pixels, cmap=ListedColormap([ORANGE]), **look)
     axes.set(xlabel=f"{right} ({unit})", ylabel=f"{up} ({unit})")

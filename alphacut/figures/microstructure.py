@@ -23,7 +23,19 @@ REDUCED = "reduced radius $r_n$ = r/a"
 
 
 def draw(fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection) -> None:
-    """Write the figures of a radius map into a folder: its p-box, the map, circles of an image."""
+    """Write the figures of a radius map into a folder, each as SVG and PNG.
+
+    They are "pbox", the distribution of the radius with its bounds; "radius_map", the map itself;
+    and "image_circles", the circles found in an image, if the particles come from one.
+
+    Args:
+        fitted: The fitted map and the particles.
+        folder: The folder, which is made if it is missing.
+        section: Section of the case, which names the file of the image.
+
+    Raises:
+        OSError: A file cannot be read or written.
+    """
     with style.figure_style():
         style.save(draw_pbox(fitted), folder / "pbox")
         style.save(draw_map(fitted), folder / "radius_map")
@@ -34,11 +46,16 @@ def draw(fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection) 
 
 
 def draw_pbox(fitted: FittedRadiusMap) -> Figure:
-    """Draw the distribution of r_n with its bootstrap band, and the p-box of the fuzzy map.
+    """Draw the distribution of the reduced radius r_n, and the p-box of the fuzzy map.
 
-    The lower panel has the same less the distribution of the fit, in per cent.
+    r_n is the radius over half the side of a square or cube as large as the cell of a particle. The
+    lower panel has the same less the distribution of the fit, in per cent.
+
+    Args:
+        fitted: The radius map, and the sample that it was fitted to.
     """
-    size, ratios = (6.4, 5.6), (3, 1.4)
+    size = (6.4, 5.6)
+    ratios = (3, 1.4)
     figure, (axes, residual_axes) = plt.subplots(
         2, 1, figsize=size, height_ratios=ratios, sharex=True
     )
@@ -61,21 +78,33 @@ def draw_distribution(axes: Axes, fitted: FittedRadiusMap, *, base: Array, scale
         scale: Factor of what is left.
     """
     table = fitted.to_dataset()
-    radius, cdf = table["r_n"].values, table["cdf"].values
-    # a distribution function lies between 0 and 1
+    radius = table["r_n"].values
+    cdf = table["cdf"].values
+    # A distribution function lies between 0 and 1: the band is cut off there before `base` is
+    # subtracted.
     low = scale * (np.maximum(cdf - fitted.band, 0) - base)
     high = scale * (np.minimum(cdf + fitted.band, 1) - base)
     axes.fill_between(radius, low, high, fc=PALE, label=f"band of ± {fitted.band:.2g}")
     cells = f"{len(fitted.truncated.values)} cells"
     axes.plot(radius, scale * (cdf - base), color=BLUE, label=cells)
-    for name, label in (("pbox_upper", "p-box"), ("pbox_lower", None)):
-        axes.plot(radius, scale * (table[name] - base), color=INK, lw=1, label=label)
+    # One entry in the legend stands for both bounds.
+    axes.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
+    axes.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
 
 
 def draw_map(fitted: FittedRadiusMap) -> Figure:
-    """Draw the radius map θ ↦ r_n: quantiles of the sample, fitted cubic and fuzzy bounds."""
+    """Draw the radius map from the random variable θ to the reduced radius r_n.
+
+    Shown are the quantiles of the sample, the fitted cubic at its nominal slopes, and the bounds of
+    all maps with slopes in the supports of the fuzzy a2 and a4.
+
+    Args:
+        fitted: The radius map, and the sample that it was fitted to.
+    """
     figure, axes = plt.subplots()
-    box, distribution = fitted.pbox, fitted.pbox.fit.distribution
+    box = fitted.pbox
+    distribution = fitted.pbox.fit.distribution
+    # The exact map is r(θ) = F⁻¹(F_Θ(θ)): the quantile of the sample at the probability of θ.
     theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 601), float)
     axes.step(theta, fitted.truncated.quantile(distribution.cdf(theta)), color=BLUE, label="sample")
     nominal = box.fit.map((box.a2[1], box.a4[1]))
@@ -100,7 +129,7 @@ def draw_circles(
         radii: Shape (n,), in m.
         look: Keyword arguments of Matplotlib's collections, such as `facecolors`.
     """
-    diameters = 2e3 * radii
+    diameters = 2e3 * radii  # in mm
     position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
     angles = np.zeros_like(diameters)
     axes.add_collection(
@@ -118,9 +147,16 @@ def set_view(axes: Axes, low: Array, high: Array) -> None:
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
-    """Draw a grey image, shape (rows, columns), with the outline of every circle found in it."""
+    """Draw the grey image of a section, with the outline of every circle found in it.
+
+    Args:
+        picture: Grey values, shape (rows, columns), the first row on top.
+        discs: The circles, and the size of the section in m.
+    """
     width, height = 1e3 * discs.size
-    figure, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
+    # Very long or high sections would have room for nothing else on a page.
+    aspect = float(np.clip(height / width, 0.5, 1.6))
+    figure, axes = plt.subplots(figsize=(6.4, 6.4 * aspect))
     axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
     look = {"facecolors": "none", "edgecolors": ORANGE}
     draw_circles(axes, discs.centres, discs.radii, linewidths=1.0, **look)

@@ -12,6 +12,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -59,6 +60,7 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     drawing = stem.with_name(f"{stem.name}.svg")
     figure.savefig(picture)
     figure.savefig(drawing, metadata={"Date": None})
+    # Matplotlib writes no titles into SVG. The names in `gid` are escaped by it.
     text = drawing.read_text(encoding="utf-8")
     titled = re.sub(rf'<g id="{HOVER}([^"]*)">', r"<g><title>\1</title>", text)
     drawing.write_text(titled, encoding="utf-8")
@@ -74,12 +76,17 @@ def colours(alpha: Array) -> list[Colour]:
 def alpha_legend(axes: Axes, alpha: Array, further: Sequence[Line2D] = ()) -> None:
     """Add a legend beside the axes: a patch for each α-level, a line for the highest one.
 
-    `further` lines are added below; each brings its own label.
+    Args:
+        axes: The axes.
+        alpha: Rising levels, shape (levels,).
+        further: Lines that are added below; each brings its own label.
     """
     shades = zip(alpha[:-1], colours(alpha), strict=False)
     patches = [Patch(facecolor=shade, label=f"α = {level:g}") for level, shade in shades]
     top = Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")
-    handles = [*patches, top, *further]
+    handles: list[Artist] = list(patches)
+    handles.append(top)
+    handles.extend(further)
     axes.legend(handles=handles, title="α-cut", loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
@@ -88,15 +95,26 @@ def prefix_axis(
 ) -> None:
     """Label the vertical axis, or the horizontal one if `across`, in a unit with a prefix.
 
-    The data stay in the SI unit `si`; the labels of the ticks are scaled. The prefix fits the
-    largest value in view, unless the unit in which to show them is given as `shown`.
+    The data stay in the SI unit; only the numbers beside the ticks are scaled. The axis must have
+    its final limits, unless `shown` is given.
+
+    Args:
+        axes: The axes.
+        label: What the axis shows, without its unit.
+        si: SI unit of the data; empty for a pure number.
+        across: Whether the horizontal axis is meant.
+        shown: Unit to be shown, with its factor from SI; None for the prefix that fits the largest
+            magnitude in view.
     """
     axis = axes.xaxis if across else axes.yaxis
     if shown is None:
         factor, unit = axis_prefix(max(map(abs, axis.get_view_interval())), si)
     else:
-        unit, factor = shown
-    axis.set_label_text(f"{label} ({unit})".replace("^2", "²") if unit else label)
+        unit = shown.label
+        factor = shown.factor
+    if unit:
+        label = f"{label} ({unit})".replace("^2", "²")
+    axis.set_label_text(label)
     if factor != 1.0:
         axis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import xarray
 
+from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
 from alphacut.frame import Sensitivity
@@ -37,16 +38,27 @@ class Picture(NamedTuple):
 
 
 def render_page(folder: ResultsFolder) -> str:
-    """Return the page for the results in a folder.
+    """Return the HTML page of the results in a folder, which needs no other file and no network.
+
+    The template report.html says what stands on the page; it takes the names given here.
+
+    Args:
+        folder: Folder of the results of a run.
 
     Raises:
         RefusedError: Files are missing, damaged, or of different runs.
     """
     summary = Summary.read(folder)
     summary.require_run_of(folder)
-    words, periods = named_words(), ""
+    words = named_words()
+    periods = ""
     if (frame := summary.structure) is not None:
+        # The first four periods show whether the structure is what its author meant.
         periods = ", ".join(f"{2 * math.pi / x:.3g}" for x in frame.omega_rad_per_s[:4])
+    envelopes: list[Document] = []
+    for name, study in summary.envelopes.items():
+        dataset = folder.dataset(f"envelope_{name}.nc")
+        envelopes.append(plot(name, study, dataset, summary.shown_units))
     return render_template(
         "report.html",
         title=summary.title,
@@ -61,30 +73,37 @@ def render_page(folder: ResultsFolder) -> str:
         periods=periods,
         sensitivity=Sensitivity(summary.shares),
         terms=words["terms"] | {str(x).capitalize(): x.sentence for x in Nature},
-        versions=Table(("program", "version"), [*summary.versions.items()]),
+        versions=Table(("program", "version"), list(summary.versions.items())),
         guaranteed_of=results.guaranteed_of,
         fractions_text=results.fractions_text,
         width_text=results.width_text,
         isotropic_label=isotropic_label,
         enclosing_box_words=enclosing_box_words,
-        envelopes=[
-            plot(name, study, folder.dataset(f"envelope_{name}.nc"), summary.shown_units)
-            for name, study in summary.envelopes.items()
-        ],
+        envelopes=envelopes,
     )
 
 
 def comparison_page(first: Summary, second: Summary, comparison: Table) -> str:
     """Return the page of two runs with the table of both side by side."""
-    title, name = f"{first.title} and {second.title}", f"{first.case} and {second.case}"
+    title = f"{first.title} and {second.title}"
+    name = f"{first.case} and {second.case}"
     return render_template(
         "comparison.html", title=title, name=name, about="", comparison=comparison
     )
 
 
 def render_template(template: str, **content: object) -> str:
-    """Return a template of this folder filled with content, all texts of which are escaped."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    """Return a template of this folder filled with content.
+
+    Args:
+        template: Name of the file.
+        content: Values by the names in the template. Special characters of HTML in texts are
+            escaped, since names and titles come from a case that somebody else may have written.
+
+    Raises:
+        jinja2.UndefinedError: The template uses a name that `content` does not have.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # only reports need it
 
     loader = FileSystemLoader(Path(__file__).parent)
     templates = Environment(
@@ -107,13 +126,24 @@ def plot(
 ) -> Document:
     """Return the data of a study for the interactive plot of report.js.
 
-    Values over time are 32-bit floats in base64, by side, level and output. A guaranteed envelope
-    contains its error, so that none is drawn beside it.
+    Args:
+        name: Name of the study.
+        study: Its numbers.
+        dataset: Its envelope over alpha, output and time, in SI units.
+        units: Unit in which each output is shown.
+
+    Returns:
+        Document with the names and units of the outputs, the α-levels, the step between time nodes
+        in s, and the series "lower", "upper" and "error": for each level and then each output all
+        values over time, as 32-bit floats, low byte first, in base64. The error is zero if the
+        envelope is guaranteed, since it then contains the error.
     """
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     encloses = next((peak.encloses for peak in study.peak.values()), "")
-    box = f", {of_enclosing_box(encloses)}" if encloses else ""
+    box = ""
+    if encloses:
+        box = f", {of_enclosing_box(encloses)}"
     document: Document = {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study.fuzzy)}{box}",
@@ -126,13 +156,17 @@ def plot(
         "step": float(time[1] - time[0]),
     }
     for side in ("lower", "upper", "error"):
+        # Six digits are more than a screen shows, and half the size of double precision.
         values = dataset[side].transpose("alpha", "output", "time").values.astype("<f4")
         if side == "error" and study.nature is Nature.GUARANTEED:
             values = 0 * values
-        document[side] = [
-            [base64.b64encode(series.tobytes()).decode() for series in level] for level in values
-        ]
+        document[side] = [[_in_base64(series) for series in level] for level in values]
     return document
+
+
+def _in_base64(series: Array) -> str:
+    """Return the bytes of an array in base64."""
+    return base64.b64encode(series.tobytes()).decode()
 
 
 class Figures:
@@ -155,7 +189,12 @@ class Figures:
         self.captions = captions
 
     def take(self, name: str) -> Picture | None:
-        """Return a figure by its name; None where the run has none, or its file is damaged."""
+        """Return a figure by its name, and forget it, so that `others` leaves it out.
+
+        Returns:
+            Caption and content; None if the run has no such figure, it was taken before, or its
+            file is missing or damaged, of which a warning is printed.
+        """
         path = self.paths.pop(name, None)
         if path is None:
             return None
@@ -173,13 +212,25 @@ class Figures:
 
 
 def caption(name: str, captions: Mapping[str, str]) -> str:
-    """Return the caption of a figure, which begins with its number in the paper if it has one."""
-    number, rest = "", name
+    """Return the caption of a figure from its name.
+
+    Args:
+        name: Name of the file without its ending. "figNUMBER-" before it gives the number in the
+            paper, with which the caption begins. "envelope-STUDY-OUTPUT" is the envelope of an
+            output.
+        captions: Captions of other figures by name, written with hyphens. A figure without an entry
+            has its name as its caption, with blanks for the hyphens.
+    """
+    number = ""
+    rest = name
     if match := re.fullmatch(r"fig(\d+)-(.+)", name):
-        number, rest = f"Fig. {match[1]}: ", match[2]
+        number = f"Fig. {match[1]}: "
+        rest = match[2]
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", rest):
         study, output = match.groups()
-        text = f"Envelope of {output}" + ("" if study == "all" else f", study {study}")
+        text = f"Envelope of {output}"
+        if study != "all":  # the name of the study that [envelope] alone makes
+            text += f", study {study}"
     else:
         text = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
     return number + text

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from alphacut.base.arrays import Array
 from alphacut.base.number_text import (
     MINUS,
     ShownUnit,
@@ -33,23 +35,68 @@ MEANING = "Least … largest value if every input stays in its range; α = 1: mo
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 
 
+class MaterialRow(NamedTuple):
+    """Texts of a constant in the table of the material.
+
+    Args:
+        label: Name and unit of the constant.
+        highest: Its value or range on the highest α-level.
+        lowest: Its range on the lowest level.
+        nature: Guarantee of the ranges.
+        error: Error that the ranges leave out, "none" or empty if there is none.
+    """
+
+    label: str
+    highest: str
+    lowest: str
+    nature: str
+    error: str
+
+
+class ComparedEntry(NamedTuple):
+    """What is compared of a run: its name, and a number in SI with the unit to show, or a text."""
+
+    what: str
+    unit: ShownUnit
+    value: float | str
+
+
 def run_text(parts: Parts) -> str:
-    """Return the results of a run for the console: tables, then sentences, answers and drivers."""
+    """Return the results of a run for the console.
+
+    Args:
+        parts: Numbers of the results; stages that the run lacks are left out.
+
+    Returns:
+        Lines that end with a newline: what α-cuts mean, the tables of the material, of the peaks
+        and of identified inputs, and then sentences of up to 80 letters a line on guarantees,
+        smaller time steps, the answers to questions, and the inputs that matter most.
+    """
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
-    sentences = [guaranteed_of(parts.image)] if parts.image is not None else []
-    sentences += [*natures(parts), *smaller_steps(parts)]
+    sentences: list[str] = []
+    if parts.image is not None:
+        sentences.append(guaranteed_of(parts.image))
+    sentences.extend(natures(parts))
+    sentences.extend(smaller_steps(parts))
     if parts.modulus is not None and parts.modulus.solver:
         sentences.append(f"Cells: {parts.modulus.solver}")
     if parts.update is not None and parts.update.is_refuted:
         sentences.append(parts.update.refuted)
     elif parts.update is not None:
-        shown.append(Table(*parts.update.table()))
-    sentences += [f"{what}: {answer} ({guarantee})" for what, answer, guarantee in answers(parts)]
-    sentences += drivers(parts)
-    heading = f"{MEANING}\n" if shown else ""
-    tables = "".join(text_table(*table) for table in shown)
-    lines = [line for text in sentences for line in wrap(text, 80, subsequent_indent="  ")]
-    return heading + tables + "".join(f"{line}\n" for line in lines)
+        shown.append(parts.update.table())
+    for what, answer, guarantee in answers(parts):
+        sentences.append(f"{what}: {answer} ({guarantee})")
+    sentences.extend(drivers(parts))
+
+    text = ""
+    if shown:
+        text = f"{MEANING}\n"
+    for table in shown:
+        text += text_table(table.head, table.rows)
+    for sentence in sentences:
+        for line in wrap(sentence, 80, subsequent_indent="  "):
+            text += f"{line}\n"
+    return text
 
 
 def key_tables(parts: Parts) -> list[Table]:
@@ -62,17 +109,27 @@ def key_tables(parts: Parts) -> list[Table]:
 
 
 def key_sentences(parts: Parts) -> list[str]:
-    """Return the sentences below them: on guarantees, smaller steps and the main drivers."""
-    return [*natures(parts), *smaller_steps(parts), *drivers(parts)]
+    """Return the sentences below the tables: on guarantees, smaller steps and main inputs."""
+    sentences = list(natures(parts))
+    sentences.extend(smaller_steps(parts))
+    sentences.extend(drivers(parts))
+    return sentences
 
 
 def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
-    """Return one α-cut with five digits; the ends of a guaranteed one contain the error.
+    """Return one α-cut as text with five digits, rounded in the direction of its guarantee.
 
-    The error does not change the sign of the lower end: a modulus is not negative.
+    Args:
+        cuts: Lower and upper ends on all levels, NaN where there is no bound, which is shown as
+            infinite.
+        level: Index of the level; -1 is the highest.
+        nature: Guarantee of the ends. Guaranteed ends are moved outwards by `error`.
+        error: Absolute error in the unit of the ends. It does not move a positive lower end below
+            zero, since a modulus is not negative.
     """
     low, high = (float(end[level]) for end in infinite_if_unknown(cuts))
     if nature is Nature.GUARANTEED:
+        # The lower end falls to 0 at most, unless it was negative before.
         low = max(low - error, min(low, 0.0))
         high += error
     return range_text(low, high, nature, 5)
@@ -80,42 +137,70 @@ def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
 
 def error_text(error: float, nature: Nature) -> str:
     """Return the error that a range leaves out; a guaranteed one leaves out none."""
-    return "none" if nature is Nature.GUARANTEED else f"{error:.2g}".replace("-", MINUS)
+    if nature is Nature.GUARANTEED:
+        return "none"
+    return f"{error:.2g}".replace("-", MINUS)
 
 
 def material(parts: Parts, *, every_constant: bool = False) -> Table:
-    """Return a table of the elastic constants and loss factors, and of damping ratios.
+    """Return a table of the elastic constants, loss factors and damping ratios.
 
-    Each row has the value on the highest level, the range on the lowest one, guarantee and error.
-    Of a cell and an image these are E, ν, E_T and the loss factor of E, or `every_constant`.
+    Args:
+        parts: Numbers of the results.
+        every_constant: Whether all constants of a cell or an image are shown, instead of E, ν, E_T
+            and the loss factor of E alone.
+
+    Returns:
+        Row of each constant with its value on the highest level, its range on the lowest one, the
+        guarantee and the error. Empty columns are left out; without a cell, an image and damping
+        by the material the table is empty.
     """
-    found = [part for part in (parts.modulus, parts.image) if part]
-    rows = [row for part in found for row in _constants(part, every_constant=every_constant)]
-    first, last = found[0].alpha[[0, -1]] if found else (0.0, 1.0)
+    rows: list[MaterialRow] = []
+    lowest_level = 0.0
+    highest_level = 1.0
+    found = [part for part in (parts.modulus, parts.image) if part is not None]
+    for part in found:
+        rows.extend(_constants(part, every_constant=every_constant))
+    if found:
+        lowest_level, highest_level = found[0].alpha[[0, -1]]
     for name, (low, nominal, high) in parts.damping.items():
         value = range_text(nominal, nominal, Nature.ATTAINED)
         ends = range_text(low, high, Nature.ATTAINED)
-        rows.append((f"damping ratio {name}", value, ends, Nature.ATTAINED, ""))
-    if first == last:  # value and range are the same: one column has both
-        same = 2 if last == 1 else 1
-        rows = [(*row[:same], "", *row[same + 1 :]) for row in rows]
-    title = "most plausible" if last == 1 else f"α = {last:g}"
-    head = ("material", title, f"range at α = {first:g}", "nature", "± error")
+        rows.append(MaterialRow(f"damping ratio {name}", value, ends, Nature.ATTAINED, ""))
+    # On a single level value and range are the same: one column has both.
+    if lowest_level == highest_level == 1:
+        rows = [row._replace(lowest="") for row in rows]
+    elif lowest_level == highest_level:
+        rows = [row._replace(highest="") for row in rows]
+    title = f"α = {highest_level:g}"
+    if highest_level == 1:
+        title = "most plausible"
+    head = ("material", title, f"range at α = {lowest_level:g}", "nature", "± error")
     return without_empty_columns(head, rows)
 
 
-def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> Iterator[Row]:
-    """Yield the row of E of a cell or an image, then those of other constants and loss factors."""
-    nature, young = part.nature, part.E_GPa
-    error, error_cell = 0.0, error_text(0.0, nature)
-    constants = dict[str, Ends]()
-    # Of a cell at most E is guaranteed; of an image every constant is.
-    nature_of_constants = nature
+def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> Iterator[MaterialRow]:
+    """Yield the row of E of a cell or an image, then those of other constants and loss factors.
+
+    Args:
+        part: α-cuts of the constants, moduli in GPa.
+        every_constant: Whether all constants are shown, instead of E, ν, E_T and the loss factor of
+            E alone.
+    """
+    young = part.E_GPa
+    error = 0.0
+    error_words = error_text(0.0, part.nature)
+    constants: dict[str, Ends] = {}
+    # Of a cell at most E is guaranteed, by signs of its derivatives that mechanics proves; of an
+    # image bounds by minimum energies hold for every constant.
+    nature_of_constants = part.nature
     if isinstance(part, ModulusResult):
         nature_of_constants = Nature.ATTAINED
         error = sum(part.error.values()) * float(young.upper.max())
+        error_words = error_text(error, part.nature)
         # A mesh from a file is solved once, without a finer one that would tell the error.
-        error_cell = "not declared" if part.particles == "mesh" else error_text(error, nature)
+        if part.particles == "mesh":
+            error_words = "not declared"
         constants["ν"] = part.nu_cuts
         for name, cuts in part.fibres.items():
             if every_constant or name == "E_T_GPa":
@@ -124,28 +209,52 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
         for definition, by_name in part.plane.items():
             for name, cuts in by_name.items():
                 constants[f"{constant_label(name)} ({definition})"] = cuts
-    ends = cut_text(young, -1, nature), cut_text(young, 0, nature, error)
-    yield (f"E, GPa ({part.average})", *ends, nature, error_cell)
+    # The declared error is the largest of all samples, so it widens the range on the lowest level;
+    # the value on the highest one is shown as it was computed.
+    highest = cut_text(young, -1, part.nature)
+    lowest = cut_text(young, 0, part.nature, error)
+    yield MaterialRow(f"E, GPa ({part.average})", highest, lowest, part.nature, error_words)
     for label, cuts in constants.items():
-        yield _row(label, cuts, nature_of_constants)
+        yield _constant_row(label, cuts, nature_of_constants)
+    yield from _loss_rows(part, every_constant=every_constant)
 
-    if isinstance(part, ImageResult) and part.proved_losses:
+
+def _loss_rows(part: ModulusResult | ImageResult, *, every_constant: bool) -> Iterator[MaterialRow]:
+    """Yield the rows of the loss factors of a cell or an image; none without losses of phases.
+
+    Args:
+        part: α-cuts of the loss factors of E, G and K.
+        every_constant: Whether all are shown, instead of that of E alone.
+    """
+    if isinstance(part, ImageResult):
         for name, cuts in part.proved_losses.items():
             if every_constant or name == "E":
                 label = f"loss factor of {name}, to first order"
-                yield _row(label, cuts, nature, error_text(0.0, nature))
-    elif isinstance(part, ModulusResult) and (loss := part.loss) is not None:
-        for name in "EGK" if every_constant else "E":
-            error_cell = error_text(loss.error[name], loss.nature) if loss.error else ""
-            yield _row(f"loss factor of {name}", getattr(loss, name), loss.nature, error_cell)
+                yield _constant_row(label, cuts, part.nature, error_text(0.0, part.nature))
+    elif part.loss is not None:
+        for name in ("E", "G", "K"):
+            if every_constant or name == "E":
+                error_words = ""
+                if part.loss.error:
+                    error_words = error_text(part.loss.error[name], part.loss.nature)
+                cuts = getattr(part.loss, name)
+                yield _constant_row(f"loss factor of {name}", cuts, part.loss.nature, error_words)
 
 
-def _row(label: str, cuts: Ends, nature: Nature, error: str = "") -> Row:
-    return label, cut_text(cuts, -1, nature), cut_text(cuts, 0, nature), nature, error
+def _constant_row(label: str, cuts: Ends, nature: Nature, error_words: str = "") -> MaterialRow:
+    """Return the row of a constant from its α-cuts, which are shown as they are."""
+    highest = cut_text(cuts, -1, nature)
+    lowest = cut_text(cuts, 0, nature)
+    return MaterialRow(label, highest, lowest, nature, error_words)
 
 
-def without_empty_columns(head: Row, rows: list[Row]) -> Table:
-    """Return the table without columns whose cells are all empty or "none"."""
+def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a table without the columns whose cells are all empty or "none".
+
+    Args:
+        head: Title of each column.
+        rows: Text of each column, for each row. Without rows the table has no columns either.
+    """
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     filled_rows = [tuple(row[k] for k in columns) for row in rows]
     return Table(tuple(head[k] for k in columns), filled_rows)
@@ -153,31 +262,46 @@ def without_empty_columns(head: Row, rows: list[Row]) -> Table:
 
 def guaranteed_of(image: ImageResult) -> str:
     """Return a sentence on what the bounds of an image or volume are guaranteed of."""
-    if len(image.lower_GPa) == 3:
+    if _is_plane(image):
         what = "image as segmented, repeated periodically, in plane strain"
     else:
         what = "volume, repeated periodically"
     return f"The bounds are guaranteed of the {what}"
 
 
+def _is_plane(image: ImageResult) -> bool:
+    """Return whether the stiffness matrix is 3×3, of an image, and not 6×6, of a volume."""
+    return len(image.lower_GPa) == 3
+
+
 def fractions_text(image: ImageResult) -> str:
     """Return a sentence, without its full stop, on the fractions of the phases."""
-    measured = "area" if len(image.lower_GPa) == 3 else "volume"
+    measured = "volume"
+    if _is_plane(image):
+        measured = "area"
     fractions = ", ".join(f"{name} {fraction:.1%}" for name, fraction in image.fractions.items())
     return f"Of the {measured}: {fractions}"
 
 
 def width_text(image: ImageResult) -> str:
-    """Return the width of E at the lowest level by cause, or which bound is missing and why."""
-    has_lower, has_upper = image.lower_GPa.any(), np.isfinite(image.upper_GPa).all()
+    """Return a sentence, without its full stop, on the width of E or on its missing bounds.
+
+    Args:
+        image: Bounds of the stiffness matrix on the highest level, which are all 0 without a lower
+            bound and infinite without an upper one; and the width of E on the lowest level by its
+            cause, in GPa, which is known if both bounds are.
+    """
+    has_lower = image.lower_GPa.any()
+    has_upper = np.isfinite(image.upper_GPa).all()
     missing = []
     if not has_lower:
         why = "stresses are sought that vanish in closed pores, and these meet their own image"
         missing.append(f"lower bound of E: {why}")
     if not has_upper:
         # In the plane E = G (3 − G/K). It falls where G, which has no bound, exceeds 3/2 K.
-        may_be_zero = has_lower and infinite_if_unknown(image.E_GPa).lower[0] <= 0
-        which = "lower or upper" if may_be_zero else "upper"
+        which = "upper"
+        if has_lower and infinite_if_unknown(image.E_GPa).lower[0] <= 0:
+            which = "lower or upper"
         missing.append(f"{which} bound of E: a phase may be rigid")
     if missing:
         return f"This program gives no {', and no '.join(missing)}"
@@ -186,83 +310,131 @@ def width_text(image: ImageResult) -> str:
 
 
 def peak_table(parts: Parts) -> Table:
-    """Return a table of the peak of each output: its cuts, error or gap, limits and verdicts.
+    """Return a table of the peak of each output over time.
 
-    Proved peaks have a gap; the others have the cut of a middle level as well. Each further limit
-    of a peak has a row of its own. Of a suite the peaks are the largest over the records, then the
-    means.
+    Args:
+        parts: Numbers of the results.
+
+    Returns:
+        Rows for each peak: one for each unit in which it is shown and, below it, one for each
+        further limit. Columns are the cuts on the highest and the lowest level, and on a middle one
+        if no peak is guaranteed; the error; of guaranteed peaks the attained value and the gap;
+        the record that moves a structure farthest; the limit with its verdict. Columns that are
+        empty are left out. Peaks over a suite come last. Without peaks the table is empty.
     """
-    studies: dict[str, EnvelopeResult | SuitePeaks] = {**parts.envelopes}
+    studies: dict[str, EnvelopeResult | SuitePeaks] = dict(parts.envelopes)
     if parts.records is not None:
         studies["records"] = parts.records
     if not studies:
         return Table((), [])
     alpha = next(iter(studies.values())).alpha
-    levels = [len(alpha) - 1, 0]
-    peaks = [peak for study in studies.values() for peak in study.peak.values()]
-    if not any(peak.nature is Nature.GUARANTEED for peak in peaks):
-        levels.insert(1, int(np.argmin(np.abs(alpha - 0.5))))
-    levels = list(dict.fromkeys(levels))
+    levels = _shown_levels(studies.values(), alpha)
 
     limits = limits_by_peak(parts)
-    rows = list[Row]()
+    rows: list[list[str]] = []
     for name, study in studies.items():
-        suffix = f" ({name})" if len(studies) > 1 else ""
-        farthest = study.farthest_record if isinstance(study, SuitePeaks) else {}
+        suffix = ""
+        if len(studies) > 1:
+            suffix = f" ({name})"
+        farthest: dict[str, str] = {}
+        if isinstance(study, SuitePeaks):
+            farthest = study.farthest_record
         for peak_name, peak in shown_peaks(study).items():
-            output = output_of(peak_name)
-            record = farthest.get(peak_name, "")
+            unit = parts.shown_units[output_of(peak_name)]
+            is_force = study.units[output_of(peak_name)] == "N"
+            # A limit of NaN stands for none, so that a peak without limits has a row as well.
             verdicts = limits.get(peak_name, [(math.nan, "")])
-            is_force = study.units[output] == "N"
-            for label, factor in display_units(
-                peak_name, parts.shown_units[output], parts.structure, is_force=is_force
-            ):
+            for label, factor in display_units(peak_name, unit, parts.structure, is_force=is_force):
                 cells = peak_cells(peak, factor, levels)
+                cells.append(farthest.get(peak_name, ""))
                 for limit, verdict in verdicts:
-                    limit_text = "" if math.isnan(limit) else engineering(limit * factor, "")
-                    rows.append((label + suffix, *cells, record, limit_text, verdict))
+                    limit_text = ""
+                    if not math.isnan(limit):
+                        limit_text = engineering(limit * factor, "")
+                    row = [label + suffix]
+                    row += cells
+                    row += [limit_text, verdict]
+                    rows.append(row)
                     # Further limits of the same peak do not repeat what is said of it.
-                    cells, record = ("",) * len(cells), ""
+                    cells = [""] * len(cells)
     titles = [f"α = {alpha[level]:g}" for level in levels]
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
-    head = ("peak of", *titles, "± error", "reached", "gap", "record", "limit", "exceeded")
+    head = ["peak of"]
+    head += titles
+    head += ["± error", "reached", "gap", "record", "limit", "exceeded"]
     return without_empty_columns(head, rows)
+
+
+def _shown_levels(studies: Iterable[EnvelopeResult | SuitePeaks], alpha: Array) -> list[int]:
+    """Return the indices of the α-levels whose cuts a table of peaks shows, the highest first.
+
+    They are the highest and the lowest level. If no peak of the studies is guaranteed, the table
+    has no gaps, and room for the level nearest to 1/2. Each level stands once.
+    """
+    levels = [len(alpha) - 1, 0]
+    peaks = [peak for study in studies for peak in study.peak.values()]
+    if not any(peak.nature is Nature.GUARANTEED for peak in peaks):
+        levels.insert(1, int(np.argmin(np.abs(alpha - 0.5))))
+    return list(dict.fromkeys(levels))
 
 
 def shown_peaks(study: EnvelopeResult | SuitePeaks) -> dict[str, Peak]:
     """Return the peaks of a study, or those of the outputs alone that the case names for it."""
-    drawn = study.drawn if isinstance(study, EnvelopeResult) else ()
-    return {name: peak for name, peak in study.peak.items() if not drawn or name in drawn}
+    if not isinstance(study, EnvelopeResult) or not study.drawn:
+        return study.peak
+    return {name: peak for name, peak in study.peak.items() if name in study.drawn}
 
 
-def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> Row:
-    """Return the texts of a peak: its cuts, its error, what is reached, and the gap.
+def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
+    """Return the texts of a peak: its cut on each level, error, attained value and gap.
 
     Args:
         peak: Bounds of a peak in SI units.
         factor: Number by which they are multiplied to be shown.
         levels: Indices of the levels whose cuts are shown. A cut between the highest and the
             lowest level has three digits, these have four.
+
+    Returns:
+        A text for each level and three more. The last two, the farthest attained peak of the lowest
+        level and its distance from the bound as a fraction of this, are empty for peaks that are
+        not guaranteed, and for those of a box around a set, of which no response is known.
     """
-    nature, lower, upper = peak.nature, factor * peak.lower, factor * peak.upper
-    cuts = []
+    lower = factor * peak.lower
+    upper = factor * peak.upper
+    cells = []
     for level in levels:
-        digits = 3 if 0 < level < len(lower) - 1 else 4
-        cuts.append(range_text(float(lower[level]), float(upper[level]), nature, digits))
-    error = error_text(factor * float(peak.error.max()), nature)
-    if nature is not Nature.GUARANTEED or peak.encloses:
-        return (*cuts, error, "", "")
-    inner = "lower" if peak.is_least else "upper"
-    reached = rounded(factor * float(peak.reached[0]), inner, Nature.ATTAINED)
-    return (*cuts, error, number_text(reached), f"{peak.gaps[0]:.1%}")
+        digits = 4
+        if 0 < level < len(lower) - 1:
+            digits = 3
+        cells.append(range_text(float(lower[level]), float(upper[level]), peak.nature, digits))
+    cells.append(error_text(factor * float(peak.error.max()), peak.nature))
+    reached_text = ""
+    gap_text = ""
+    if peak.nature is Nature.GUARANTEED and not peak.encloses:
+        # Attained values are rounded inwards, so that the rounded one is attained as well.
+        side: Literal["lower", "upper"] = "upper"
+        if peak.is_least:
+            side = "lower"
+        reached = rounded(factor * float(peak.reached[0]), side, Nature.ATTAINED)
+        reached_text = number_text(reached)
+        gap_text = f"{peak.gaps[0]:.1%}"
+    cells += [reached_text, gap_text]
+    return cells
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
-    """Return limits in SI units, each with its verdict in a word, by the name of their peak."""
-    short = {"exceeded": "yes", "not exceeded": "no", "can be exceeded": "can be"}
+    """Return the limits of [decision] by the name of their peak, each with its verdict.
+
+    Returns:
+        Limit in the SI unit of the peak, and "yes", "no", "can be" or "undecided" on whether it is
+        exceeded, in the order of the case. Empty without this question.
+    """
     limits: dict[str, list[tuple[float, str]]] = {}
-    for decision in () if parts.decision is None else parts.decision.limits.values():
+    if parts.decision is None:
+        return limits
+    short = {"exceeded": "yes", "not exceeded": "no", "can be exceeded": "can be"}
+    for decision in parts.decision.limits.values():
         verdict = short.get(decision.verdict, decision.verdict)
         limits.setdefault(decision.peak_name, []).append((decision.limit, verdict))
     return limits
@@ -270,43 +442,68 @@ def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
 
 def display_units(
     name: str, unit: ShownUnit, frame: FrameResult | None, *, is_force: bool
-) -> Iterator[tuple[str, float]]:
-    """Yield the label and the factor from SI of each unit in which a peak is shown.
+) -> Iterator[ShownUnit]:
+    """Yield each unit in which a peak is shown, labelled as its row of a table.
 
-    Of a frame these are also the height of the storey of a drift, and the weight, for a force.
+    The first is `unit`. In a frame a drift is also shown in per cent of the height of its storey,
+    and a force in per cent of the weight of all floors.
+
+    Args:
+        name: Name of the peak, such as "drift1" or "max q3".
+        unit: Unit of the output; its label is empty for a pure number.
+        frame: Weight in N and heights in m by output; None for other structures.
+        is_force: Whether the output is a force.
     """
-    yield f"{name}, {unit.label}" if unit.label else name, unit.factor
+    label = name
+    if unit.label:
+        label = f"{name}, {unit.label}"
+    yield ShownUnit(label, unit.factor)
     if frame is None:
         return
     height = frame.heights_m.get(output_of(name))
     if height is not None:
-        yield "  % of storey", 100 / height
+        yield ShownUnit("  % of storey", 100 / height)
     if is_force:
-        yield "  % of weight", 100 / frame.weight_N
+        yield ShownUnit("  % of weight", 100 / frame.weight_N)
 
 
 def natures(parts: Parts) -> Iterator[str]:
-    """Yield sentences on the guarantees of C and of peaks, and on the motions that tested them."""
-    studies, suite = parts.envelopes.values(), parts.records
+    """Yield sentences, without full stops, on what is guaranteed and how it was tested.
+
+    They say that the stiffness on an own mesh is an upper bound; which peaks are guaranteed,
+    estimated or attained; what a box around a set of inputs means; what a mean over records is; and
+    how many exact responses agree with guaranteed bounds. Each stands only if it applies.
+
+    Args:
+        parts: Numbers of the results.
+    """
+    suite = parts.records
     if parts.modulus is not None and parts.modulus.particles == "mesh":
         yield UPPER_BOUND
+    peaks_of_studies = [study.peak for study in parts.envelopes.values()]
+    over = "over time"
+    if suite is not None:
+        peaks_of_studies.append(suite.peak)
+        over = "over time and records"
     outputs: dict[Nature, dict[str, None]] = {}  # an ordered set of names for each guarantee
-    for study in (*studies, suite):
-        for output, peak in (study.peak if study else {}).items():
+    for peaks in peaks_of_studies:
+        for output, peak in peaks.items():
             outputs.setdefault(peak.nature, {})[output] = None
     groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
     if len(groups) == 1:
         groups = [f"all {nature}" for nature in outputs]
     if groups:
-        over = "over time" if suite is None else "over time and records"
         yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
     if parts.encloses:
         yield enclosing_box_words(parts.encloses)
     if suite is not None:
         yield "A mean is that of one structure's peaks; its bounds are means of the records' bounds"
-    for is_guaranteed in (True, False):
-        tested = [x for x in studies if (x.nature is Nature.GUARANTEED) == is_guaranteed]
-        if count := sum(study.motions_tested for study in tested):
+    # Envelopes whose own bounds are not guaranteed were compared with wider ones that are.
+    tested = {True: 0, False: 0}
+    for study in parts.envelopes.values():
+        tested[study.nature is Nature.GUARANTEED] += study.motions_tested
+    for is_guaranteed, count in tested.items():
+        if count:
             yield f"{count} exact motions by another algorithm {agreement(is_guaranteed)}"
 
 
@@ -318,88 +515,151 @@ def agreement(is_guaranteed: bool) -> str:
 
 
 def smaller_steps(parts: Parts) -> Iterator[str]:
-    """Yield a sentence for each peak whose bound is widened most by motions between nodes."""
+    """Yield a sentence for each peak whose bound the time step widens noticeably.
+
+    Bounds hold at all times, so they contain what responses may add between the time nodes. The
+    sentence says about what half the step would give.
+
+    Args:
+        parts: Numbers of the results.
+    """
     for study in parts.envelopes.values():
         for name, peak in study.peak.items():
             if not peak.is_widened_by_step:
                 continue
-            # What motions add between nodes falls with the square of the step: half a step
+            # What responses add between nodes falls with the square of the step: half a step
             # leaves a quarter of it.
             saved = 0.75 * peak.between_nodes
             if peak.nature is not Nature.GUARANTEED:
-                what, value = "an error of", float(peak.error[0]) - saved
+                what = "an error of"
+                value = float(peak.error[0]) - saved
             elif peak.is_least:
-                what, value = "at least", float(peak.far_end[0]) + saved
+                what = "at least"
+                value = float(peak.far_end[0]) + saved
             else:
-                what, value = "at most", float(peak.far_end[0]) - saved
+                what = "at most"
+                value = float(peak.far_end[0]) - saved
             text = parts.shown_units[output_of(name)].text(value)
             yield f"{name}: a step of {study.step / 2:g} s would give {what} about {text}"
 
 
 def answers(parts: Parts) -> list[Row]:
-    """Return rows (what, answer, guarantee) of all answers; inputs of tolerances share a row."""
+    """Return the answers to all questions of a case as rows of texts.
+
+    Args:
+        parts: Numbers of the results.
+
+    Returns:
+        Rows of what is answered, the answer, and its guarantee, in the order of the report. The
+        admissible ranges of the inputs, of which a case may have many, share one row.
+    """
     rows: list[Row] = []
     for answer in parts.answers:
         answer_rows = answer.table().rows
         if isinstance(answer, Tolerances):
-            scale, *inputs = answer_rows
+            scale = answer_rows[0]
+            count = len(answer_rows) - 1  # one row for each input
             place = "table on the page and in tolerances.csv"
-            answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", place)]
-        rows += [(f"{answer.key}: {row[0]}", *row[1:3]) for row in answer_rows]
+            answer_rows = [scale, ("ranges", f"of {count} inputs", place)]
+        for row in answer_rows:
+            rows.append((f"{answer.key}: {row[0]}", row[1], row[2]))
     return rows
 
 
 def drivers(parts: Parts) -> Iterator[str]:
-    """Yield sentences on the inputs that widen E most, and the last output's peak most."""
+    """Yield a sentence on the inputs that widen E most, and one on the last output's peak.
+
+    Each names up to three inputs of E and two of a peak, with the fraction by which the width of
+    the result on the lowest level falls if the input is fixed at its nominal value.
+
+    Args:
+        parts: Numbers of the results, with these fractions by result and input in `shares`.
+    """
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
-    for name in [name for name in parts.shares if name == "E"] + peaks[-1:]:
-        count = 3 if name == "E" else 2
-        ranked = sorted(parts.shares[name].items(), key=lambda x: -x[1])[:count]
-        (largest, fraction), *further = ranked
-        more = "".join(f", {x} by {percent_text(y, 0)}" for x, y in further)
+    if "E" in parts.shares:
+        yield _driver_sentence("E", parts.shares["E"], count=3)
+    for name in peaks[-1:]:
         what = name.replace("the peak", "the reached peak")
-        if name != "E" and parts.encloses:
+        if parts.encloses:
             what = f"{name}, as tried in the box around {parts.encloses},"
-        yield f"Fixing {largest} narrows {what} by {percent_text(fraction, 0)}{more}"
+        yield _driver_sentence(what, parts.shares[name], count=2)
+
+
+def _driver_sentence(what: str, fractions: Mapping[str, float], *, count: int) -> str:
+    """Return a sentence on the `count` inputs with the largest fractions of a result's width."""
+    ranked = sorted(fractions.items(), key=lambda entry: -entry[1])[:count]
+    largest, fraction = ranked[0]
+    sentence = f"Fixing {largest} narrows {what} by {percent_text(fraction, 0)}"
+    for name, further_fraction in ranked[1:]:
+        sentence += f", {name} by {percent_text(further_fraction, 0)}"
+    return sentence
 
 
 def comparison(first: Parts, second: Parts) -> Table:
-    """Return a table of what both runs have: E, peaks and their widths, verdicts on limits."""
+    """Return a table of the quantities that two runs have in common, on their lowest levels.
+
+    Args:
+        first: Numbers of the first run, whose order and units the table has.
+        second: Numbers of the second run.
+
+    Returns:
+        Row of each quantity with both values and their ratio, second over first, which is empty for
+        texts and where the first value is zero. Without a common quantity there is no row.
+    """
     rows: list[Row] = []
-    second_entries = {what: entry for what, _, entry in _compared_entries(second)}
-    for what, unit, entry in _compared_entries(first):
-        if what not in second_entries:
+    second_values = {entry.what: entry.value for entry in _compared_entries(second)}
+    for what, unit, value in _compared_entries(first):
+        if what not in second_values:
             continue
-        second_entry = second_entries[what]
-        if isinstance(entry, str) or isinstance(second_entry, str):
-            rows.append((what, str(entry), str(second_entry), ""))
-        else:
-            ratio = f"{second_entry / entry:.3f}" if entry else ""
-            rows.append((what, unit.text(entry), unit.text(second_entry), ratio))
+        second_value = second_values[what]
+        if isinstance(value, str) or isinstance(second_value, str):
+            rows.append((what, str(value), str(second_value), ""))
+            continue
+        ratio = ""
+        if value:
+            ratio = f"{second_value / value:.3f}"
+        rows.append((what, unit.text(value), unit.text(second_value), ratio))
     return Table(("at the lowest α", "first", "second", "second over first"), rows)
 
 
-def _compared_entries(parts: Parts) -> Iterator[tuple[str, ShownUnit, float | str]]:
-    """Yield what is compared of a run on the lowest level: its name, its unit, number or text."""
-    shown_units, no_unit = parts.shown_units, ShownUnit("", 1.0)
+def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
+    """Yield the quantities of a run on its lowest level that are compared with another run's.
+
+    They are the largest E and its width, unless infinite; the farthest bound and the width of each
+    peak; statistics over the records of a suite; the verdict on each limit; and the admissible
+    scale of the tolerances.
+
+    Args:
+        parts: Numbers of the results.
+    """
+    shown_units = parts.shown_units
+    no_unit = ShownUnit("", 1.0)
+    gigapascal = ShownUnit("GPa", 1e-9)
     for result in (parts.modulus, parts.image):
-        if result is not None:
-            low, high = (1e9 * float(end[0]) for end in infinite_if_unknown(result.E_GPa))
-            for what, value in (("greatest E", high), ("width of E", high - low)):
-                if math.isfinite(value):
-                    yield what, ShownUnit("GPa", 1e-9), value
+        if result is None:
+            continue
+        low, high = (1e9 * float(end[0]) for end in infinite_if_unknown(result.E_GPa))
+        if math.isfinite(high):
+            yield ComparedEntry("greatest E", gigapascal, high)
+        if math.isfinite(high - low):
+            yield ComparedEntry("width of E", gigapascal, high - low)
     for study_name, study in parts.envelopes.items():
         for output, peak in study.peak.items():
-            name = output if study_name == "all" else f"{output} ({study_name})"
+            name = output
+            if study_name != "all":  # the name of the study that [envelope] alone makes
+                name = f"{output} ({study_name})"
             unit = shown_units[output_of(output)]
-            yield f"greatest peak of {name}", unit, float(peak.far_end[0])
-            yield f"width of the peak of {name}", unit, float(peak.upper[0] - peak.lower[0])
+            width = float(peak.upper[0] - peak.lower[0])
+            yield ComparedEntry(f"greatest peak of {name}", unit, float(peak.far_end[0]))
+            yield ComparedEntry(f"width of the peak of {name}", unit, width)
     if parts.records is not None:
         for output, statistics in parts.records.statistics.items():
+            unit = shown_units[output_of(output)]
             for name, ends in statistics.items():  # mean, median …
-                unit = shown_units[output_of(output)]
-                yield f"{name} of the records' peaks of {output}", unit, float(ends[0])
-    for limit in () if parts.decision is None else parts.decision.limits.values():
-        yield limit.words, no_unit, limit.verdict_words
+                what = f"{name} of the records' peaks of {output}"
+                yield ComparedEntry(what, unit, float(ends[0]))
+    if parts.decision is not None:
+        for limit in parts.decision.limits.values():
+            yield ComparedEntry(limit.words, no_unit, limit.verdict_words)
     if parts.tolerances is not None and parts.tolerances.kept is not None:
-        yield "scale of tolerances", no_unit, parts.tolerances.kept
+        yield ComparedEntry("scale of tolerances", no_unit, parts.tolerances.kept)

@@ -31,7 +31,14 @@ DIGITS = 6
 
 
 def frames(parts: Parts) -> dict[str, pd.DataFrame]:
-    """Return the numbers of all results as data frames by name: stages first, then answers."""
+    """Return the numbers of all results as data frames, by the names of their CSV files.
+
+    The results of stages come first, then the answers to questions. Stages that the run lacks and
+    identified inputs that are refuted have none.
+
+    Args:
+        parts: Numbers of the results, in SI units but for moduli in GPa.
+    """
     found: dict[str, pd.DataFrame] = {}
     if parts.microstructure:
         found["radius_map"] = radius_map(parts.microstructure)
@@ -75,7 +82,12 @@ def radius_map(numbers: Document) -> pd.DataFrame:
 
 
 def modulus(result: ModulusResult | ImageResult) -> pd.DataFrame:
-    """Return the α-cuts of E, and of a cell those of ν and the error of E, a row for each level."""
+    """Return the α-cuts of E, and of a cell those of ν and the error of E, a row for each level.
+
+    Args:
+        result: α-cuts in GPa. Ends without a bound become infinite. The error of E is the sum of
+            the relative errors by source times the upper end; NaN if none is declared.
+    """
     lower, upper = infinite_if_unknown(result.E_GPa)
     columns = {"α": result.alpha, "E from [GPa]": lower, "E to [GPa]": upper}
     if isinstance(result, ModulusResult):
@@ -93,7 +105,16 @@ def rows_of(answer: Answer) -> pd.DataFrame:
 
 
 def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
-    """Return the peaks of all studies, a row for each output and level."""
+    """Return the bounds of the peaks of all studies, a row for each output and level.
+
+    Args:
+        studies: Numbers of each study by name. There must be one with a peak.
+
+    Returns:
+        Bounds, error and attained value in SI units, NaN where no value is known to be attained,
+        and the distance of the attained value from the bound as a fraction of this ("gap, share").
+        If the peaks are those of a box around a set of inputs, a column "inputs" says so.
+    """
     found = []
     for name, study in studies.items():
         for output, peak in study.peak.items():
@@ -116,13 +137,24 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
 
 
 def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
-    """Return the bounds of one output over time, with three columns for each level.
+    """Return the bounds of one output over time, with up to three columns for each level.
 
-    The third one is the error; of guaranteed bounds, which contain it, the gap to attained values.
+    Args:
+        data: Envelope of a study over alpha, output and time, in SI units.
+        output: Name of the output.
+        unit: Its SI unit, for the titles.
+
+    Returns:
+        Row of each time node: the time in s and, for each level, lower bound, upper bound and
+        error. Guaranteed bounds contain the error; there the third column is the gap to attained
+        values, and is left out if the bounds are those of a box around a set of inputs.
     """
-    series, nature = data.sel(output=output), Nature(data.attrs["nature"])
+    series = data.sel(output=output)
+    nature = Nature(data.attrs["nature"])
     encloses = data.attrs.get("encloses", "")
-    box = f" {of_enclosing_box(encloses)}" if encloses else ""
+    box = ""
+    if encloses:
+        box = f" {of_enclosing_box(encloses)}"
     titles = {"lower": f"{nature} lower{box}", "upper": f"{nature} upper{box}"}
     if nature is not Nature.GUARANTEED:
         titles["error"] = "error"
@@ -138,9 +170,13 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
 
 
 def shown(frame: pd.DataFrame) -> Table:
-    """Return a data frame as a table of texts, without columns that are empty.
+    """Return a data frame as a table of texts with six significant digits.
 
-    Lower and upper ends are rounded out- or inwards, as their guarantee demands.
+    Columns without any value are left out. The ends of E and of peaks are rounded outwards if they
+    are guaranteed and inwards if they are attained, so that the guarantee stays true.
+
+    Args:
+        frame: Numbers and texts; a missing number is NaN and becomes an empty text.
     """
     filled = frame.dropna(axis=1, how="all")
     for low, high, guarantee in (
@@ -149,24 +185,39 @@ def shown(frame: pd.DataFrame) -> Table:
     ):
         if low not in filled:
             continue
-        ends = [
-            rounded_ends(lower, upper, Nature(nature), DIGITS)
-            for lower, upper, nature in filled[[low, high, guarantee]].itertuples(index=False)
-        ]
-        filled = filled.assign(**{low: [x[0] for x in ends], high: [x[1] for x in ends]})
+        lower_ends = []
+        upper_ends = []
+        for lower, upper, nature in filled[[low, high, guarantee]].itertuples(index=False):
+            ends = rounded_ends(lower, upper, Nature(nature), DIGITS)
+            lower_ends.append(ends[0])
+            upper_ends.append(ends[1])
+        filled = filled.assign(**{low: lower_ends, high: upper_ends})
     rows = [tuple(map(_text, row)) for row in filled.itertuples(index=False)]
     return Table(tuple(map(str, filled)), rows)
 
 
 def _text(value: object) -> str:
+    """Return a number with six significant digits, "" for NaN and None, and a text as it is."""
     if value is None or isinstance(value, str):
         return value or ""
     number = float(value)  # type: ignore[arg-type]
-    return "" if np.isnan(number) else f"{number + 0.0:.{DIGITS}g}".replace("-", MINUS)
+    if np.isnan(number):
+        return ""
+    return f"{number + 0.0:.{DIGITS}g}".replace("-", MINUS)  # adding 0 removes the sign of −0
 
 
 def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Path]:
-    """Write the results of a run into a folder as CSV files; return the files."""
+    """Write all results of a run into a folder as CSV files, and return the files.
+
+    Args:
+        parts: Numbers of the results.
+        results: Folder of the results, for the envelopes over time.
+        folder: Folder for the files NAME.csv, which is made if it is missing.
+
+    Raises:
+        RefusedError: The dataset of an envelope is missing or damaged.
+        OSError: A file cannot be written.
+    """
     found = frames(parts)
     for name, study in parts.envelopes.items():
         data = results.dataset(f"envelope_{name}.nc")
@@ -176,9 +227,17 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
 
 
 def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
-    """Write data frames as CSV files, with all digits so that a bound stays one; return the files.
+    """Write data frames as CSV files, and return the files.
 
-    Texts have plain minus signs, and no spreadsheet takes one for a formula.
+    Numbers have all digits, so that a bound stays one. Texts have hyphens for minus signs, and
+    those that a spreadsheet would take for a formula are marked as texts.
+
+    Args:
+        found: Data frames by the name of their file.
+        folder: Folder for the files NAME.csv. Links in place of a file are replaced, not followed.
+
+    Raises:
+        OSError: A file cannot be written.
     """
     for name, frame in found.items():
         texts = frame.select_dtypes("object").map(_csv_cell)
@@ -188,11 +247,23 @@ def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
 
 
 def _csv_cell(value: object) -> object:
-    return csv_cell(value.replace(MINUS, "-")) if isinstance(value, str) else value
+    """Return a text with hyphens for minus signs and no formula in it; other values as they are."""
+    # A name in a case may begin with "=", by which a spreadsheet would run it.
+    if isinstance(value, str):
+        return csv_cell(value.replace(MINUS, "-"))
+    return value
 
 
 def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
-    """Write each table that has rows as a LaTeX file; return the files."""
+    """Write each table that has rows as a LaTeX file, and return the files.
+
+    Args:
+        named: Tables by the name of their file.
+        folder: Folder for the files NAME.tex, which is made if it is missing.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
     written = []
     for name, table in named.items():
         if table.rows:
@@ -202,12 +273,16 @@ def write_markup(named: Mapping[str, Table], folder: Path) -> list[Path]:
 
 
 def latex(table: Table) -> str:
-    """Return a table as a tabular environment with the rules of the package booktabs.
+    """Return a table as a LaTeX tabular environment with the rules of the package booktabs.
 
-    Signs that the fonts of LaTeX do not have become commands.
+    Special characters of LaTeX in the texts are escaped, and signs that its fonts do not have, such
+    as Greek letters and ≤, become commands. The first column is aligned to the left, others to the
+    right.
     """
-    frame, columns = pd.DataFrame(table.rows, columns=table.head), "l" + "r" * (len(table.head) - 1)
+    frame = pd.DataFrame(table.rows, columns=table.head)
+    columns = "l" + "r" * (len(table.head) - 1)
     text: str = frame.to_latex(index=False, escape=True, column_format=columns)
+    # pandas has escaped the texts already, so that the commands are put in afterwards.
     commands: dict[str, str | int | None] = {
         "…": r"\dots{}",
         "µ": r"\textmu{}",
