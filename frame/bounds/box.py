@@ -121,7 +121,8 @@ class Box:
             its rounding.
 
         Raises:
-            UnprovedError: A mode does not oscillate at one of the points.
+            UnprovedError: A mode does not oscillate at one of the points, or turns too far within
+                one sample interval of a load.
         """
         value = np.empty(len(unit))
         error = np.empty(len(unit))
@@ -152,15 +153,15 @@ class Box:
         """Return outputs at the midpoint of the box at all time nodes, exact but for rounding.
 
         Args:
-            outputs: Indices of the outputs, shape (m,), or a slice; all unless given. At least one
-                must be left.
+            outputs: Indices of the outputs, shape (m,), m ≥ 1, or a slice; all unless given.
 
         Returns:
             `value`, shape (T, m) for T time nodes, in the units of the outputs, and `error` of the
             same shape, a bound of its rounding.
 
         Raises:
-            UnprovedError: A mode does not oscillate at the midpoint.
+            UnprovedError: A mode does not oscillate at the midpoint, or turns too far within one
+                sample interval of a load.
         """
         sigma = self.midpoint_modes.sigma[0]
         point = np.zeros(len(self.time), int)
@@ -178,14 +179,18 @@ class Box:
     ) -> Array:
         """Return upper bounds of max |output| over time at one point, also between nodes, (m,).
 
+        Rounding is contained at the nodes. Between them, where the bound is the distance from a
+        straight line, that of the modes themselves is not.
+
         Args:
             unit: The point, shape (d,): coordinates in [−1, 1] of the d inputs of nonzero width.
             between_nodes: Bounds of the distance of these outputs from a straight line in the step
                 that ends at each of the T time nodes, shape (T, m).
-            outputs: Indices of the outputs, shape (m,), or a slice; all unless given.
+            outputs: Indices of the outputs, shape (m,), m ≥ 1, or a slice; all unless given.
 
         Raises:
-            UnprovedError: A mode does not oscillate at the point.
+            UnprovedError: A mode does not oscillate at the point, or turns too far within one
+                sample interval of a load.
         """
         point = self.inputs(unit)
         at_point = replace(self, low=point, high=point)
@@ -216,7 +221,7 @@ class Box:
 
         A response is at most the sum over modes of |output coefficient| |participation factor|
         times that of an oscillator of unit participation, so the distances of the oscillators are
-        added with these weights.
+        added with these weights. The rounding of modes and weights is not contained.
 
         Args:
             outputs: Indices of the outputs, shape (m,), or a slice; all unless given.

@@ -46,8 +46,8 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 
     The peak of a trajectory is its largest |output| over all time nodes. The bound holds for every
     input in the box; it is the smallest over cells, ranges of the modes' frequencies and decays
-    that together cover those of the box. The cell of the lowest bound is halved until a fixed
-    number of bisections is reached or none is left to halve.
+    that together cover those of the box. The cell of the lowest bound is halved, until it cannot be
+    halved or a fixed number of bisections is reached.
 
     Args:
         level: Models of the response over the box of d inputs of nonzero width.

@@ -55,9 +55,9 @@ def response_tables(
     """Return tables of the responses of K oscillators on grids, by the order of the derivative.
 
     Args:
-        grids: Grid over the frequency ω and the quotient q = decay/ω of each oscillator; all have
-            the same numbers of points.
-        excitation: Loads by name, T time nodes, and the names of the sources.
+        grids: Grid over the frequency ω and the quotient q = decay/ω of each oscillator, at least
+            one; all have the same numbers of points.
+        excitation: Loads by name, T time nodes, and the names of the sources, at least one.
         orders: Derivatives by time of the displacements (0, 1, 2) that outputs take, each once.
         inputs: Number of inputs of the sums that the responses enter, for their rounding.
 
@@ -143,7 +143,8 @@ class LevelModels:
 
         Args:
             structure: The structure as Taylor models over the box of the inputs.
-            excitation: Loads by name, T time nodes from 0 on, and the names of the sources.
+            excitation: Loads by name, T time nodes from 0 on, and the names of the sources, at
+                least one.
             truncation_tolerance: Allowed error of each of the m outputs by modes that are not
                 enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
                 unless it is given.
@@ -167,6 +168,10 @@ class LevelModels:
         Row j belongs to the step that ends at node j. Where no force jumps in the step, the number
         also bounds the distance of the outputs from a straight line. All is in the units of the
         outputs and holds for every input of the box.
+
+        Raises:
+            UnprovedError: An oscillator is out of the range in which responses are computed to
+                rounding.
         """
         # Contributions whose signs within a step are not known, so that they cannot cancel.
         unresolved = self.models.interpolation_error + sum(

@@ -348,8 +348,8 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
             waves = 2 * part.waves[p]
             cubic += np.tensordot(waves, term[3], (1, 1))
             quadratic = TaylorModel(tuple(term[:3]), np.zeros((n, m)), d)
-            values, slopes, *_ = majorant_parts(quadratic, upper - lower)
-            largest = np.concatenate([values, slopes])
+            # The first two degrees are bounds of the values and of the slopes.
+            largest = np.concatenate(majorant_parts(quadratic, upper - lower)[:2])
             rounding += np.tensordot(relative_rounding * waves, largest, (1, 1))
             term = [
                 product_part(term, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)

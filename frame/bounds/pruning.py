@@ -102,7 +102,8 @@ def _bounds_over_piece(
     Raises:
         UnprovedError: Numbers of the models exceed the range of the dual function.
     """
-    inside = OutputBounds.initial(piece, *bounds.index, bounds.wanted_gap, bounds.attained)
+    output, side = bounds.index
+    inside = OutputBounds.initial(piece, output, side, bounds.wanted_gap, bounds.attained)
     inside.upper[:] = bounds.upper
     effort = inside.effort(max_cells, int(numbers.PRUNING_STEPS), slack_below_peak=1.0)
     for node in above[np.argsort(-bounds.upper[above])]:

@@ -368,7 +368,7 @@ class Queue:
                 largest = np.maximum(largest, np.where(is_bounded, upper_peaks, 0.0))
         return largest
 
-    def _peaks_to_close(self, box: SubBox, k: int) -> Mask:
+    def _peaks_with_open_gaps(self, box: SubBox, k: int) -> Mask:
         """Return the peaks on row k of a sub-box whose gaps are still to be closed, (m, 2)."""
         excess = self._excess(box, k)
         # A sub-box that was refused has no bounds yet, whether its peaks are abandoned or not.
@@ -378,16 +378,16 @@ class Queue:
     def _fathom(self, box: SubBox) -> None:
         """Close the peaks of a sub-box that need no further bisection, in place.
 
-        These are the peaks that are abandoned or whose bound exceeds the largest attained value by
-        no more than the wanted gap. Their bounds go into the hull. A level keeps all its peaks as
-        long as one that is still open has a very wide gap. The sub-box's `peaks`, and `is_wide` of
-        the levels that have no wide gaps any more, are changed.
+        These are the peaks that are abandoned with a finite bound, or whose bound exceeds the
+        largest attained value by no more than the wanted gap. Their bounds go into the hull. A
+        level keeps all its peaks as long as one that is still open has a very wide gap. The
+        sub-box's `peaks`, and `is_wide` of the levels that have no wide gaps any more, are changed.
 
         Args:
             box: The sub-box.
         """
         for k, level in enumerate(box.levels):
-            is_open = self._peaks_to_close(box, k)
+            is_open = self._peaks_with_open_gaps(box, k)
             if (is_open & (self._excess(box, k) > self.wide_gap)).any():
                 continue  # bounds of other peaks are worth little then
             if box.is_wide[k]:  # from here on only the open peaks of this level are bounded
@@ -437,9 +437,9 @@ class Queue:
     def _halves(self, box: SubBox, answers: Sequence[Answer]) -> list[SubBox]:
         """Return both halves of a sub-box on the levels that have open peaks; none without any.
 
-        It is bisected along the input that most votes are for: of each open peak the fractions of
-        its gap by input, where some gaps are very wide those of these alone, and one vote of each
-        error for the input that it names.
+        It is bisected along the input with most votes. Each open peak gives as votes the fractions
+        of its gap that inputs account for; on a level on which some gaps are very wide, only those
+        peaks vote. An error gives one vote to the input that it names, if any.
 
         Args:
             box: The sub-box; not changed.
@@ -450,7 +450,7 @@ class Queue:
         votes = np.zeros(len(self.problem.boxes.names))
         for k, bounds in enumerate(answers):
             if isinstance(bounds, BoxBounds):
-                is_open = self._peaks_to_close(box, k)
+                is_open = self._peaks_with_open_gaps(box, k)
                 is_wide = is_open & (self._excess(box, k) > self.wide_gap)
                 voters = is_wide if is_wide.any() else is_open
                 votes += bounds.gap_fractions[voters].sum(axis=0)

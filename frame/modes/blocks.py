@@ -141,13 +141,14 @@ def narrowest_block(
     Args:
         block: Indices of its modes from the lowest on, rising, shape (p,).
         rotation: Orthogonal matrix, shape (p, p): X at the midpoint of the box, in the rows of the
-            block.
+            block. It must be the same at each call for the same block and matrices.
         centre: M and K as Taylor models, diagonal at the midpoint.
         tolerance: Relative error bound of L and of the modal masses that suffices.
 
     Returns:
-        The enclosure, that of the last degree tried if none meets the tolerance. None if no degree
-        gives one, or if its relative error is .05 (a tuned number) or more.
+        The enclosure by the last degree tried, which meets the tolerance or is the highest one.
+        None if this degree gives no enclosure, or one with a relative error of .05 (a tuned number)
+        or more.
     """
     largest_error = 0.05
     # With a relative error of 3e-4 no higher degree is tried; this is tuned.

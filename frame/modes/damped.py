@@ -144,6 +144,7 @@ class DampedModes:
         Raises:
             UnprovedError: One of them does not oscillate, or has the frequency of another one, from
                 which the inputs separate it.
+            numpy.linalg.LinAlgError: One of them is defective at the midpoint.
         """
         eigenvalue, shape = _eigen_series(structure, chosen)
         force = shape @ structure.impulses
@@ -389,6 +390,9 @@ def _orthogonal_shapes(shape: Array, rate: complex, D: Array) -> Array:
     form = basis.T @ (2 * rate * basis + D @ basis)
     real = form.real
     imag = form.imag
+    # For A = V S Vᵀ with a unitary V the columns v of V obey A v̄ = s v, s ≥ 0. In real and
+    # imaginary parts of v this is an eigenvalue problem of a symmetric matrix, whose eigenvalues
+    # are ± s: the upper half of them, which NumPy puts last, belongs to V.
     vectors = np.linalg.eigh(np.block([[real, imag], [imag, -real]]))[1][:, g:]
     V = vectors[:g] + 1j * vectors[g:]
     return np.asarray((basis @ V.conj()).T)

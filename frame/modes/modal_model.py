@@ -94,6 +94,7 @@ class ModalModel:
             UnprovedError: The integrator is not the exact one, the structure is not known to have a
                 mass and to lose energy, a mode does not oscillate or has the frequency of another
                 one, or the mass may be singular in the box.
+            numpy.linalg.LinAlgError: A mode is defective at the midpoint of the box.
         """
         require_dissipation(exact_flow(flow).system, boxes)
         structure = DampedStructure.over_box(flow.system, boxes, degree)
@@ -246,7 +247,7 @@ def wave_factors(eigenvalues: Array, C: Array, d: int) -> Array:
     of_wave[:] = np.moveaxis(C, 0, -1)
     for a in range(1, 1 + d):
         of_first_derivative[..., a] = C[0] * rate[a]
-    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), start=1 + d):
+    for a, (i, j) in enumerate(np.transpose(np.triu_indices(d)), start=1 + d):
         rate_i = rate[1 + i]
         rate_j = rate[1 + j]
         of_first_derivative[..., a] = C[1 + i] * rate_j + C[1 + j] * rate_i + C[0] * rate[a]

@@ -124,6 +124,10 @@ class Response(NamedTuple):
         Args:
             first: Beginning of the step, in s.
             last: Its end, in s.
+
+        Raises:
+            UnprovedError: An oscillator is out of the range in which responses are computed to
+                rounding.
         """
         if self.sigma is not None:
             return np.asarray(self.line_deviation(np.array([first, last]))[1])
@@ -146,6 +150,10 @@ class Response(NamedTuple):
             nodes: Rising times, shape (nodes,), in s.
             parts: Every `parts`-th node is the end of a step, between which the chords, straight
                 lines, run. The last node must be one of these.
+
+        Raises:
+            UnprovedError: An oscillator is out of the range in which responses are computed to
+                rounding.
         """
         chords = Chords.through(np.arange(0, len(nodes), parts), nodes)
         if self.sigma is None:
@@ -166,6 +174,10 @@ class Response(NamedTuple):
 
         Returns:
             Lower and upper bounds for each output, shape (m,) each.
+
+        Raises:
+            UnprovedError: An oscillator is out of the range in which responses are computed to
+                rounding.
         """
         nodes = np.array([first, last])
         if self.sigma is None:
@@ -321,6 +333,13 @@ def narrowed_deviation(
         bound: The bound that adds all responses by magnitude, shape (T, m), row j for the step that
             ends at node j. Where it is narrower, it stays; it is not changed.
         unresolved: Bound of the same distance of what is not among the responses, shape (T, m).
+
+    Returns:
+        The narrower bound, or `bound` itself if it is sharp enough already.
+
+    Raises:
+        UnprovedError: An oscillator is out of the range in which responses are computed to
+            rounding.
     """
     # At the midpoint of the box four substeps show what the true distance is. If the bound is at
     # most 2.5 times as large, it stays. If four substeps leave a bound of at most 1.25 times, four
@@ -357,6 +376,10 @@ def narrowed_at_jumps(responses: Sequence[Response], time: Array, bound: Array) 
         time: Time nodes, shape (T,), in s.
         bound: Bound of the distance from the chord in the step to each node, shape (T, m); not
             changed.
+
+    Raises:
+        UnprovedError: An oscillator is out of the range in which responses are computed to
+            rounding.
     """
     has_jump = np.zeros(len(time), bool)
     for response in responses:

@@ -181,7 +181,7 @@ def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Arra
             if a * b < 0:  # a line through zero encloses two triangles, a²/2 and b²/2 over |slope|
                 area = x * (a * a + b * b) / (2 * (abs(a) + abs(b)))
             is_long = decay * x > 1
-            tail = largest / decay
+            tail = largest / decay  # not finite where g = 0, and not looked at then
             for n in range(5):
                 total = 0.0
                 binomial = 1.0
@@ -325,8 +325,9 @@ def _respond_at_nodes(
                 first = node + 1
             inside = slice(first, node + length + 1)
             nodes = load.interval[inside], load.offset[inside], load.time_rounding[inside]
-            end = out[:, inside, s], error[inside, s]
-            _respond(sigma[s], load, orders, nodes, load.offsets, factors, start, *end)
+            rho = out[:, inside, s]
+            rounding = error[inside, s]
+            _respond(sigma[s], load, orders, nodes, load.offsets, factors, start, rho, rounding)
 
 
 @parallel
@@ -352,8 +353,9 @@ def _respond_at_given(
         nodes = load.interval[here], np.zeros(1, np.int64), load.time_rounding[here]
         for k in range(sigma.shape[1]):
             factors = _propagators(sigma[s, k], offsets)
-            end = out[:, s : s + 1, k], error[s : s + 1, k]
-            _respond(sigma[s, k], load, orders, nodes, offsets, factors, (0, -1), *end)
+            rho = out[:, s : s + 1, k]
+            rounding = error[s : s + 1, k]
+            _respond(sigma[s, k], load, orders, nodes, offsets, factors, (0, -1), rho, rounding)
 
 
 @compiled

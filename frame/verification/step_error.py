@@ -286,7 +286,8 @@ def _fed_between(fed: _FedThrough, time: Array, substeps: int) -> Array:
     """
     steps = (len(time) - 1) // substeps
     added = np.zeros((steps, fed.amplitude.shape[-1]))
-    for history, amplitude, jumps in zip(*fed, strict=True):
+    of_forces = zip(fed.histories, fed.amplitude, fed.jumps, strict=True)
+    for history, amplitude, jumps in of_forces:
         from_chord = load_deviation(history, time)[1:].reshape(steps, substeps).max(axis=1)
         beyond_ends = load_excess(history, time)[1:].reshape(steps, substeps).max(axis=1)
         distance = np.where(jumps, beyond_ends, from_chord)
