@@ -46,7 +46,7 @@ class Jet:
 
     @classmethod
     def of(cls, value: Array, first: Array, second: Array) -> Jet:
-        """Return the jet with the given derivatives by d parameters.
+        """Return the jet with the given values and derivatives by d parameters.
 
         Args:
             value: Values, of any shape V.
@@ -124,6 +124,7 @@ class Jet:
         return -self + other
 
     def __mul__(self, other: Jet | ArrayLike) -> Jet:
+        """Return the elementwise product with a jet of the same parameters or with numbers."""
         if not isinstance(other, Jet):
             factor = np.asarray(other, float)
             return Jet(_padded(self, factor.ndim).terms * factor, self.directions)
@@ -235,7 +236,7 @@ def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
 
 
 def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> dict[str, Jet]:
-    """Return the variables themselves as jets, for differentiation of functions of them.
+    """Return the variables as jets, values with derivatives, for differentiation of functions.
 
     Args:
         points: Values of all variables at S points, shape (S, variables).
@@ -257,7 +258,7 @@ def inverse(a: Jet) -> Jet:
     They are X_i = −X A_i X and X_ij = −X A_ij X − X A_i X_j − X A_j X_i.
 
     Args:
-        a: The matrices, a jet of shape (…, n, n).
+        a: The matrices with their derivatives by d parameters, shape (…, n, n).
 
     Raises:
         numpy.linalg.LinAlgError: A matrix is singular.

@@ -472,6 +472,10 @@ class TaylorModel:
                 that the product of the magnitudes bounds its magnitude.
             factor: The numbers.
             terms: Number of products that each entry of the result is the sum of.
+
+        Returns:
+            Taylor model of the array of functions that `bilinear` gives, of the same inputs and
+            order.
         """
         magnitude = np.abs(factor)
         remainder = np.asarray(bilinear(self.remainder, magnitude)) * (1 + gamma(terms + 2))

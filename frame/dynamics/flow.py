@@ -155,8 +155,9 @@ class Flow(ABC):
                 `self.names`. Other parameters have their nominal values.
 
         Returns:
-            Jet whose `value` has the shape (S, time nodes, outputs), in SI units; `first` and
-            `second` have one and two axes of length d in front, in the order of the names.
+            A jet: its `value`, the trajectories, has the shape (S, time nodes, outputs), in SI
+            units; `first` and `second` have one and two axes of length d in front, in the order of
+            the names.
 
         Raises:
             RefusedError: A trajectory does not exist, or leaves the range of floating-point
@@ -174,7 +175,8 @@ class Flow(ABC):
                 Their values are not checked.
 
         Returns:
-            Jet of shape (S, time nodes, outputs), all of whose values are finite.
+            Trajectories with their derivatives (a jet), shape (S, time nodes, outputs), in the
+            units of the outputs; all values are finite.
 
         Raises:
             RefusedError: A matrix is singular, or a value is not finite; the message names the
@@ -289,7 +291,8 @@ class LinearFlow(Flow):
         An output r·q + s·v of displacements q and velocities v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ)
         √(qᵀ K q + vᵀ M v), by the inequality of Cauchy and Schwarz. The second factor is the root
         of twice the energy, here the largest one at a time node of the response at the nominal
-        parameters. What forces add to accelerations at once is left out.
+        parameters. What forces add to accelerations at once is left out, and so are displacements
+        without strain energy where K is singular.
 
         Returns:
             Array of shape (outputs,), in the units of the outputs, not negative.
@@ -338,7 +341,8 @@ class LinearFlow(Flow):
             derivatives: Whether the jet has first and second derivatives by the d parameters.
 
         Returns:
-            Jet of shape (S, time nodes, outputs).
+            Trajectories with their derivatives (a jet), shape (S, time nodes, outputs), in the
+            units of the outputs.
 
         Raises:
             RefusedError: Damping is given by ratios, and the stiffness is not positive definite; or
@@ -367,9 +371,9 @@ class LinearFlow(Flow):
             rows: Rows C of the outputs, shape (S, outputs, 2n), with or without derivatives.
 
         Returns:
-            Jet of shape (S, time nodes, outputs), with derivatives if `rows` has them. None if
-            damping couples the modes, two of them are too close, or a mode does not oscillate or
-            grows.
+            Trajectories with their derivatives (a jet), shape (S, time nodes, outputs); there are
+            as many derivatives as `rows` has. None if damping couples the modes, two of them are
+            too close, or a mode does not oscillate or grows.
         """
         pushes, loads = self._loads(matrices)
         if not rows.directions:
@@ -386,8 +390,8 @@ def with_feedthrough(outputs: Jet, matrices: Matrices, system: LinearSystem, tim
     """Return outputs with what forces add to accelerations at once.
 
     Args:
-        outputs: Trajectories C x(t) of the states x of a structure, a jet of shape (S, nodes,
-            outputs).
+        outputs: Trajectories C x(t) of the states x of a structure, with their derivatives by
+            parameters (a jet), shape (S, nodes, outputs).
         matrices: Matrices of the structure at the same S parameter sets.
         system: The structure, which has the loads.
         time: Time nodes, shape (nodes,), in s.

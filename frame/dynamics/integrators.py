@@ -181,10 +181,12 @@ def state_matrix(m: Matrices) -> Jet:
     """Return the state matrices A of the free motion [q; v]˙ = A [q; v] (eq. 17, eq. 23).
 
     Args:
-        m: Mass M, damping D and stiffness K of n unknowns at S parameter sets.
+        m: Mass M, damping D and stiffness K of n unknowns at S parameter sets, with their
+            derivatives by the parameters.
 
     Returns:
-        Jet of shape (S, 2n, 2n) with the blocks [[0, I], [-M⁻¹ K, -M⁻¹ D]].
+        The matrices with their derivatives (a jet), shape (S, 2n, 2n), with the blocks [[0, I],
+        [-M⁻¹ K, -M⁻¹ D]].
 
     Raises:
         numpy.linalg.LinAlgError: A mass matrix is singular.
@@ -201,7 +203,8 @@ def exponential(z: Jet) -> Jet:
     """Return the exponentials of matrices, with derivatives, by scaling and squaring.
 
     Args:
-        z: Matrices, a jet of shape (…, N, N), of finite values.
+        z: Matrices with their derivatives by d parameters (a jet), shape (…, N, N), of finite
+            values.
 
     Returns:
         Jet of the same shape, accurate to rounding in the values; squaring amplifies rounding where
@@ -230,8 +233,9 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
     """Return the moments ∫ s^k f(t) dt of a load f over each step, for k = 0 … order - 1.
 
     In each step s falls from 1 at its beginning to 0 at its end. The integrals are exact to
-    rounding, also where samples and jumps of the load lie inside a step. Results are cached;
-    callers must not change them.
+    rounding, also where samples and jumps of the load lie inside a step; with a sine in the load
+    this holds if it turns by at most 2 rad in a step. Results are cached; callers must not change
+    them.
 
     Args:
         history: The load f, zero before it starts, and behind its end unless its last sample is

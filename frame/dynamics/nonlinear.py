@@ -210,7 +210,8 @@ class LagrangianFlow(Flow):
             derivatives: Whether the jet has first and second derivatives by the d parameters.
 
         Returns:
-            Jet of shape (S, time nodes, outputs).
+            Trajectories with their derivatives (a jet), shape (S, time nodes, outputs), in the
+            units of the outputs.
 
         Raises:
             RefusedError: A function of the system is not smooth.

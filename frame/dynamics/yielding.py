@@ -99,7 +99,14 @@ class YieldingFlow(Flow):
         return replace(self, step=self.step / 4), 4
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        """Return trajectories at parameter sets (S, d), shape (S, time nodes, outputs).
+        """Return trajectories at parameter sets, shape (S, time nodes, outputs).
+
+        They are in the units of the outputs, as a jet (values with derivatives) without
+        derivatives.
+
+        Args:
+            points: Parameter sets in SI units, shape (S, d): a column for each uncertain parameter.
+            derivatives: Must be false.
 
         Raises:
             RefusedError: Derivatives are asked for, which do not exist where a storey yields; a

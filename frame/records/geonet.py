@@ -52,7 +52,7 @@ class _Component:
 
     @classmethod
     def of(cls, file: TextFile, start: int) -> _Component:
-        """Return the component that begins in a line, counted from 0.
+        """Return the component that begins in a line of a file, counted from 0.
 
         A component has 16 lines of text, 4 lines of integers and 6 of reals, all in columns of 8
         characters, and then its accelerations, velocities and displacements, 10 in a line, each
@@ -142,7 +142,7 @@ def _components(file: TextFile) -> Iterator[_Component]:
 
 
 def _reals(file: TextFile, first: int) -> Array:
-    """Return the reals of a head, shape (60,), from their first line on."""
+    """Return the 60 reals of a head from their first line on, or raise RefusedError."""
     reals = file.numbers(first, first + 6, width=_Component.width)
     if len(reals) != 60:
         allowed = "60 reals, of which 26 is the step"

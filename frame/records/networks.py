@@ -63,7 +63,8 @@ class _PeerHead:
         line = named[0] if named else min(3, len(file.lines) - 1)
         for row in named:
             if match := re.search(names_last, head[row], re.I):
-                return cls(int(match["count"]), float(match["step"]), row)
+                step = float(re.sub("[dD]", "e", match["step"]))
+                return cls(int(match["count"]), step, row)
             match = re.search(names_first, head[row], re.I)
             if match is None:
                 continue

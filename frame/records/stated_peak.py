@@ -62,6 +62,8 @@ def remarks_on_peak(
 ) -> tuple[str, ...]:
     """Return a clause if the peak of the samples is none of those that the head states.
 
+    Else, and if there are no samples or no stated peaks, the result is empty.
+
     A peak may be that of the samples or of the samples without their mean: networks state the peak
     of a record before or after they remove the offset of its sensor. Differences up to 5 % are not
     remarked, since networks filter and interpolate.

@@ -172,7 +172,7 @@ def read_recordings(
 
 
 def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
-    """Refuse two recordings of the same name, which is that of their results."""
+    """Raise RefusedError if two recordings have the same name, which is that of their results."""
     counts = Counter(recording.name for recording in recordings)
     repeated = ", ".join(sorted(name for name, count in counts.items() if count > 1))
     require(not repeated, key, repeated, allowed="each file once, by its name")

@@ -118,7 +118,8 @@ class _Table:
         Returns:
             The table: `start`, the index of the first line passed neither as empty nor as a
             comment, 0 without one; `head`, the last line above the rows that is no comment, or
-            empty; `above`, all lines above the rows, comments among them without their "#"; and
+            empty, and if it has units alone, joined with the line of names before, as "time [s],acc
+            [g]"; `above`, all lines above the rows, comments among them without their "#"; and
             `rows`, the cells of each row by the index of its line.
         """
         lines = {k: x for k, x in enumerate(file.lines) if x.strip() and not x.startswith("#")}
@@ -252,13 +253,16 @@ class _Table:
 
 
 def _with_units(heads: Sequence[str]) -> str:
-    """Return the last of the lines above numbers, joined with the one before if it has units alone.
+    """Return the last line above the numbers, joined with the one before if it has units alone.
 
-    Loggers write the names of columns in one line and their units, with or without brackets, in
-    the next: "time,acc" and "s,g" become "time [s],acc [g]".
+    Loggers write the names of columns in one line and their units, with or without brackets, in the
+    next: "time,acc" and "s,g" become "time [s],acc [g]". The last line is returned as it is if
+    there is one line alone, if a cell of it is no known unit, or if both lines have different
+    numbers of cells.
 
     Args:
-        heads: The lines above the numbers, one or more.
+        heads: The lines above the numbers, one or more, of which the last two count. Commas,
+            semicolons and tabs separate their cells.
     """
     cells = [re.split("[,;\t]", line) for line in heads[-2:]]
     units = [cell.strip(' "[]()') for cell in cells[-1]]

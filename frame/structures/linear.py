@@ -81,8 +81,8 @@ class Assembly(Generic[Number]):
 
         The histories are those of the loads, each once, in the order of their first use; loads with
         equal histories are added at their amplitudes. None if no load has a history, so also if all
-        are impulses. The … stands for the parameter sets of a jet, and for nothing for a Taylor
-        model.
+        are impulses. The … stands for the parameter sets of a jet (values with derivatives), and
+        for nothing for a Taylor model (polynomials with error bounds over a box).
         """
         histories = distinct_histories(self.loads)
         belongs = np.zeros((len(self.loads), len(histories)))
@@ -114,9 +114,10 @@ class Assembly(Generic[Number]):
             weights: One row for each load, in their order, and k columns, shape (loads, k).
 
         Returns:
-            Jet or Taylor model. Column j is the sum of the loads, each at its amplitude, times
-            weights[:, j]; … stands for the parameter sets of a jet, and for nothing for a Taylor
-            model. None if there are no loads, or all weights are 0.
+            Array with derivatives (a jet) or with bounds over a box (a Taylor model). Column j is
+            the sum of the loads, each at its amplitude, times weights[:, j]; … stands for the
+            parameter sets of a jet, and for nothing for a Taylor model. None if there are no loads,
+            or all weights are 0.
         """
         if self.columns is None or not weights.any():
             return None
@@ -251,7 +252,8 @@ class Matrices:
         """Initial state [q; v] in m and m/s, shape (S, 2n, 1): n displacements, then n velocities.
 
         The given displacements are increased by those under the static force, K⁻¹ f, and the given
-        velocities by those that the impulse J at t = 0 adds, M⁻¹ J. S counts the parameter sets.
+        velocities by those that the impulse J at t = 0 adds, M⁻¹ J. S counts the parameter sets;
+        derivatives by the parameters are carried along (a jet).
 
         Raises:
             numpy.linalg.LinAlgError: There is a static force and K is singular.
@@ -273,9 +275,10 @@ class Matrices:
                 displacements of the unknowns under a unit displacement of the ground.
 
         Returns:
-            Jet of shape (S, n, loads) over S parameter sets. Behind the base's column, if any,
-            there is one for each history of the forces, M⁻¹ b with the force vector b in N, in m/s²
-            for one unit of the history. There are none without forces.
+            Array with its derivatives by the parameters (a jet), shape (S, n, loads), over S
+            parameter sets. Behind the base's column, if any, there is one for each history of the
+            forces, M⁻¹ b with the force vector b in N, in m/s² for one unit of the history. There
+            are none without forces.
         """
         # The slice of the one column of ι is empty without a ground, so that one concatenation
         # serves both cases.
@@ -291,8 +294,9 @@ class Matrices:
         """Feedthrough: what a unit of each force history adds to the outputs at once.
 
         A force adds M⁻¹ b to accelerations at the moment at which it acts, and so to outputs that
-        observe these. The jet has the shape (S, outputs, histories) over S parameter sets. It is
-        None if no output observes an acceleration, or no force has a history.
+        observe these. The shape is (S, outputs, histories) over S parameter sets, with derivatives
+        by the parameters (a jet). It is None if no output observes an acceleration, or no force has
+        a history.
         """
         if self.forces is None or not self.accelerated.any():
             return None

@@ -510,13 +510,13 @@ def _value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
 
 
 def require_symmetric(key: str, array: Array, names: Sequence[object]) -> None:
-    """Refuse an array that differs from its transpose by more than rounding.
+    """Raise an error if an array differs from its transpose by more than 1e-9 of its largest entry.
 
-    That is 1e-9 of its largest entry.
+    A smaller difference is rounding.
 
     Args:
         key: What the array is, for the message.
-        array: Shape (n, n).
+        array: Shape (n, n), with n ≥ 1.
         names: Names of its n rows and columns, for the message.
 
     Raises:

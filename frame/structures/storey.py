@@ -411,7 +411,8 @@ class StoreyFrame(LinearSystem):
         It is as given, or 12 c E I / l³ of c columns that are clamped at both ends.
 
         Args:
-            p: All parameters by name, jets or Taylor models of one shape (…).
+            p: All parameters by name, all of one shape (…): jets (values with derivatives) or
+                Taylor models (polynomials with error bounds).
         """
         if self.stiffness:
             return self._of_floors("k{}", p)

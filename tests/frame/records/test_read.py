@@ -217,6 +217,7 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         (written.at2("NPTS=  400, DT= 5 MSEC"), "line 4 is .*the step in s"),
         (written.at2("NPTS=  400.5, DT= .0050 SEC"), "line 4 is .*write the count"),
         (written.at2("NPTS=  0, DT= .0050 SEC"), "line 4 is .*write the count"),
+        (written.at2("  400   .5D-6   NPTS, DT"), "line 4 is a step of 5e-07 s; "),
         (written.at2(NAMED, "VELOCITY TIME SERIES IN UNITS OF CM/S"), "take the file .AT2 of the"),
         (written.at2(NAMED, "ACCELERATION TIME SERIES"), r'say records\.unit = "g"'),
         (written.at2("NPTS=  400, DT= 0.0 SEC"), "a step of 0 s"),
