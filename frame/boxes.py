@@ -199,8 +199,8 @@ class Boxes:
 def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = ALPHA) -> Boxes:
     """Return the α-cuts of fuzzy inputs as nested boxes.
 
-    Inputs that carry claims of coverage are joined first: their cuts are widened until all claims
-    hold at once with the probability 1 - α.
+    Inputs that carry claims of coverage are joined first, unless they have been: their cuts are
+    widened until all claims hold at once with the probability 1 - α.
 
     Args:
         inputs: Fuzzy numbers by name, in SI units; a plain number is a crisp one.

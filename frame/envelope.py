@@ -95,8 +95,9 @@ class Envelope(Bounds):
     def to_dataset(self) -> xarray.Dataset:
         """Return the envelope as an xarray dataset, ready for NetCDF.
 
-        The bounds over (alpha, time, output), the inputs that attain them and the guarantees are
-        written as for any fuzzy result. As far as they are known, these variables are added:
+        The variables `lower`, `upper` and `error` have the axes (alpha, time, output), the inputs
+        that attain the bounds, `lower_at` and `upper_at`, a further axis parameter; `nature` and
+        `label` are guarantee and name of each output. As far as they are known, there are also:
 
         - `inner_lower`, `inner_upper`: attained bounds; `proved_lower`, `proved_upper`: guaranteed
           bounds; (alpha, time, output);

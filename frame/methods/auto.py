@@ -147,7 +147,7 @@ class Auto:
         bound also if a tolerance is stated for all time nodes.
 
         Args:
-            flow: The problem.
+            flow: The response over the boxes of the inputs.
             reasons: Reasons why a proof is not possible are appended to this list, in place.
         """
         # A proof looks at 1000 boxes for each bound on average (tuned: more hardly close gaps).
@@ -168,7 +168,8 @@ class Auto:
         if len(methods) < 2:
             return methods
         undivided = replace(proof, parts=1)
-        # Branch and bound has the same gap at all nodes; the dual bound only at peaks.
+        # Branch and bound closes the gap at all nodes alike, the dual bound only at peaks. Branch
+        # and bound on sub-boxes comes last, because each one costs as much as the whole box.
         if self.is_for_all_nodes or works[0] <= works[1]:
             return [undivided, dual, proof]
         return [dual, undivided]
@@ -176,10 +177,14 @@ class Auto:
     def _dual(self, flow: UnitFlow) -> DualProof:
         """Return the dual bound with gaps that fit the tolerance.
 
-        Its gaps are left at their defaults if a tolerance is stated for all time nodes. Otherwise
-        they follow the tolerance if it is a fraction of the peaks and there are few inputs: four,
-        or six for a stated tolerance. With more inputs a stated tolerance asks for a gap of a
-        tenth of the peaks only. If magnitudes alone count, bounds below peaks get no effort.
+        Its gaps are left at their defaults if a tolerance is stated for all time nodes. Otherwise,
+        if the tolerance is a fraction of the peaks and there are few inputs, both the gap of the
+        nodes and that of the peaks are the tolerance, at least 1e-4: with up to four inputs, or up
+        to six for a stated tolerance. With more inputs a stated tolerance asks for a gap of a tenth
+        of the peaks only. If magnitudes alone count, bounds below peaks get no effort.
+
+        Args:
+            flow: The response over the boxes of the inputs.
         """
         dual = DualProof(workers=self.workers)
         if self.magnitudes:
@@ -205,8 +210,8 @@ class Auto:
         at most four inputs, and else up to a tenth of each peak.
 
         Args:
-            proved: The envelope.
-            flow: The problem.
+            proved: The envelope, whose `error` is the gap at each time node.
+            flow: The response over the boxes of the inputs.
         """
         if self.is_for_all_nodes:
             allowed = flow.tolerance(self.tolerance) * flow.scale * (1 + 1e-9)  # rounding
@@ -241,7 +246,7 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
 
     Args:
         proved: The guaranteed envelope, with attained bounds.
-        flow: The problem.
+        flow: The response over the boxes of the inputs, for which both were computed.
         followed: Attained bounds of the same problem: upper bounds of (-output, output), shape
             (levels, times, outputs, 2), and the unit coordinates that attain them.
     """
@@ -289,7 +294,7 @@ def _gap(proved: Envelope, flow: UnitFlow) -> float:
 
     Args:
         proved: A guaranteed envelope with attained bounds.
-        flow: The problem, which tells the outputs at rest.
+        flow: The response over the boxes of the inputs, which tells the outputs at rest.
     """
     outer, inner = _sides(proved)
     outer_peaks = outer.max(axis=1)  # (levels, outputs, 2)

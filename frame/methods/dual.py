@@ -376,8 +376,8 @@ class DualProof:
         """Check that bounds are not made wide by Taylor remainders that bisections would reduce.
 
         Args:
-            problems: Bounds with known values of the models, by the indices of the output and of
-                the side.
+            problems: Bounds at all time nodes with the largest known values of the models, by the
+                indices of the output and of the side (0 for the output with its sign changed).
             box: The box of the inputs.
             peak: Peak of each output, shape (outputs,).
 
@@ -413,14 +413,17 @@ def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Arr
     """
     node, output, side = np.nonzero(needed)
     points = unit[needed]
-    value, error = (x[node, output] for x in box.midpoint_response())
+    at_midpoint = box.midpoint_response()
+    value = at_midpoint.value[node, output]
+    error = at_midpoint.error[node, output]
     # Most points may be the midpoint of the box, whose response is known.
     is_moved = points.any(axis=1)
     if is_moved.any():
         moved = box.exact_values(points[is_moved], node[is_moved], output[is_moved])
-        value[is_moved], error[is_moved] = moved
+        value[is_moved] = moved.value
+        error[is_moved] = moved.error
     attained = np.full(needed.shape, -np.inf)
-    attained[needed] = np.where(side, value, -value) - error
+    attained[needed] = np.where(side == 1, value, -value) - error
     attained_error = np.zeros(needed.shape[:2])
     # The exact response may lie on either side of the computed one.
     np.maximum.at(attained_error, (node, output), 2 * error)

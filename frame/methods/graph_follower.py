@@ -92,7 +92,8 @@ class Storage:
         older graph stays the best.
 
         Args:
-            points: Unit coordinates of the graphs, shape (graphs, inputs); at least one.
+            points: Inputs of the graphs, at least one, shape (graphs, inputs), in unit coordinates,
+                in which each input runs over [-1, 1] on its widest cut.
 
         Returns:
             The places where one of these graphs is now the best: indices of the time node, of the
@@ -312,10 +313,11 @@ def estimated_envelope(
     and other structures stay well below).
 
     Args:
-        flow: The problem.
+        flow: The response over the boxes of the inputs.
         bounds: Attained upper bounds, shape (levels, times, outputs, 2): on the last axis first of
             the output with its sign changed, then of the output.
-        points: Unit coordinates that attain them, shape (levels, times, outputs, 2, inputs).
+        points: Inputs that attain them, shape (levels, times, outputs, 2, inputs), in unit
+            coordinates, in which each input runs over [-1, 1] on its widest cut.
         error: Estimated error of the bounds, shape (levels, times, outputs).
         steepest: Largest first derivative of each output by a unit coordinate, shape (outputs,).
         method: Name of the method.

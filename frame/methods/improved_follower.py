@@ -216,7 +216,7 @@ def _chunk_size(flow: UnitFlow) -> int:
     may need more, and is computed nevertheless.
 
     Args:
-        flow: The problem, which tells the numbers of nodes, outputs, inputs and unknowns.
+        flow: The response, which tells the numbers of time nodes, outputs, inputs and unknowns.
     """
     d = len(flow.boxes.names)
     n_times = flow.time.size
@@ -293,7 +293,8 @@ class _LevelModels:
         node, output and side, and `self.sampled_at` their unit coordinates, both in place.
 
         Args:
-            points: Unit coordinates, shape (trajectories, inputs).
+            points: Inputs, shape (trajectories, inputs), in unit coordinates, in which each input
+                runs over [-1, 1] on its widest cut.
 
         Raises:
             RefusedError: A trajectory does not exist or is not finite.

@@ -157,6 +157,10 @@ class Proof:
             boxes: The sub-box on each level.
             goal: Unit of the gap for each output, number of threads, and progress.
 
+        Returns:
+            For each level, upper bounds and attained values of both sides of the outputs at all
+            time nodes, with the inputs that attain them.
+
         Raises:
             UnprovedError: The modal model is not accurate enough even for the largest gap, with the
                 input to bisect as a `GapError` if bisections would help and as a `BisectionError`
@@ -242,7 +246,8 @@ class Proof:
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
         fractions = _error_fractions(model)
         max_degree = _max_degree(len(model.boxes.names))
-        # Halving the inputs that contribute divides the error of the degree N by 2^(N + 1). The
+        # The error is extrapolated to the largest degree. There halving the inputs that contribute
+        # divides the error of the degree N by 2^(N + 1), its first term that is left out. The
         # halvings are distributed among the inputs in proportion to their fractions of the error.
         log2_excess = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
         halvings = max(1.0, np.ceil(log2_excess / (max_degree + 1)))
@@ -423,8 +428,10 @@ def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> A
         Bound of the error in the step before each node minus the smaller one of the bounds at both
         its ends, same shape; 0 for the first node.
     """
-    # All of the error but `direct` decays no faster than exp(g t), where g < 0 is the smallest
-    # growth rate. Within a step of the length h it is at most exp(-g h) times its value at the end.
+    # Without `direct` the bound of the error is a sum of functions of time that either rise or are
+    # in proportion to bounds of a mode's response, which decay no faster than exp(g t) with the
+    # upper bound g of its growth rate. With the most negative g of all modes, the bound within a
+    # step of the length h is at most exp(-g h) times its value at the end.
     rate = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     swell = float(np.exp(np.maximum(-rate, 0.0).max() * model.flow.step))
     within = swell * np.maximum(error[1:], error[:-1]) + direct[1:]

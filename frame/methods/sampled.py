@@ -130,7 +130,7 @@ class PeakSearch:
         stopping rule of the search is met, and attained only where the budget ended it.
 
         Args:
-            flow: The problem, of a frame whose columns yield.
+            flow: The response of a frame whose columns yield, over the boxes of the inputs.
             progress: Called with the completed fraction.
 
         Returns:
@@ -251,7 +251,7 @@ def independent_excess(
     On each level up to 192 trajectories are computed at points that no search uses.
 
     Args:
-        flow: The problem.
+        flow: The response over the boxes of the inputs.
         bounds: Upper bounds on each level of its boxes, shape (levels, times, outputs, 2): on the
             last axis first of the output with its sign changed, then of the output.
         progress: Called with the completed fraction.
@@ -317,8 +317,9 @@ def largest_values(
     """Return the largest values of outputs over some trajectories, and which ones have them.
 
     Args:
-        flow: The problem.
-        points: Unit coordinates of the trajectories, shape (trajectories, inputs).
+        flow: The response over the boxes of the inputs.
+        points: Inputs of the trajectories, shape (trajectories, inputs), in unit coordinates, in
+            which each input runs over [-1, 1] on its widest cut.
         progress: Called with the completed fraction.
 
     Returns:
