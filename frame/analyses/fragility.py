@@ -180,7 +180,7 @@ class CriticalMeasures:
         """Return the critical measures of the event that any of several limits is exceeded.
 
         The event is reached with the first limit, so that bounds are the smallest ones of all
-        limits.
+        limits. `high_reached` is `low_reached`: no larger measure is known to be attained.
 
         Args:
             limits: Critical measures of each limit, for the same levels and records.
@@ -461,8 +461,8 @@ class Fragility(Answer):
         """Return a row for each limit or event, record and level of a frame that yields.
 
         "first crossing" is the smallest measure tried at which some structure exceeds the limit,
-        and "last non-exceedance" the largest one at which some structure keeps it; None if there
-        is none up to the largest measure tried. The measures at which some structure and at which
+        and "last non-exceedance" the largest one at which some structure keeps it; None for what
+        lies beyond the largest measure tried. The measures at which some structure and at which
         all structures that were moved exceed the limit follow as texts of intervals. A linear
         structure has no rows.
         """
@@ -470,7 +470,8 @@ class Fragility(Answer):
         rows: list[Record] = []
         for name, part in self.limits.items():
             for column, (record, increments) in enumerate(self.increments.items()):
-                measure, (greatest, least) = increments.measure, increments.demands[name]
+                measure = increments.measure
+                greatest, least = increments.demands[name]  # (levels, measures) each
                 for level, alpha in enumerate(self.alpha):
                     row: Record = {
                         "limit": part.words,

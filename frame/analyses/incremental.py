@@ -330,9 +330,9 @@ class IncrementalAnalysis:
 
         Args:
             scale: Scale of the record.
-            side: `SOME` for the largest, `ALL` for the smallest demand.
+            side: 0 (`SOME`) for the largest, 1 (`ALL`) for the smallest demand.
             level: Index of the cut.
-            event: Index of the limit or event.
+            event: Index of the limit or event; events follow the limits.
         """
         low = self.cuts.lower[level]
         high = self.cuts.upper[level]

@@ -121,8 +121,9 @@ def limits_by_name(
 
     Raises:
         RefusedError: There is no limit; a limit is given twice, names no output or is not a finite
-            number; a limit of a magnitude or of a mean is not positive; or an output has several
-            limits, or one that is not of its magnitude, though `magnitudes` is set.
+            number; a limit of a magnitude or of a mean is not positive; a mean has a range; or an
+            output has several limits, or one that is not of its magnitude, though `magnitudes` is
+            set.
     """
     if isinstance(limits, Limit):
         limits = [limits]
@@ -131,6 +132,9 @@ def limits_by_name(
     for limit in single:
         if outputs:
             require_choice("limits", limit.output, outputs)
+        has_side = limit.largest is not None
+        allowed = "a mean of magnitudes, with one value"
+        require(not (limit.mean and has_side), "limits", value=limit.text, allowed=allowed)
         is_magnitude = limit.side in ("", "mean")
         checked_number(f"limit of {limit.peak}", limit.number, positive=is_magnitude)
 

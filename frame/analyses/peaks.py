@@ -236,14 +236,15 @@ def peaks(band: Envelope, names: Sequence[str] = ()) -> dict[str, Peak]:
             outputs are taken.
 
     Raises:
-        RefusedError: The envelope has no such output.
+        RefusedError: The envelope has no such output, or the name is that of a mean over records.
     """
     return {name: _peak_of(band, name) for name in names or map(str, band.outputs)}
 
 
 def _peak_of(band: Envelope, name: str) -> Peak:
     """Return the fuzzy peak with a name, such as "q3" or "min q3", of an envelope."""
-    output = output_of(name)
+    # A mean over records ("mean q3") is no peak of one envelope, and is refused as an output.
+    output = name.removeprefix("max ").removeprefix("min ")
     column = band.column(output)
     nature = band.nature_of(output)
     is_guaranteed = nature is Nature.GUARANTEED
@@ -316,9 +317,9 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
     """Return the fuzzy peak of the magnitude of an output that was found by a search of peaks.
 
     Args:
-        found: Bounds of the peaks at the time nodes, with arrays of shape (levels, outputs). The
-            search knows responses that attain both ends; nothing else is said by it, so that the
-            guarantee is at most an estimate.
+        found: Bounds of the peaks at the time nodes, with arrays of shape (levels, outputs).
+            Responses that were computed attain both ends; that no peak lies outside is at most an
+            estimate.
         column: Index of the output.
         between: What responses may add to a peak within the time steps, shape (levels,).
 

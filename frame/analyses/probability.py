@@ -290,7 +290,7 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     """Return a sampler whose probability density is proportional to a membership function.
 
     The cumulative integral of the membership function is inverted by linear interpolation on a fine
-    grid. A crisp number, or a cut without width, gives its only value.
+    grid. A crisp number gives its only value.
 
     Args:
         number: The fuzzy number.
@@ -433,7 +433,7 @@ def _limit_probability(
         ratios: Bounds of peak over limit at the nodes and at all times, shape (points, draws) each.
         level: Index of the level to which each fuzzy point belongs, shape (points,).
         is_random: Whether there are random inputs. If not, there is one draw, and the interval is
-            the range of the points.
+            the range of the points, with what peaks between the nodes may add.
 
     Returns:
         Bounds, interval and error on each level, and the bounds as functions of the limit.
@@ -454,7 +454,8 @@ def _limit_probability(
     within_steps = _bounds_over_points(fractions, level)
     added_to_lower = within_steps.lower[:, 0] - lower_at_nodes
     added_to_upper = within_steps.upper[:, 0] - high[:, -1]
-    interval = Ends(lower_at_nodes, high[:, -1])
+    # Without random inputs nothing is left to chance, and the interval is the range of the points.
+    interval = Ends(low[:, -1], within_steps.upper[:, 0])
     if is_random:
         # Either limit at each point is missed with this probability; by the inequality of
         # Bonferroni all of them hold with the probability `CONFIDENCE`.

@@ -134,18 +134,22 @@ def scaled_records(
         ends before its record.
 
     Raises:
-        RefusedError: `measure` is unknown, a record is zero throughout, the structure has no
-            matrices of mass, damping and stiffness, or its first period is above 1000 s.
+        RefusedError: `measure` is unknown, two records have the same name, a record is zero
+            throughout, the structure has no matrices of mass, damping and stiffness, or its first
+            period is above 1000 s.
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
+    # Results of records are told apart by the names.
+    names = [record.name or f"record {number}" for number, record in enumerate(suite, start=1)]
+    repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
+    require(not repeated, "suite", value=repeated, allowed="a name of its own for each record")
     mode = nominal_mode(model)
     # Towers have periods of about 10 s. A longer one than 1000 s is a mistake in a unit.
     what = f"a first natural period of {mode.period:.4g} s"
     cure = "are the units of mass and stiffness right, as t and MN/m?"
     require(mode.period <= 1000, "structure", what, "periods up to 1000 s", cure)
     scaled = []
-    for number, record in enumerate(suite, start=1):
-        name = record.name or f"record {number}"
+    for name, record in zip(names, suite, strict=True):
         # A spectrum is defined for less than critical damping, for which an oscillator oscillates.
         response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
         measures = {"PGA": record.extremes[0], "Sa(T1)": response}

@@ -185,7 +185,8 @@ def scale_supports(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str,
     """
     scaled: dict[str, FuzzyNumber] = {}
     for name, number in inputs.items():
-        nominal, (low, high) = number.nominal, number.support
+        nominal = number.nominal
+        low, high = number.support
         scaled[name] = Crisp(nominal)
         if scale > 0 and high > low:
             lower = nominal - scale * (nominal - low)

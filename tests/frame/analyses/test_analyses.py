@@ -7,12 +7,15 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.frame import (
+    Accelerogram,
     Limit,
     Peak,
     StoreyFrame,
     decide,
     envelope,
+    over_records,
     peaks,
+    pendulum,
     probability,
     tolerances,
 )
@@ -20,7 +23,7 @@ from alphacut.frame.analyses.limits import ANY
 from alphacut.frame.analyses.peaks import loose_peaks, tightest
 from alphacut.frame.analyses.probability import shaped_like
 from alphacut.frame.analyses.tolerances import scale_supports
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.result import Nature
 from tests.frame.motions import exact_motions, random_points
 
@@ -231,6 +234,32 @@ def test_wrong_questions_are_refused(limits, random, key):
     with pytest.raises(RefusedError) as refused:
         probability(FRAME, INPUTS, asked, random, duration=1, step=0.1)
     assert refused.value.key == key
+
+
+def test_the_interval_without_random_inputs_contains_the_bounds_and_what_lies_between_nodes():
+    """The limit of 27 N lies within the error of the time steps, that of 28 N between the nodes."""
+    of_force = pendulum().with_outputs(("force",))
+    for limit, bounds, error in ((27.0, (0.0, 1.0), 0.0), (28.0, (0.0, 0.0), 1.0)):
+        asked = Limit("force", limit)
+        inputs = {"l": Interval(0.9999, 1.0001)}
+        found = probability(of_force, inputs, asked, duration=4, step=0.1, alpha=[0])
+        of_limit = found.events["force"]
+        assert (of_limit.lower[0], of_limit.upper[0], of_limit.error[0]) == (*bounds, error)
+        assert (of_limit.interval.lower[0], of_limit.interval.upper[0]) == (0.0, 1.0)
+
+
+def test_a_mean_takes_one_value_and_several_records():
+    band = envelope(ONE, {"m1": Interval(900, 1100)}, duration=1, step=0.05, progress=False)
+    with pytest.raises(RefusedError, match=r"limits is mean q1 <= 0.01; .* one value"):
+        decide(band, Limit("q1", (0.01, 0.1), mean=True))
+    with pytest.raises(RefusedError, match="output is mean q1; allowed: q1"):
+        decide(band, Limit("q1", 0.1, mean=True))
+
+
+def test_two_records_of_one_name_are_refused():
+    twice = [Accelerogram(0.05, scale * np.ones(20), name="push") for scale in (1.0, 3.0)]
+    with pytest.raises(RefusedError, match="suite is push; allowed: a name of its own"):
+        over_records(ONE, {"m1": Interval(900, 1100)}, twice, duration=1, step=0.05)
 
 
 def one_level(lower, upper, reached, nature, error=0.0, outputs=("q1",)):
