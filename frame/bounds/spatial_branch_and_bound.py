@@ -252,6 +252,12 @@ class Queue:
             box: The sub-box.
             workers: Number of threads for it; at least one is given.
             tick: Called with the sub-box and the completed fraction of its bounds.
+
+        Returns:
+            `needed`, the bounds that are asked for, and `known_upper`, those that are known, shape
+            (levels, T, m, 2): levels of the sub-box, time nodes, outputs q, and the sides −q, q;
+            `incumbent`, the largest attained values over time, shape (levels, m, 2); and `is_last`,
+            whether one more refusal ends the proof.
         """
         incumbent = np.stack([self.hull.incumbent(level) for level in box.levels])
         is_above = box.upper > (incumbent + self.gap)[:, np.newaxis]

@@ -247,7 +247,8 @@ def wave_factors(eigenvalues: Array, C: Array, d: int) -> Array:
     of_wave[:] = np.moveaxis(C, 0, -1)
     for a in range(1, 1 + d):
         of_first_derivative[..., a] = C[0] * rate[a]
-    for a, (i, j) in enumerate(np.transpose(np.triu_indices(d)), start=1 + d):
+    row, column = np.triu_indices(d)
+    for a, (i, j) in enumerate(zip(row, column, strict=True), start=1 + d):
         rate_i = rate[1 + i]
         rate_j = rate[1 + j]
         of_first_derivative[..., a] = C[1 + i] * rate_j + C[1 + j] * rate_i + C[0] * rate[a]

@@ -77,7 +77,21 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
 
 
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
-    """Return the structure at each of S sets of inputs of an envelope, shape (S, n)."""
+    """Return the matrices of a structure at each of S sets of its inputs.
+
+    Static forces and impulses at t = 0 are contained in the initial state.
+
+    Args:
+        system: The structure.
+        envelope: Its `inputs` are the names of n inputs, in order; other parameters are nominal.
+        points: The inputs, shape (S, n), in SI units.
+
+    Returns:
+        S structures with the same loads.
+
+    Raises:
+        numpy.linalg.LinAlgError: A mass, or a stiffness under a static force, is singular.
+    """
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
     n = matrices.mass.value.shape[-1]
     record: Array = np.zeros(0)
@@ -120,7 +134,17 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
 
 
 def motion_inputs(envelope: Envelope, cuts: Boxes, max_count: int) -> Array:
-    """Return at most `max_count` distinct finite inputs to test, those at peaks first, (S, n)."""
+    """Return distinct finite inputs to test an envelope at, those at peaks first, shape (S, n).
+
+    They are, in this order: inputs that the envelope names at peaks of the lowest level, nominal
+    values and corners, inputs named at peaks of higher levels, and quasi-random points, half of
+    them in the lowest level and the others in all levels in turn.
+
+    Args:
+        envelope: The envelope.
+        cuts: Boxes of its n inputs on all levels, the widest first.
+        max_count: Largest S.
+    """
     at_peaks = [inputs_at_peaks(envelope, level) for level in range(len(envelope.alpha))]
     number = np.arange(4 * max_count)
     # Every second point lies in the lowest level, and the others in all levels in turn.
@@ -133,7 +157,14 @@ def motion_inputs(envelope: Envelope, cuts: Boxes, max_count: int) -> Array:
 
 
 def inputs_at_peaks(envelope: Envelope, level: int) -> Array:
-    """Return the distinct inputs that an envelope names at its outputs' peaks, shape (P, n)."""
+    """Return the distinct inputs that an envelope names at its outputs' peaks, shape (P, n).
+
+    The peaks are the largest upper and the smallest lower bound over time of each output.
+
+    Args:
+        envelope: The envelope.
+        level: Row of the α-cut, 0 for the widest.
+    """
     outputs = np.arange(len(envelope.outputs))
     highest_nodes = envelope.upper[level].argmax(axis=0)
     lowest_nodes = envelope.lower[level].argmin(axis=0)
@@ -158,7 +189,14 @@ class _TestedMotion(NamedTuple):
 
 
 def jumps_at_ends(histories: Sequence[LoadHistory], time: Array) -> Mask:
-    """Return whether one of the forces jumps at the end of each step between nodes, (T − 1,)."""
+    """Return whether one of the forces jumps at the end of each step between nodes, shape (T − 1,).
+
+    A force may jump where it begins and, unless it is held, where it ends.
+
+    Args:
+        histories: The forces over time.
+        time: Time nodes, shape (T,), in s.
+    """
     jumps = np.zeros(len(time), bool)
     for history in histories:
         ends = [history.start]
@@ -219,10 +257,19 @@ class Trial:
             self.slack = self.tolerance + envelope.attained_error
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
-        """Check that exact responses at inputs (S, n) do not contradict the envelope.
+        """Check that exact responses do not contradict the envelope, at nodes or between them.
+
+        A response is compared with the bounds of all levels whose cut contains its inputs, but for
+        rounding.
+
+        Args:
+            points: Inputs of S structures, shape (S, n), in SI units.
+            motions: The structures at these inputs.
 
         Raises:
-            ContradictionError: As `with_motions_tested`.
+            ContradictionError: A response leaves guaranteed bounds, is farther from a straight line
+                between nodes than is guaranteed, or differs from the attained bound that names its
+                inputs.
         """
         for k, motion in enumerate(motions):
             point = points[k]
@@ -239,6 +286,10 @@ class Trial:
     def require_inside(self, level: int, motion: _TestedMotion) -> None:
         """Check that a response does not leave the guaranteed bounds, at nodes or between them.
 
+        Args:
+            level: Row of the α-cut, 0 for the widest, whose bounds are meant.
+            motion: The response, at the nodes and at some times within each step.
+
         Raises:
             ContradictionError: It leaves a bound by more than rounding.
         """
@@ -253,6 +304,12 @@ class Trial:
 
     def require_attained(self, level: int, motion: _TestedMotion) -> None:
         """Check that attained bounds of a level that name the inputs of a response equal it.
+
+        Nothing is checked where the envelope has no attained bounds, or none names these inputs.
+
+        Args:
+            level: Row of the α-cut, 0 for the widest.
+            motion: The response; only its values at the nodes are compared.
 
         Raises:
             ContradictionError: One differs by more than the errors that the envelope declares.
@@ -280,6 +337,9 @@ class Trial:
 
         In a step at whose end a force jumps it must not lie farther beyond its values at both ends.
 
+        Args:
+            motion: The response, at the nodes and at some times within each step.
+
         Raises:
             ContradictionError: It is farther by more than rounding.
         """
@@ -298,10 +358,18 @@ class Trial:
         self._require(excess, line, "farther than `between` from the straight line at", motion)
 
     def _require(self, excess: Array, bound: Array, words: str, motion: _TestedMotion) -> None:
-        """Check that all excesses of a response over a bound, shape (J, m), are at most 0.
+        """Check that all excesses of a response over a bound are at most 0.
+
+        Args:
+            excess: Excesses beyond rounding and declared errors, shape (J, m), at nodes or at all
+                times.
+            bound: The bound, same shape, for the message.
+            words: What the bound is, for the message, such as "above the proved upper bound of α =
+                0".
+            motion: The response at the same J times.
 
         Raises:
-            ContradictionError: One is larger, or NaN. The largest one is named.
+            ContradictionError: An excess is larger, or NaN. The largest one is named.
         """
         if bool((excess <= 0).all()):
             return
@@ -361,7 +429,17 @@ def variables(
 
 
 def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
-    """Return the inputs (S, n) and the structures of the tested responses that a dataset holds."""
+    """Return what `variables` has stored: the inputs and structures of tested responses.
+
+    Args:
+        data: Dataset with these variables.
+
+    Returns:
+        The inputs, shape (S, n), in SI units, and S structures.
+
+    Raises:
+        KeyError: The dataset has no tested structures.
+    """
     values = {str(name): variable.values for name, variable in data.data_vars.items()}
     points = values["motion_inputs"]
     numbers = values["course_numbers"]
