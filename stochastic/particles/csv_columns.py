@@ -15,6 +15,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import require_text
 
+# The micro sign and the Greek letter look alike, and both are in use.
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6}
 METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 """Metres in a unit of length."""
@@ -25,24 +26,27 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
     """Read columns of lengths from a CSV file, separated by commas, semicolons or tabs.
 
-    Empty lines and comments behind # are skipped. A column d of diameters may stand in for "r".
+    The header names each column with its unit, as ``x [mm]``. Empty lines and lines that begin with
+    # are skipped. A column d of diameters may stand in for "r" and is halved.
 
     Args:
-        path: The file.
+        path: The file, text in UTF-8.
         columns: Names of the columns.
 
     Returns:
-        Row numbers as an editor shows them, shape (n,), and the columns in m, shape (n, columns).
+        Row numbers as an editor shows them, from 1, shape (n,), and the columns in m, shape (n,
+        columns), n at least 1.
 
     Raises:
-        RefusedError: The file cannot be read, a column or its unit is missing, or a field is no
-            number.
+        RefusedError: The file cannot be read or has no rows below the header, a column or its unit
+            is missing or unknown, a row has more fields than the header, or a field is no number.
     """
     header, *rows = fields(path)
     found = [_column(header.cells, name, path) for name in columns]
     values = np.empty((len(rows), len(columns)))
     for k, line in enumerate(rows):
         n_cells = len(line.cells)
+        # Empty fields at the end of a row are common in files of spreadsheets and mean nothing.
         if n_cells > len(header.cells) and all(line.cells):
             what = f"{n_cells} fields below a header of {len(header.cells)}"
             cure = "write decimal points, if these are decimal commas"
@@ -63,8 +67,15 @@ class Line(NamedTuple):
 def fields(path: Path) -> list[Line]:
     """Return each line of a CSV file that is neither empty nor a comment, the header first.
 
+    The separator is the semicolon or the tab if the header has one, else the comma. Comments are
+    lines that begin with #.
+
+    Returns:
+        Number of each line as an editor shows it, from 1, and its fields; two lines at least.
+
     Raises:
-        RefusedError: The file cannot be read, has fewer than two lines, or too long a field.
+        RefusedError: The file cannot be read, has fewer than two such lines, or a field that is
+            longer than the module csv allows.
     """
     texts = dict(enumerate(text_of(path).splitlines(), 1))
     texts = {row: x for row, x in texts.items() if x.strip() and not x.startswith("#")}
@@ -73,6 +84,7 @@ def fields(path: Path) -> list[Line]:
         raise RefusedError(path.name, f"{len(texts)} lines", allowed)
     header = next(iter(texts.values()))
     separator = next((mark for mark in ";\t" if mark in header), ",")
+    # Line by line, so that each row keeps the number that an editor shows.
     rows = []
     for row, line in texts.items():
         try:
@@ -85,7 +97,12 @@ def fields(path: Path) -> list[Line]:
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file in UTF-8; refuse what is none."""
+    """Return the text of a file in UTF-8, without a byte order mark.
+
+    Raises:
+        RefusedError: The file does not exist, cannot be read, is a folder, a pipe or a device, is
+            too large for the free memory, or is no text in UTF-8.
+    """
     try:
         require_text(path)
         return path.read_text(encoding="utf-8-sig")
@@ -100,13 +117,15 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
     Args:
         path: The file, for the message.
         row: Number of the row, for the message.
-        cells: Fields of the row.
-        column: Index of the field.
+        cells: Fields of the row, with or without blanks around.
+        column: Index of the field, from 0; it may be beyond the end of the row.
 
     Raises:
-        RefusedError: The field is missing, or no finite number of at most 100 plain ASCII digits.
+        RefusedError: The field is missing, longer than 100 letters, or no finite decimal number in
+            ASCII digits: NaN, infinity and 1_000 are none.
     """
     text = cells[column].strip() if column < len(cells) else ""
+    # `float` alone would take "nan", "1_000" and digits of other scripts.
     if len(text) > 100 or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
         cure = ""
@@ -122,7 +141,13 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
 def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     """Return the index of the column `name` in the header, and the factor that makes it metres.
 
-    A column of diameters stands in for "r", with half the factor.
+    For "r" the names radius, d, diameter and size are taken too, the last three with half the
+    factor. Upper and lower case do not matter. The first column that fits is taken.
+
+    Args:
+        header: Fields of the header, each a name and a unit in brackets.
+        name: Name of the column in lower case.
+        path: The file, for the message.
 
     Raises:
         RefusedError: There is no such column, or its unit is missing or unknown.
@@ -131,7 +156,7 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     if name == "r":
         factors = {"r": 1.0, "radius": 1.0, "d": 0.5, "diameter": 0.5, "size": 0.5}
     for column, cell in enumerate(header):
-        # the name of the column, and its unit in brackets
+        # The name of the column, and its unit in round or square brackets.
         match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
         if match and match[1].lower() in factors and match[2] in METRES:
             return column, METRES[match[2]] * factors[match[1].lower()]

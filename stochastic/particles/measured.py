@@ -70,10 +70,15 @@ def read_particles(
 
 
 def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
-    """Return the circles of a CSV file in a section of some width and height, in m.
+    """Return the circles of a CSV file in a section, a window with a corner at the origin.
+
+    Args:
+        path: CSV file with the columns x, y and r (or d, diameters), each with its unit.
+        size: Width and height of the section, in m.
 
     Raises:
-        RefusedError: The file cannot be read, or circles leave the section or overlap.
+        RefusedError: The file cannot be read, a radius is not from 1e-12 to 1e6 m, a centre is
+            outside the section, or two circles overlap by more than 1e-9 of the smaller radius.
     """
     rows, values = length_columns(path, ("x", "y", "r"))
     centres = values[:, :2]
@@ -99,7 +104,13 @@ def _read_circles(path: Path, size: tuple[float, float]) -> Particles:
 
 
 def section_picture(path: Path) -> Array:
-    """Return the grey values of the image file, (rows, columns); refuse other files."""
+    """Return the grey values of an image file as floats, shape (rows, columns).
+
+    Colours are turned into grey values; grey images keep the numbers of their file.
+
+    Raises:
+        RefusedError: The file does not exist, is no image, is damaged or too large.
+    """
     try:
         with opened_picture(path) as image:
             is_grey = image.mode in ("1", "L", "I", "F") or image.mode.startswith("I;16")
@@ -115,17 +126,21 @@ def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
     """Find the particles in a grey image, and return circles of equal area and centroid, in m.
 
     The particles are the phase whose pieces fill more of their convex hulls. Those that touch the
-    edge are left out.
+    edge are left out, since their circle is not known.
 
     Args:
-        picture: Grey values, shape (rows, columns); y rises from the lower edge.
+        picture: Grey values, shape (rows, columns), the first row at the top.
         pixel: Side of a pixel, in m.
         name: Name of the image in messages.
 
+    Returns:
+        At least one disc in a window of the size of the image, with y upwards from its lower edge.
+        Discs may overlap a little.
+
     Raises:
-        RefusedError: Noise or light hides the particles, or more than 2 % of their area is in
-            pieces that are not round: too small, or with a convex hull of which they fill less than
-            90 %.
+        RefusedError: Noise or light hides the particles, there are none, or more than 2 % of their
+            area is in pieces that are not round: with less area than a circle of 4 pixels radius,
+            or filling less than 90 % of their convex hull.
     """
     from skimage import measure
 
@@ -170,9 +185,13 @@ def _particle_mask(picture: Array, name: str) -> Mask:
         picture: Grey values, shape (rows, columns).
         name: Name of the image in messages.
 
+    Returns:
+        True in particles, shape (rows, columns).
+
     Raises:
-        RefusedError: The grey values of the phases are closer than three standard deviations of the
-            noise, or the light changes the matrix by more than a fifth of the contrast.
+        RefusedError: The image has one grey, the grey values of the phases are closer than three
+            standard deviations of the noise, or the light changes the matrix by more than a fifth
+            of the contrast.
     """
     from skimage import filters
 
@@ -203,9 +222,15 @@ def _particle_mask(picture: Array, name: str) -> Mask:
 
 
 def _label_particles(phase: Mask) -> NDArray[np.int_]:
-    """Return the number of the particle at each pixel of a mask, 0 outside.
+    """Return the number of the particle at each pixel of a mask, from 1, and 0 outside.
 
     Particles that touch are parted by a watershed on the distance to the background.
+
+    Args:
+        phase: True in particles, shape (rows, columns).
+
+    Returns:
+        Whole numbers of the same shape; all 0 for an empty mask.
     """
     from scipy import ndimage
     from skimage import feature, measure, segmentation
@@ -213,6 +238,7 @@ def _label_particles(phase: Mask) -> NDArray[np.int_]:
     # Smoothing by a pixel removes the false peaks of a ragged outline.
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(phase), 1.0)
     parts = measure.label(phase)  # type: ignore[no-untyped-call]
+    # Peaks nearer than the smallest radius belong to one particle.
     peaks = feature.peak_local_max(depth, round(MIN_RADIUS), labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
     seeds = np.zeros(phase.shape, int)
     seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
@@ -221,7 +247,13 @@ def _label_particles(phase: Mask) -> NDArray[np.int_]:
 
 
 def _convexity(phase: Mask) -> float:
-    """Return the area of all particles of a phase over the area of their convex hulls."""
+    """Return the area of all particles of a phase over the area of their convex hulls, in [0, 1].
+
+    Pieces with less area than a circle of 4 pixels radius are left out; 0 if none is left.
+
+    Args:
+        phase: True in the phase, shape (rows, columns).
+    """
     from skimage import measure
 
     pieces = measure.regionprops(_label_particles(phase))  # type: ignore[no-untyped-call]
@@ -233,18 +265,18 @@ def _convexity(phase: Mask) -> float:
 def _unevenness(smooth: Array, matrix: Mask) -> float:
     """Return the range of the matrix's median grey value over 8 × 8 tiles of the image.
 
-    Pixels near particles, where smoothing mixes greys, and tiles of fewer than 64 pixels do not
-    count.
+    Pixels within 4 of particles, where smoothing mixes greys, and tiles with fewer than 64 other
+    pixels do not count. It is 0 if no tile or one is left.
 
     Args:
         smooth: Smoothed grey values, shape (rows, columns).
-        matrix: Pixels of the matrix.
+        matrix: True outside the particles, same shape.
     """
     from scipy import ndimage
 
     core = ndimage.binary_erosion(matrix, iterations=4)
     greys = np.where(core, smooth, np.nan)
-    medians = [0.0]
+    medians = [0.0]  # for an image without any tile that counts
     for band in np.array_split(greys, 8):
         for tile in np.array_split(band, 8, axis=1):
             if np.count_nonzero(~np.isnan(tile)) >= 64:

@@ -48,7 +48,17 @@ class Packing:
         checked_number(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
-        """Return a random packing in a square or cube that it fills to `fraction`.
+        """Return a random packing in a periodic square or cube that it fills to `fraction`.
+
+        Loose packings are made by random sequential addition, and others, or those for which it
+        fails, by pushing overlapping particles apart.
+
+        Args:
+            generator: Source of radii and places; its state moves on.
+
+        Returns:
+            `number` particles without overlap, or a multiple of it where the box would not hold the
+            largest one. The side of the box follows from the radii.
 
         Raises:
             RefusedError: The box of too many particles has no room for the largest one.
@@ -66,11 +76,16 @@ class Packing:
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
         """Draw radii until their box has room for the largest particle.
 
-        Further radii are added to the ones that have been drawn. On average this keeps the
-        frequencies of the distribution (Wald's identity), as drawing all radii anew does not.
+        Further radii are added to the ones that have been drawn, `number` at a time. On average
+        this keeps the frequencies of the distribution (Wald's identity), as drawing all radii anew
+        does not.
+
+        Args:
+            generator: Source of the radii; its state moves on.
 
         Returns:
-            Radii, shape (n,), and the side of the box, in m.
+            Radii in m, shape (n,), with n a multiple of `number`, and the side of the square or
+            cube that they fill to `fraction`, in m.
 
         Raises:
             RefusedError: There is no room with 100,000 particles.
@@ -104,13 +119,13 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
     at a new random centre.
 
     Args:
-        radii: Radii in m, shape (n,).
+        radii: Radii in m, in any order, shape (n,), n at least 1.
         box: Sides of the box in m, shape (d,).
-        generator: Source of the centres.
+        generator: Source of the centres; its state moves on.
 
     Returns:
-        Centres in m, shape (n, d), of particles without overlap; None if one of them was proposed
-        1,000 times in vain.
+        Centres in m in the order of `radii`, shape (n, d), of particles without overlap; None if
+        one of them was proposed 1,000 times in vain.
     """
     # Small particles still find gaps when the large ones are placed; the reverse would fail early.
     order = np.argsort(-radii, kind="stable")
@@ -151,8 +166,10 @@ class _Obstacles:
     def overlapped_by(self, proposal: Array, radii: Array) -> Mask:
         """Return which of some proposed particles overlap an obstacle, shape (n,).
 
+        Particles that just touch do not overlap.
+
         Args:
-            proposal: Centres in m, shape (n, d).
+            proposal: Centres in the box, in m, shape (n, d).
             radii: Radii in m, shape (n,).
         """
         overlaps = np.zeros(len(proposal), bool)
@@ -171,12 +188,13 @@ def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generat
     """Place a block of particles beside obstacles and without overlap among each other.
 
     Args:
-        obstacles: Particles that are placed already.
+        obstacles: Particles that are placed already, perhaps none, with the box.
         radii: Radii of the block in m, shape (n,).
-        generator: Source of the centres.
+        generator: Source of the centres; its state moves on.
 
     Returns:
-        Centres in m, shape (n, d); None if a particle was proposed 1,000 times in vain.
+        Centres in m in the order of `radii`, shape (n, d); None if a particle was proposed 1,000
+        times in vain.
     """
     box = obstacles.box
     centres = np.full((len(radii), len(box)), np.nan)  # of pending particles
@@ -197,13 +215,14 @@ def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generat
 
 
 def _accepted_in_order(proposal: Array, radii: Array, box: Array) -> Mask:
-    """Return which proposals overlap no earlier accepted one, shape (n,).
+    """Return which proposed particles overlap no earlier accepted one, shape (n,).
 
     This is what a loop over the proposals would accept, for all proposals at once: in each round
-    those are accepted that wait for no earlier proposal, and the ones that overlap them rejected.
+    those are accepted that wait for no earlier proposal, and the ones that overlap them rejected. A
+    round settles the first open proposal at least, so the loop ends.
 
     Args:
-        proposal: Centres in m, shape (n, d).
+        proposal: Centres in m, shape (n, d), the earliest first.
         radii: Radii in m, shape (n,).
         box: Sides of the periodic box in m, shape (d,).
     """
@@ -225,12 +244,12 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
     """Place particles in a periodic box at random, push them apart, and move them at random.
 
     Args:
-        radii: Radii in m, shape (n,).
-        box: Sides of the box in m, shape (d,).
-        generator: Source of the centres and of the moves.
+        radii: Radii in m, shape (n,), n at least 1.
+        box: Sides of the box in m, shape (d,): 2 for discs, 3 for spheres.
+        generator: Source of the centres and of the moves; its state moves on.
 
     Returns:
-        Centres in m, shape (n, d).
+        Centres in m in the order of `radii`, shape (n, d), of particles without overlap.
 
     Raises:
         FailedError: The particles still overlap after all steps.
@@ -249,14 +268,16 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
 def _push(particles: Particles, growth: float) -> Particles:
     """Move particles apart until none overlap, by fast inertial relaxation (Bitzek et al. 2006).
 
-    The constants of the method are those of its authors, but for the time steps.
+    The energy is half the sum of the squared overlaps. The constants of the method are those of its
+    authors, but for the time steps.
 
     Args:
-        particles: Particles in a periodic box, which may overlap.
-        growth: Factor of the radii, above 1, with which they repel each other.
+        particles: Particles in a periodic box, at least one, which may overlap.
+        growth: Factor of the radii, above 1, with which they repel each other. They may overlap
+            with the larger radii at the end, but not with their own.
 
     Returns:
-        The particles at new places.
+        New particles with the same radii at new places.
 
     Raises:
         FailedError: The particles still overlap after 4,000 steps.
@@ -265,6 +286,8 @@ def _push(particles: Particles, growth: float) -> Particles:
     box = particles.size
     radii = particles.radii * growth
     centres = particles.centres
+    # Grown particles that overlap by less than what both radii grew, (growth − 1) (r_i + r_j), do
+    # not touch with their own radii. This is the smallest such sum.
     allowed_overlap = (growth - 1) * 2 * float(particles.radii.min())
     velocity = np.zeros_like(centres)
     time_step = 0.1
@@ -311,11 +334,12 @@ def _repulsion(
     Args:
         centres: Centres in m, shape (n, d).
         radii: Radii in m, shape (n,).
-        pairs: First and second particle of each pair that may overlap.
+        pairs: First and second particle of each pair that may overlap, shape (m,) each.
         box: Sides of the periodic box in m, shape (d,).
 
     Returns:
-        Forces of shape (n, d), and the largest overlap, in m.
+        Forces in m, shape (n, d), and the largest overlap of a pair, in m, 0 if none overlaps. Two
+        particles at one place do not repel each other.
     """
     first, second = pairs
     offset = nearest_image(centres[second] - centres[first], box)
@@ -338,10 +362,11 @@ def _shake(particles: Particles, generator: np.random.Generator) -> Array:
 
     Args:
         particles: Particles without overlap in a periodic box.
-        generator: Source of the moves.
+        generator: Source of the moves; its state moves on.
 
     Returns:
-        Centres in m, shape (n, d).
+        New centres in m, shape (n, d), of particles without overlap, some of them outside the box:
+        they are to be taken back by its sides.
     """
     n_searches = 12
     moves_per_search = 5
@@ -357,6 +382,8 @@ def _shake(particles: Particles, generator: np.random.Generator) -> Array:
         first, second = close_pairs(Particles(centres, radii, box), gap)
         contact = radii[first] + radii[second]  # distance of centres that touch
         for _ in range(moves_per_search):
+            # A normal vector over its length is uniform on the circle or sphere, and the root of a
+            # uniform number makes the end of the move uniform in the disc or ball.
             direction = generator.standard_normal(centres.shape)
             direction /= np.linalg.norm(direction, axis=1)[:, None]
             length = reach * generator.random(len(radii)) ** (1 / dimensions)

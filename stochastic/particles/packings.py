@@ -20,8 +20,6 @@ from alphacut.stochastic.particles.radius_distributions import (
 )
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
-SHAPES = {shape.particles: shape for shape in (DISCS, SPHERES)}
-
 
 @dataclass(frozen=True, eq=False)
 class Packings(Sequence[Particles]):
@@ -50,12 +48,20 @@ class Packings(Sequence[Particles]):
         """Return `count` independent packings.
 
         Args:
-            packing: Specification of each of them.
+            packing: Specification of each of them: number, fraction, radii and shape of the
+                particles.
             count: Number of packings.
-            seed: Seed of all packings.
-            executor: Makes the packings; None for this process. The packings are the same.
-            progress: Function that takes the completed fraction.
+            seed: Seed of all packings, 0 or more; the k-th one depends on it and k alone.
+            executor: Makes the packings in other processes; None for this process. The packings are
+                the same.
+            progress: Function that takes the completed fraction after each packing, up to 1.
+
+        Raises:
+            RefusedError: A box of too many particles has no room for the largest one.
+            FailedError: Particles of a packing still overlap after all steps.
         """
+        # Each packing has a stream of its own, so that neither the number of processes nor the
+        # number of packings changes it.
         seeds = np.random.SeedSequence(seed).spawn(count)
         map_function = executor.map if executor else map
         sections: list[Particles] = []
@@ -97,34 +103,40 @@ def pack(
     """Pack discs in squares, or spheres in cubes, at random, periodically and without overlap.
 
     Args:
-        particles: Number of particles in each packing.
-        packings: Number of independent packings.
-        fraction: Fraction of the area or volume that the particles take.
+        particles: Number of particles in each packing, at least 1; there are more where the box
+            would not hold the largest one.
+        packings: Number of independent packings, at least 1.
+        fraction: Fraction of the area or volume that the particles take, above 0 and at most 0.82
+            for discs and 0.58 for spheres.
         radii: Smallest and largest radius, in m, of a log-normal distribution (eq. 11); or a
             distribution, as `MeasuredRadii.read` has it from a file.
         shape: "discs" or "spheres".
-        seed: Seed of everything left to chance.
+        seed: Seed of everything left to chance, 0 or more.
         workers: Processes that pack; the packings do not depend on their number.
-        progress: Function that takes the completed fraction.
+        progress: Function that takes the completed fraction, up to 1.
+
+    Returns:
+        Sequence of the packings; each depends on the seed and its index alone.
 
     Raises:
         RefusedError: A number is out of range, or the fraction above what packs at random.
         FailedError: The particles still overlap after all steps.
 
     Example:
-        >>> sections = pack(50, packings=3, fraction=0.2, radii=(1e-3, 4e-3), seed=1)
-        >>> len(sections), len(sections[0]), round(sections[0].fraction, 3)
-        (3, 50, 0.2)
+            >>> sections = pack(50, packings=3, fraction=0.2, radii=(1e-3, 4e-3), seed=1)
+            >>> len(sections), len(sections[0]), round(sections[0].fraction, 3)
+            (3, 50, 0.2)
     """
     for key, number in {"particles": particles, "packings": packings, "seed": seed}.items():
         checked_number(key, number, whole=True, positive=key != "seed")
-    require_choice("shape", shape, SHAPES)
+    shapes = {kind.particles: kind for kind in (DISCS, SPHERES)}
+    require_choice("shape", shape, shapes)
     if isinstance(radii, LogNormalRadii | MeasuredRadii):
         distribution: RadiusDistribution = radii
     else:
         require_numbers("radii", radii)
         require(len(radii) == 2, "radii", radii, allowed="the smallest and the largest, or a law")
         distribution = LogNormalRadii(smallest=radii[0], largest=radii[1])
-    packing = Packing(particles, fraction, distribution, shape=SHAPES[shape])
+    packing = Packing(particles, fraction, distribution, shape=shapes[shape])
     with pool(workers) as executor:
         return Packings.make(packing, packings, seed=seed, executor=executor, progress=progress)

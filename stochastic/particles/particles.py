@@ -31,6 +31,10 @@ class Particles:
     periodic: bool = True
 
     def __post_init__(self) -> None:
+        """Copy the arrays as floats, and move centres into a periodic box.
+
+        Shapes and values are not checked.
+        """
         size = np.array(self.size, float)
         centres: Array = np.array(self.centres, float)
         if self.periodic:
@@ -75,9 +79,14 @@ class Particles:
 def nearest_image(offset: Array, size: Array) -> Array:
     """Return vectors between centres to the nearest image in a periodic box.
 
+    At half a side, where two images are equally near, one of them is taken.
+
     Args:
         offset: Vectors to any image in m, shape (…, d).
         size: Sides of the box in m, shape (d,).
+
+    Returns:
+        Vectors in m, in the shape of `offset`.
     """
     return np.asarray(offset - size * np.round(offset / size))
 
@@ -85,7 +94,11 @@ def nearest_image(offset: Array, size: Array) -> Array:
 def size_classes(radii: Array) -> Iterator[Ints]:
     """Yield the indices of particles by class: radii of a class lie within a factor of two.
 
-    Radii below 1e-6 of the largest one are in one class.
+    Radii below about 1e-6 (2⁻²⁰) of the largest one are in one class, as are all if the largest is
+    0. Each index comes once; without particles there is no class.
+
+    Args:
+        radii: Radii, not negative, shape (n,).
     """
     number = np.zeros(len(radii))
     largest = radii.max(initial=0.0)
@@ -100,11 +113,12 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
     """Return the unordered pairs of particles whose surfaces are closer than a gap.
 
     Args:
-        particles: Particles in a periodic box or a window.
-        gap: The gap in m; 0 finds overlaps.
+        particles: Particles in a periodic box or a window, at least one. In a box only the nearest
+            images of a pair count.
+        gap: The gap in m; 0 finds overlaps, without particles that just touch.
 
     Returns:
-        First and second index of each pair, shape (m,) each.
+        First and second index of each pair, shape (m,) each; each pair once, in no certain order.
     """
     box = particles.size if particles.periodic else None
     classes = list(size_classes(particles.radii))
@@ -124,19 +138,22 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
 
 
 def surface_distance(particles: Particles, first: Ints, second: Ints) -> Array:
-    """Return the distance between the surfaces of pairs, in m, negative where they overlap.
+    """Return the distance between the surfaces of pairs, in m, shape (m,).
+
+    It is negative where they overlap. In a periodic box the nearest image of the second particle
+    counts.
 
     Args:
         particles: The particles.
         first: Index of the first particle of each pair, shape (m,).
-        second: Index of the second particle, of which the nearest image counts.
+        second: Index of the second particle of each pair, shape (m,).
     """
     distance = np.linalg.norm(particles.separation(first, second), axis=-1)
     return np.asarray(distance - particles.radii[first] - particles.radii[second])
 
 
 def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Ints, Ints]:
-    """Return the points of a tree that lie in some balls.
+    """Return the points of a tree that lie in some balls, their surfaces included.
 
     Args:
         tree: The points.
@@ -144,7 +161,8 @@ def points_in_balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Ints, I
         reach: Radii of the balls, shape (n,).
 
     Returns:
-        Number of points in each ball, shape (n,), and the indices of all points, ball after ball.
+        Number of points in each ball, shape (n,), and the indices of all points, ball after ball,
+        in no certain order within one.
     """
     near = tree.query_ball_point(centres, reach, return_sorted=False)
     counts = np.array([len(ball) for ball in near], int)
@@ -170,7 +188,10 @@ class Pairs:
         return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
     def joined(self, other: Pairs) -> Pairs:
-        """Return the pairs of both, grouped by i again."""
+        """Return the pairs of both, grouped by the first disc i again.
+
+        Those of `self` come before those of `other` with the same i.
+        """
         both = Pairs(
             first=np.concatenate([self.first, other.first]),
             second=np.concatenate([self.second, other.second]),
@@ -182,15 +203,19 @@ class Pairs:
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]:
     """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
-    They come in portions of three million pairs or so, which fit into memory.
+    They come in portions of three million pairs or so, which fit into memory. A disc and its own
+    images are pairs too, a disc and itself is none. In a window there are no images.
 
     Args:
-        discs: The discs.
+        discs: The discs, at least one.
         reach: Largest distance of the centres for each i, in m, shape (n,).
 
     Yields:
-        The indices i of a portion, and its pairs.
+        The indices i of a portion, and its pairs, grouped by i, with the vectors between the
+        centres.
     """
+    # Images as points of their own, and not a periodic tree: that one finds the nearest image of
+    # each disc alone, and cells of few large discs have walls towards several.
     disc_of_image, shift = _periodic_images(discs, float(reach.max()))
     tree = KDTree(discs.centres[disc_of_image] + shift)
     n_pairs = tree.query_ball_point(discs.centres, reach, return_length=True)
@@ -211,8 +236,13 @@ def _periodic_images(discs: Particles, margin: float) -> tuple[Ints, Array]:
 
     A window has the originals alone.
 
+    Args:
+        discs: The discs in their box, n of them.
+        margin: Distance from the box in m, along each side.
+
     Returns:
-        Index of the disc of each image, shape (k,), and its shift in m, shape (k, 2).
+        Index of the disc of each image, shape (k,), and its shift from the disc in m, shape (k, 2),
+        which is 0 in the first n rows.
     """
     originals = np.arange(len(discs), dtype=np.intp)
     indices: list[Ints] = [originals]

@@ -17,7 +17,17 @@ from alphacut.stochastic.theta.distribution import TruncatedNormal
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
-    """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit."""
+    """Raise for no radius at all, and for radii outside [1e-12, 1e6] m.
+
+    Such radii have a wrong unit or digit.
+
+    Args:
+        key: Name of the radii in the message.
+        radii: One radius or several in one dimension, in m; NaN is outside.
+
+    Raises:
+        RefusedError: There is no radius, or one is outside; the first such one is shown.
+    """
     radii = np.atleast_1d(np.asarray(radii, float))
     wrong = radii[~((radii >= 1e-12) & (radii <= 1e6))]
     allowed = "radii from 1e-12 to 1e+06 m"
@@ -130,6 +140,7 @@ class MeasuredRadii:
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """Draw independent radii, shape (number,), in m."""
+        # The inverse of the distribution function, at uniform probabilities.
         return np.asarray(np.interp(generator.random(number), self._grade, self.values), float)
 
 

@@ -60,13 +60,14 @@ class Apollonius:
     def walls(self, count: int) -> tuple[Array, Array]:
         """Return points along the wall of each arc, in polar coordinates around its cell's centre.
 
-        The ends of the arc are among them.
+        They are at even steps of the angle, with the ends of the arc among them. A wall that does
+        not close the cell has negative distances, beyond the angle where it goes to infinity.
 
         Args:
             count: Number of points of each arc.
 
         Returns:
-            Angles and distances (in m), shape (count, m) each.
+            Angles from the x axis and distances (in m), shape (count, m) each.
         """
         angle = np.asarray(np.linspace(self.start, self.end, count), float)
         near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.offset)
@@ -77,9 +78,19 @@ class Apollonius:
 def apollonius(discs: Particles) -> Apollonius:
     """Return the Apollonius diagram of discs, of which none lies inside another one.
 
-    Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of i
-    if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell: all
-    such discs are then taken into account.
+    The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j, in a
+    periodic box or within a window. Cells bounded by the discs nearby contain the true ones, and a
+    disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the
+    largest radius of that first cell: all such discs are then taken into account.
+
+    Args:
+        discs: Discs in a periodic box or a window, at least one.
+
+    Returns:
+        Areas of the cells, and the arcs that bound them, sorted by cell and by angle.
+
+    Raises:
+        FailedError: The envelope of the walls of a cell does not close.
     """
     # The first cells are bounded by the discs within three mean spacings. With fewer discs first
     # cells are large, and with more they take longer than they save.
@@ -107,14 +118,17 @@ def apollonius(discs: Particles) -> Apollonius:
 
 
 def _near_far(radii: Array, first: Ints, second: Ints, offset: Array) -> tuple[Array, Array]:
-    """Return d + Δ and d − Δ of pairs of discs, the parameters near and far of their walls.
+    """Return d + Δ and d − Δ of pairs of discs, shape (m,) each, in m: near and far of their walls.
 
-    d is the distance of the centres, and Δ = r_first − r_second, which is 0 at an edge.
+    d is the distance of the centres, and Δ = r_first − r_second, which is 0 at an edge. Half of
+    them are the distances of the wall's nearest point from both centres. One of them is not
+    positive where one disc lies inside the other, and there is no wall.
 
     Args:
         radii: Radii of all discs, in m, shape (n,).
         first: Index of the first disc of each pair, shape (m,).
-        second: Index of the second disc; −1 for an edge.
+        second: Index of the second disc; −1 for an edge of a window, towards the disc's mirror
+            image.
         offset: Vector between the centres, in m, shape (m, 2).
     """
     distance = np.hypot(offset[:, 0], offset[:, 1])
@@ -146,7 +160,11 @@ class _Walls:
     arcs: Arcs
 
     def _arc_ends(self) -> _ArcEnds:
-        """Return the anomalies at the ends of all arcs."""
+        """Return the hyperbolic anomalies at both ends of all arcs, and near and far of the walls.
+
+        With d the distance of the two centres and Δ the difference of the radii, near is d + Δ and
+        far is d − Δ, in m. The anomaly is the parameter along the wall, 0 at its nearest point.
+        """
         pairs = self.pairs.select(self.arcs.function)
         near, far = _near_far(self.discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = np.arctan2(pairs.offset[:, 1], pairs.offset[:, 0])
@@ -166,9 +184,10 @@ class _Walls:
     def largest_radius(self) -> Array:
         """Return an upper bound of the distance from each centre to its cell's boundary.
 
-        The boundary is farthest at a corner. The distance there is (d cosh s + Δ)/2, s the anomaly
-        on either of the two walls that meet; the wall with the smaller |s| gives it with the
-        smaller rounding. A per mille is added for rounding.
+        The boundary is farthest at a corner. The distance there is (d cosh s + Δ)/2, with d the
+        distance of the centres, Δ the difference of the radii and s the anomaly on either of the
+        two walls that meet; the wall with the smaller |s| gives it with the smaller rounding. A per
+        mille is added for rounding.
 
         Returns:
             Distances in m, shape (n,); 0 for discs without walls here.
@@ -198,11 +217,18 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     Args:
         discs: The discs.
         reach: Largest distance of a neighbour's centre for each disc, in m, shape (n,).
+
+    Yields:
+        Walls of the discs of a portion, towards other discs and to their own images or the edges of
+        a window, with the arcs that bound cells. Each disc is in one portion.
+
+    Raises:
+        FailedError: The envelope of the walls of a cell does not close.
     """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
-        # Else the one disc lies within the other, and there is no wall.
-        walls = neighbours.select((near > 0) & (far > 0))  # neither disc contains the other
+        # There is no wall where one disc lies within the other.
+        walls = neighbours.select((near > 0) & (far > 0))
         pairs = walls.joined(_bounding_pairs(discs, portion))
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
         direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]
@@ -215,7 +241,14 @@ def _bounding_pairs(discs: Particles, portion: Ints) -> Pairs:
     """Return pairs that bound the cells of some discs, whatever their neighbours.
 
     These are pairs with their own eight images next to them, or in a window with their mirror
-    images beyond the four edges, of which `second` is −1.
+    images beyond the left, right, lower and upper edge, of which `second` is −1.
+
+    Args:
+        discs: All discs.
+        portion: Indices of the discs whose cells are bounded, shape (k,).
+
+    Returns:
+        8 k or 4 k pairs, grouped by disc, with the vector from the disc to its image.
     """
     if discs.periodic:
         tiles = [tile for tile in product((-1, 0, 1), repeat=2) if any(tile)]
@@ -240,10 +273,14 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     Large cells are changed more often than small ones; each counted cell therefore stands for 1/p
     cells, p the fraction of positions in the window where an equal cell would count (Miles 1974,
     Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose centre lies
-    in the window.
+    in the window, and no disc outside larger than the largest one inside.
+
+    Args:
+        diagram: Cells of discs in a window or in a periodic box.
 
     Returns:
-        Indices of their discs and weights, shape (k,) each; all and 1 in a periodic box.
+        Indices of their discs in rising order and weights 1/p, shape (k,) each; all discs and
+        weights 1 in a periodic box.
 
     Raises:
         RefusedError: There is no such cell.
@@ -283,6 +320,9 @@ def _reach(diagram: Apollonius) -> Array:
     neighbour: its radius is ρ − r, and it extends by ρ cos ψ + ρ − r, ψ the angle from the edge's
     direction. The maximum over 33 points of each arc has an error of second order.
 
+    Args:
+        diagram: Cells of n discs.
+
     Returns:
         Extents from the disc's centre towards the left, right, lower and upper edge, in m, shape
         (n, 4); ∞ for a cell that is not closed, of which some ρ is negative.
@@ -321,12 +361,21 @@ def neighbours(discs: Particles) -> Neighbours:
 
     In a window the centres on the convex hull are not counted. A periodic section is triangulated
     with a layer of images, eight mean spacings wide: its triangles are those of the plane if no
-    circumcircle is wider, as in any packing. Fewer than three centres, or centres in one line, have
-    no neighbours.
+    circumcircle is wider, as in any packing.
+
+    Args:
+        discs: Discs in a periodic box or a window, at least one; their radii do not matter.
+
+    Returns:
+        Number of neighbours of each counted centre, and the edges from counted centres with the
+        vectors to the other ends. All are empty where no triangle can be made: in a window with
+        fewer than three centres, or with all of them in one line.
     """
     from scipy.spatial import Delaunay, QhullError
 
     tiles = (0, 1, -1) if discs.periodic else (0,)
+    # Wider empty circles do not occur in a packing of so many discs, so that no triangle near the
+    # box has a corner beyond the layer.
     layer = 8.0 * discs.spacing
     images = [discs.centres + discs.size * tile for tile in product(tiles, repeat=2)]
     points = np.concatenate(images)
@@ -349,10 +398,13 @@ def neighbours(discs: Particles) -> Neighbours:
 
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
-    """Return pairs of values of cells that share a wall, in both orders, shape (2, m).
+    """Return pairs of values of cells that share a wall, each pair in both orders, shape (2, m).
+
+    Cells that share several walls, of different images, are one pair; a cell that meets its own
+    image is none, and walls at the edge of a window do not count.
 
     Args:
-        diagram: The cells.
+        diagram: The cells of n discs.
         values: A value of each cell, shape (n,).
     """
     once = diagram.neighbour > diagram.cell

@@ -19,11 +19,15 @@ from alphacut.base.errors import FailedError
 def anomaly(psi: Array, near: Array, far: Array) -> Array:
     """Return the hyperbolic anomaly s of points on walls: tanh(s/2) = √(near/far) tan(ψ/2).
 
+    s is the parameter along the hyperbola, 0 at the point nearest to the disc's centre. At infinity
+    and beyond it is about ±37.
+
     Args:
-        psi: Angle ψ of each point at the disc's centre, from the direction of the neighbour, shape
+        psi: Angle ψ of each point at the disc's centre, from the direction of the neighbour, any
+            number of turns, shape (m,).
+        near: Twice the distance of the wall's nearest point from the disc's centre, positive, shape
             (m,).
-        near: Parameter of the wall as of `sector_area`, shape (m,).
-        far: The other parameter.
+        far: Twice the distance of this point from the neighbour's centre, positive, shape (m,).
     """
     psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
     # The largest number below 1 keeps the anomaly finite where the wall is at infinity.
@@ -35,13 +39,14 @@ def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
     """Return the area between a disc's centre and its hyperbolic wall over an arc, shape (m,).
 
     The wall is 1/ρ = M cos ψ + C with M + C = 2/near and M − C = 2/far, ρ the distance from the
-    disc's centre, ψ the angle from the direction of the neighbour.
+    disc's centre, ψ the angle from the direction of the neighbour. The anomaly s of a point is
+    defined by tanh(s/2) = √(near/far) tan(ψ/2). The area is in the square of the unit of `near`.
 
     Args:
         start: Anomaly at the beginning of the arc, shape (m,).
-        end: Anomaly at its end.
-        near: Twice the distance of the wall's nearest point from the disc's centre.
-        far: Twice the distance of this point from the neighbour's centre.
+        end: Anomaly at its end, shape (m,).
+        near: Twice the distance of the wall's nearest point from the disc's centre, shape (m,).
+        far: Twice the distance of this point from the neighbour's centre, shape (m,).
     """
     midpoint = (start + end) / 2
     half = (end - start) / 2
@@ -85,7 +90,11 @@ class Arcs:
 
     @classmethod
     def joined(cls, parts: list[Arcs]) -> Arcs:
-        """Return the arcs of all parts, of which there is one or more, in their order."""
+        """Return the arcs of all parts, one part after another.
+
+        Args:
+            parts: At least one. They are not sorted by envelope again.
+        """
         return cls(
             owner=np.concatenate([part.owner for part in parts]),
             function=np.concatenate([part.function for part in parts]),
@@ -99,10 +108,14 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
 
     Args:
         a: Coefficients of cos φ, shape (k,), the groups one after the other; b and c likewise.
-        b: Coefficients of sin φ.
-        c: Constants.
+        b: Coefficients of sin φ, shape (k,).
+        c: Constants, shape (k,).
         counts: Number of functions in each group, shape (n,), sum k > 0; a group of none has no
             arcs.
+
+    Returns:
+        Arcs sorted by group and then by angle. The arcs of a group cover the circle once. Angles
+        are those of a turn from wherever it began, so that they may lie outside [−π, π].
 
     Raises:
         FailedError: A sweep around the circle does not end.
@@ -199,19 +212,20 @@ def _sweep(a: Array, b: Array, c: Array, *, table: Ints, group: Ints) -> Arcs:
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Ints, Array]:
     """Return the uppermost function of each row at an angle, and how far ahead it is crossed.
 
-    At φ the difference g ≤ 0 of another function to the uppermost one has the value −h, the slope
-    q, the oscillating part p and the constant d. Ahead by δ, with t = tan(δ/2), it is zero where
-    (d − p) t² + 2 q t − h = 0, at the root where it rises; the largest 1/t is the nearest crossing.
+    The functions are a cos φ + b sin φ + c. At φ the difference g ≤ 0 of another function to the
+    uppermost one has the value −h, the slope q, the oscillating part p and the constant d. Ahead by
+    δ, with t = tan(δ/2), it is zero where (d − p) t² + 2 q t − h = 0, at the root where it rises;
+    the largest 1/t is the nearest crossing.
 
     Args:
         a: Coefficients of cos φ, shape (n, w).
-        b: Coefficients of sin φ.
-        c: Constants.
+        b: Coefficients of sin φ, shape (n, w).
+        c: Constants, shape (n, w).
         phi: Angle of each row, shape (n,).
 
     Returns:
-        Column of the uppermost function, shape (n,), and the angle from φ to its next crossing, 2 π
-        for none, shape (n,).
+        Column of the uppermost function, shape (n,); of several that are equal the one that rises
+        most. And the angle from φ to its next crossing, in [0, 2 π], 2 π for none, shape (n,).
     """
     row = np.arange(len(a))
     cos = np.cos(phi)[:, None]
