@@ -66,16 +66,22 @@ class RadiusLimits:
         if self.stated is not None:
             return self.stated
         lower, upper = sample.limits(0.9927)
+        # At r_n = 1 the particle would touch the sides of its square or cubic cell.
         return lower, min(upper, self.shape.reach)
 
     def capped(self, sample: AreaWeighted) -> AreaWeighted:
-        """Return a copy of a sample with r_n of discs capped at `Shape.reach`.
+        """Return a copy of a sample with the reduced radii r_n of discs capped at `Shape.reach`.
 
-        With stated limits the sample is returned as it is. Cells of spheres that are tighter than
-        `Shape.reach` are cut off by the limits instead.
+        Reach is the largest r_n of a map: particles touch the sides of a square cell at 1. With
+        stated limits, and for spheres, the sample itself is returned: limits cut off what is
+        tighter.
+
+        Args:
+            sample: Reduced radii of all cells, weighted by area or volume.
 
         Raises:
-            RefusedError: More than 15 % of the area or volume is in such cells.
+            RefusedError: Limits are not stated, and more than 15 % of the area or volume is in
+                tighter cells.
         """
         if self.stated is not None:
             return sample
@@ -91,9 +97,9 @@ class RadiusLimits:
         return sample.capped(shape.reach)
 
     def capped_fraction(self, sample: AreaWeighted) -> float:
-        """Return the fraction of area or volume in cells tighter than `Shape.reach`.
+        """Return the fraction of area or volume in cells with an r_n above `Shape.reach`.
 
-        It is 0 with stated limits.
+        Reach is the largest reduced radius of a map. The fraction is 0 with stated limits.
         """
         if self.stated is not None:
             return 0.0
@@ -101,7 +107,11 @@ class RadiusLimits:
 
     @property
     def _cure(self) -> str:
-        """Advice in the message on particles that are too dense for cells of one particle."""
+        """Advice in the message on particles that are too dense for cells of one particle.
+
+        It names keys of a case file: the fraction in place of the particles, and for discs also an
+        image of them or stated limits.
+        """
         fraction = "…"
         if self.packed_fraction is not None:
             fraction = f"{self.packed_fraction:g}"
@@ -142,7 +152,11 @@ class FittedRadiusMap:
 
     @property
     def map(self) -> HermiteMap:
-        """The radius map at the nominal slopes."""
+        """The radius map at the nominal slopes.
+
+        Its limits a1 and a3 are rounded to ten digits and its slopes a2 and a4 to eight, so that
+        the map in a printed case file is the same.
+        """
         fit = self.pbox.fit
         return HermiteMap(
             a1=float(f"{fit.a1:.10g}"),
@@ -163,10 +177,14 @@ class FittedRadiusMap:
 
     @property
     def triangles(self) -> dict[str, SlopeEnds]:
-        """Ends and nominal values of the slopes "a2" and "a4", in eight digits.
+        """Ends and nominal values of the slopes "a2" and "a4", rounded to eight digits.
 
+        The slopes are dr/dξ at the lower and at the upper end of θ, ξ from 0 to 1 over its support.
         Ends that differ from the nominal value by 1e-6 of a3 − a1, which is rounding of the linear
         program, are that value.
+
+        Returns:
+            Lower end, nominal value and upper end by name.
         """
         tolerance = 1e-6 * (self.pbox.fit.a3 - self.pbox.fit.a1)
         triangles = {}
@@ -193,7 +211,11 @@ class FittedRadiusMap:
         return self.rule.capped(self.sample).fraction_within(*self.limits)
 
     def __str__(self) -> str:
-        """Return the map and its fuzzy slopes, and how many cells they rest on."""
+        """Return one line: the number of cells, the fraction within the limits, and the map.
+
+        Of the map it shows the limits a1 and a3, the fuzzy slopes a2 and a4 as lower … nominal …
+        upper, and the mean fraction of the cell that the particle takes.
+        """
         cells = f"{len(self.sample.values)} cells of {self.shape.particles}"
         words = f"{self.fraction_within:.2%} of their {self.shape.cells} within the limits"
         triangles = self.triangles.items()
@@ -207,16 +229,22 @@ class FittedRadiusMap:
     __repr__ = __str__
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return the distribution functions of r_n at 501 points between the limits as a dataset.
+        """Return distribution functions of the reduced radius r_n between the limits as a dataset.
 
-        "cdf" belongs to the sample, "pbox_lower" and "pbox_upper" to the p-box, and "fitted" to the
-        map at the nominal slopes.
+        Returns:
+            Dataset with the coordinate "r_n", 501 even points from a1 to a3, and four probabilities
+            over it: "cdf" of the sample within the limits, "pbox_lower" and "pbox_upper" of the
+            p-box of the fuzzy slopes, and "fitted" of the map at the nominal slopes.
+
+        Raises:
+            ImportError: xarray is not installed.
         """
         import xarray
 
         fit = self.pbox.fit
         radius = np.linspace(fit.a1, fit.a3, 501)
         distribution = fit.distribution
+        # A map has no inverse in closed form, so that a table of θ stands in for it.
         theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 5001), float)
         # The distribution function of a map is F_Θ at the θ of the radius: large radii give a small
         # one.
@@ -236,7 +264,19 @@ class FittedRadiusMap:
         return dataset
 
     def numbers(self) -> dict[str, object]:
-        """Return all numbers by the keys of the JSON file, lengths in m."""
+        """Return all numbers of the fit by the keys of its JSON file; lengths are in m.
+
+        Of the particles: their kind and number, the number of packings, the smallest and the
+        largest radius, and fractions of area or volume (measured; as the mean over the cells, eq.
+        10; as the mean of the map; and, if they were packed, as it was asked for). Of the cells:
+        neighbours and the correlation of their r_n (discs alone), the number of cells, mean and
+        largest r_n, "share_capped" and "share_kept", the fractions that are tighter than a map may
+        be and within the limits. Of the map: limits, a1 and a3; a2 and a4 as [lower, nominal,
+        upper], and their bootstrap bands in the same form; the half-width of the "band" of the
+        distribution function, and "pbox_breach", the largest distance of the sample from the p-box
+        (both probabilities); area of the p-box and root mean square misfit, in units of r_n; seed.
+        "radius" is the table of a case file, rounded.
+        """
         packings = [section.particles for section in self.sections]
         radii = np.concatenate([packing.radii for packing in packings])
         shape = self.shape
@@ -375,12 +415,17 @@ def _repacked(
     Args:
         rule: Limits of the map.
         packings: The packings whose fraction the map shall have.
-        cells: Their cells.
+        cells: Their cells, one object for each packing.
         executor: Runs the packings and the tessellations; None for this process.
-        progress: Function that takes the completed fraction.
+        progress: Function that takes the completed fraction, from 0.5 to 0.7 here.
 
     Returns:
-        The cells with the smallest error.
+        The cells with the smallest error, which may be `cells` itself. The error may be above 5e-3.
+
+    Raises:
+        FailedError: Spheres of a denser packing still overlap, or have no cell.
+        RefusedError: Fewer than ten reduced radii are within the limits, or a cell is smaller than
+            its sphere.
     """
     max_packings = 6
     map_function = executor.map if executor else map
@@ -401,6 +446,7 @@ def _repacked(
         # The exponent is above 1, since the limit cuts off more than in proportion.
         correction = (target / map_fraction) ** 1.5
         fraction = min(packing.fraction * correction, rule.shape.densest)
+        # Denser than `densest` spheres do not pack: the fraction then stays as it is.
         is_last = number == max_packings - 1 or fraction == packing.fraction
         if best_error < 5e-3 or is_last:
             break
@@ -429,15 +475,21 @@ class FuzzyFit:
 
 
 def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
-    """Fit the radius map to a sample of r_n and make its slopes fuzzy.
+    """Fit the radius map to a sample of reduced radii r_n and make its slopes fuzzy.
 
     Args:
-        rule: Limits between which it is fitted.
-        sample: Reduced radii of all cells.
-        seed: Seed of the bootstrap.
+        rule: Limits of r_n between which it is fitted.
+        sample: Reduced radii of all cells, weighted by area or volume, in groups for the bootstrap.
+        seed: Seed of the bootstrap, 0 or more.
+
+    Returns:
+        The values within the limits; the p-box that contains their distribution but for its
+        bootstrap band, with the fuzzy slopes; the bootstrap band of the slopes; and the half-width
+        of the band of the distribution function.
 
     Raises:
-        RefusedError: All cells have one r_n.
+        RefusedError: All cells have one r_n, more than 15 % of the cells are too tight, fewer than
+            ten values are within the limits, or there are fewer than five groups.
         FailedError: No p-box contains the sample.
     """
     capped = rule.capped(sample)
@@ -469,7 +521,14 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
 def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
     """Return number and distances of direct neighbours, and the correlation of their r_n.
 
-    The result is empty for spheres, whose cells have no diagram.
+    Args:
+        sections: Particles and cells; those without a diagram (spheres) are left out.
+
+    Returns:
+        "neighbours" with "counted", the number of particles whose neighbours were counted, the
+        "mean" number of neighbours and the "mean_distance" of their centres in m, None where there
+        are none; and "correlation", the mean over the sections of the correlation of reduced radii
+        of cells that share a wall. Empty for spheres, whose cells have no diagram.
     """
     diagrams = [section.diagram for section in sections if section.diagram]
     if not diagrams:
@@ -477,6 +536,7 @@ def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
     direct = [neighbours(diagram.discs) for diagram in diagrams]
     numbers = np.concatenate([found.number for found in direct])
     distances = np.concatenate([found.distances for found in direct])
+    # Pairs are counted in both orders, so that it does not matter which cell is called the first.
     correlations = []
     for diagram in diagrams:
         pairs = neighbouring_values(diagram, diagram.reduced_radii)
@@ -493,5 +553,6 @@ def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
 
 def _mean_fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
     """Return the mean fraction of the cell that the particle fills, for slopes (a2, a4)."""
+    # r is cubic in θ, so that r² has degree 6 and r³ degree 9; eight nodes are exact to degree 15.
     rule = gauss_rule(fit.distribution, points=8)
     return float(rule.mean(shape.fractions(fit.map(slopes)(rule.nodes))))

@@ -47,12 +47,17 @@ class RadiusMap(Protocol):
 
 
 def require_map(radius_map: RadiusMap) -> None:
-    """Refuse a radius map whose θ has no bounded support, or whose radii leave (0, 1).
+    """Raise for a radius map whose θ has no bounded support, or whose radii leave (0, 1).
 
-    The radii are tested at 65 equally spaced θ.
+    The radii are tested at 65 equally spaced θ, ends included.
+
+    Args:
+        radius_map: Function of θ with the attribute `distribution`, the distribution of θ.
 
     Raises:
-        RefusedError: The map is not allowed.
+        RefusedError: The distribution lacks members or has a support that is not finite, not in
+            order or too narrow; or the radii are not one for each θ, or outside (0, 1).
+        AttributeError: The map has no attribute `distribution`.
     """
     distribution = radius_map.distribution
     require_distribution(distribution)
@@ -94,8 +99,15 @@ class HermiteMap:
     distribution: ThetaDistribution = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
+        """Check the map.
+
+        Raises:
+            RefusedError: `distribution` is no distribution of θ, a value is no finite real number,
+                or r(θ) leaves (0, 1) somewhere on the support.
+        """
         require_distribution(self.distribution)
         values = (self.a1, self.a2, self.a3, self.a4)
+        # NaN is inside no limits, so that values that are no numbers are refused by the same check.
         low = high = np.nan
         if all(isinstance(value, Real) and np.isfinite(value) for value in values):
             low, high = self.extremes()
@@ -107,6 +119,8 @@ class HermiteMap:
     @property
     def monomials(self) -> Array:
         """Coefficients of 1, ξ, ξ², ξ³, shape (4,), from which eq. 12 is evaluated."""
+        # eq. 12 sorted by powers: h1 = 1 − 3 ξ² + 2 ξ³, h2 = ξ − 2 ξ² + ξ³, h3 = 3 ξ² − 2 ξ³ and
+        # h4 = −ξ² + ξ³.
         quadratic = 3 * (self.a3 - self.a1) - 2 * self.a2 - self.a4
         cubic = 2 * (self.a1 - self.a3) + self.a2 + self.a4
         return np.array([self.a1, self.a2, quadratic, cubic])
@@ -124,9 +138,11 @@ class HermiteMap:
     def extremes(self) -> tuple[float, float]:
         """Return the smallest and the largest radius on the support of θ.
 
-        They are at its ends or where dr/dξ = 0.
+        They are in halves of the cell's side, at the ends of the support or where dr/dξ = 0. They
+        may be outside (0, 1); such a map is refused when it is made.
         """
-        # dr/dξ is a quadratic: its roots are the inner extremes.
+        # dr/dξ is a quadratic: its roots are the inner extremes. `polyder` gives coefficients by
+        # rising powers, `roots` takes them by falling ones.
         roots = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
         is_real = abs(roots.imag) < 1e-12  # the rounding of a double root
         inner = roots.real[is_real & (roots.real > 0) & (roots.real < 1)]

@@ -50,12 +50,23 @@ class ParticleCells:
 def with_cells(particles: Particles) -> ParticleCells:
     """Return particles with their cells: Apollonius cells of discs, power cells of spheres.
 
-    Cells near the edge of a window are left out and others weighted instead (`counted_cells`).
+    Cells of discs near the edge of a window are left out, and each cell that counts stands for more
+    than one in return (its weight), since large cells are left out more often. In a periodic box
+    all count, with the weight 1. Spheres must be in a periodic cube.
+
+    Args:
+        particles: Discs or spheres, of which none lies inside another one.
+
+    Raises:
+        RefusedError: In a window no cell is whole.
+        FailedError: Voro++, which makes the cells of spheres, is not installed or fails, a sphere
+            has no cell, or the envelope of a disc's walls does not close.
     """
     if particles.shape != DISCS:
         # All cells of a periodic box are whole.
         indices = np.arange(len(particles), dtype=np.intp)
         return ParticleCells(particles, indices, cell_volumes(particles), np.ones(len(particles)))
+    # Beyond the edge of a window there are discs that are not known.
     diagram = apollonius(particles)
     counted, weight = counted_cells(diagram)
     return ParticleCells(particles, counted, diagram.areas[counted], weight, diagram)
@@ -64,12 +75,18 @@ def with_cells(particles: Particles) -> ParticleCells:
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     """Return the reduced radii of all counted cells, weighted by area or volume.
 
-    For the bootstrap they are grouped by section, or by 5 × 5 patches (5 × 5 × 5 of a cube) if
-    there is a single section.
+    The reduced radius is that of the particle over half the side of a square or cube as large as
+    its cell. For the bootstrap the radii are grouped by section, or by 5 × 5 patches (5 × 5 × 5 of
+    a cube) if there is a single section.
+
+    Args:
+        sections: Particles of one kind with their cells, at least one section.
 
     Raises:
         RefusedError: A cell is smaller than its particle.
     """
+    # Cells of one packing depend on one another, so that the bootstrap must draw packings. Patches
+    # of a single section depend on one another along their edges alone.
     if len(sections) == 1:
         groups = [_patches(sections[0])]
     else:
@@ -92,6 +109,8 @@ def _patches(section: ParticleCells) -> Ints:
     per_side = 5
     particles = section.particles
     place = (per_side * particles.centres[section.counted] / particles.size).astype(int)
+    # The number of a patch has one digit in base 5 for each axis. A centre on the upper side, as
+    # windows may have, belongs to the last patch.
     digits = per_side ** np.arange(len(particles.size))[::-1]
     return np.asarray(np.minimum(place, per_side - 1) @ digits)
 
@@ -99,10 +118,15 @@ def _patches(section: ParticleCells) -> Ints:
 def cell_volumes(spheres: Particles) -> Array:
     """Return the volumes of the power (Laguerre) cells of spheres in a periodic cube, in m³, (n,).
 
-    Voro++ (Rycroft, Chaos 19, 041111, 2009) is run as a program; Debian's package is voro++.
+    Voro++ (Rycroft, Chaos 19, 041111, 2009) is run as a program; Debian's package is voro++. Its
+    volumes have six digits.
+
+    Args:
+        spheres: Spheres in a cube; the first side of the box is taken for all.
 
     Raises:
-        FailedError: Voro++ is not installed or fails, or a sphere has no cell.
+        FailedError: Voro++ is not installed, the volumes do not add up to that of the cube, or a
+            sphere has no cell.
     """
     program = shutil.which("voro++")
     if program is None:

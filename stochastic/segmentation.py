@@ -69,7 +69,8 @@ class Segmentation:
     def ranges(self) -> tuple[Ints, Ints]:
         """Return the lowest and the highest class that each pixel may be of, (rows, columns) each.
 
-        The grey value is varied by `CONFIDENT` standard deviations of the noise and by the light.
+        The grey value is varied by three standard deviations of the noise and by the magnitude of
+        the light. Salt, pepper and scratches may be of any class.
         """
         # The light counts in full, as if it had not been fitted: its polynomial may be wrong.
         uncertainty = CONFIDENT * self.noise + np.abs(self.light)
@@ -79,11 +80,16 @@ class Segmentation:
         return first, last
 
     def require_certain(self, max_fraction: float = 0.15) -> None:
-        """Refuse a segmentation that leaves too many pixels open.
+        """Raise for a segmentation that leaves too many pixels open.
 
         Args:
-            max_fraction: Area that may be open, over the area of the smallest class.
+            max_fraction: Area of pixels that may be of another class, over the area of the smallest
+                class.
+
+        Raises:
+            RefusedError: There are more open pixels.
         """
+        # The smallest class changes most by the same number of pixels.
         fraction = self.open_fraction / float(self.fractions.min())
         impulses = float(np.mean(self.is_impulse))
         value = (
@@ -100,15 +106,18 @@ class Segmentation:
 def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
     """Segment a grey image: classes, light, noise, and pixels that may be of another class.
 
-    Levels, light and noise are fitted and classes assigned in turn, until no class changes, at most
-    20 times.
+    A grey value is modelled as the level of its class, plus a light that is a polynomial of degree
+    two over the image, plus noise. Levels, light and noise are fitted and classes assigned in turn,
+    until no class changes, at most 20 times.
 
     Args:
-        grey: Grey values, shape (rows, columns).
-        thresholds: Grey values between the classes, rising.
+        grey: Grey values, finite, shape (rows, columns).
+        thresholds: Grey values between the classes, rising, at least one; a pixel at a threshold is
+            of the class above it.
 
     Raises:
-        RefusedError: A class has no pixel, or grey values are clipped.
+        RefusedError: A class has no pixel, or the grey values of a class pile up at an end, where
+            they were clipped.
     """
     values = np.asarray(grey, float)
     borders = tuple(map(float, thresholds))
@@ -121,6 +130,7 @@ def segment(grey: Array, thresholds: Sequence[float]) -> Segmentation:
     polynomials -= polynomials.mean(axis=0)
 
     light = np.zeros_like(values)
+    # The fit depends on the labels alone: once they repeat, nothing changes any more.
     last_labels = None
     for _ in range(20):
         labels = np.searchsorted(borders, values - light, side="right")
@@ -144,15 +154,17 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
 
     An impulse differs from the level of every class, and from most of the 7 × 7 pixels around, of
     which a line has 7, by more than the noise; pixels of a blurred border differ from the levels
-    alone. Noise by itself leaves 0.3 % of such pixels: below 1 % they do not count.
+    alone. Noise by itself leaves 0.3 % of such pixels: below 1 % of the image none counts. The
+    image is taken as periodic.
 
     Args:
         grey: Grey values of an evenly lit image, shape (rows, columns).
-        levels: Grey value of each class.
-        noise: Standard deviation of the noise.
+        levels: Grey value of each class, shape (classes,).
+        noise: Standard deviation of the noise, in grey values.
     """
     band = CONFIDENT * noise + _rounding(grey)
     is_outlier = np.abs(grey[..., None] - levels).min(axis=-1) > band
+    # A line takes 7 of the 49 pixels, 14 %, so that these percentiles are greys beside it.
     low = percentile_filter(grey, 15, 7, mode="wrap")
     high = percentile_filter(grey, 85, 7, mode="wrap")
     impulses = is_outlier & ((grey < low - band) | (grey > high + band))
@@ -160,15 +172,16 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
 
 
 def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
-    """Refuse an image of which a class piles up at an end of the grey values.
+    """Raise for an image of which a class piles up at an end of the grey values.
 
     A class is clipped where 1 % of its pixels have the last grey value, and three times as many as
-    have the next one. Classes of fewer than 50 pixels tell nothing.
+    have the next one. Classes with fewer than 50 pixels away from borders tell nothing. A clean
+    image, whose classes are all flat, passes.
 
     Args:
         values: Grey values, shape (rows, columns).
-        borders: Grey values between the classes.
-        sound: Pixels that are no impulses, shape (rows, columns).
+        borders: Grey values between the classes, rising.
+        sound: Pixels that are no impulses, shape (rows, columns), at least one.
 
     Raises:
         RefusedError: A class is clipped.
@@ -182,6 +195,7 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
     is_flat = [_is_flat(grey, contrast) for grey in classes]
     if all(is_flat):  # a clean image
         return
+    # The histogram of a noisy class falls towards its end; clipping heaps its tail up there.
     for end in (float(values[sound].min()), float(values[sound].max())):
         for grey in classes:
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
@@ -202,7 +216,7 @@ def _is_flat(grey: Array, contrast: float) -> bool:
     values are apart by 5 % of the contrast.
 
     Args:
-        grey: Grey values of the pixels of the class.
+        grey: Grey values of the pixels of the class, shape (pixels,), at least one.
         contrast: Range of the grey values of the image.
     """
     values, counts = np.unique(grey, return_counts=True)
@@ -229,17 +243,24 @@ def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int)
 
     Args:
         values: Grey values, shape (rows, columns).
-        labels: Class of each pixel, same shape.
-        polynomials: Polynomials of the light, shape (pixels, 5).
+        labels: Class of each pixel, from 0, same shape.
+        polynomials: Values of the five polynomials of the light, of mean zero, shape (pixels, 5),
+            with pixels row by row.
         classes: Number of classes.
+
+    Returns:
+        Level of each class, shape (classes,); light at each pixel, shape (rows, columns); and
+        standard deviation of the residuals. Light and noise that are no more than rounding are 0.
 
     Raises:
         RefusedError: A class has no pixel.
     """
     inner = _inner_pixels(labels, classes).ravel()
+    # A column for each class is 1 in its pixels, so that its coefficient is the level of the class.
     columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), polynomials])
     flat = values.ravel()
     rounding = _rounding(flat)
+    # The first fit has the outliers too; each further one leaves out those of the fit before.
     used = inner
     for _ in range(3):
         coefficients = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
@@ -250,6 +271,7 @@ def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int)
         limit = max(3.0 * 1.4826 * float(median), float(high), rounding)
         used = inner & (residual <= limit)
     noise = float(np.sqrt(np.mean(residual[used] ** 2)))
+    # Rounding is neither light nor noise: 0 leaves no pixel of a clean image open.
     light = polynomials @ coefficients[classes:]
     light[np.abs(light) < rounding] = 0.0
     return _LightFit(
@@ -260,12 +282,13 @@ def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int)
 
 
 def _inner_pixels(labels: Ints, classes: int) -> Mask:
-    """Return the pixels that are 3 pixels from other classes, shape (rows, columns).
+    """Return the pixels that have no pixel of another class within 3, shape (rows, columns).
 
-    They are nearer if less than a tenth of some class would be left.
+    The distance is 2 or 1 if less than a tenth of some class would be left, and all pixels are
+    returned if it would with 1 as well. The image is taken as periodic.
 
     Args:
-        labels: Class of each pixel, shape (rows, columns).
+        labels: Class of each pixel, from 0, shape (rows, columns).
         classes: Number of classes.
 
     Raises:

@@ -49,12 +49,14 @@ class AreaWeighted:
     def from_values(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Return a sample with the values sorted, the weights of sum 1, the groups numbered.
+        """Return a sample with sorted values, weights of the sum 1, and numbered groups.
 
         Args:
-            values: Reduced radii in any order and shape.
-            weights: Area or volume of the cell of each value; equal by default.
-            groups: Label of the group of each value; by default each is a group.
+            values: Reduced radii in any order and shape, n of them, at least one.
+            weights: Area or volume of the cell of each value, n of them in the same order, with a
+                positive sum; equal by default.
+            groups: Label of the group of each value, such as the number of its packing; the
+                bootstrap draws whole groups. By default each value is a group.
         """
         values = np.asarray(values, float).ravel()
         if weights is None:
@@ -91,7 +93,8 @@ class AreaWeighted:
         """Return the smallest value with at least this fraction of the area at or below it.
 
         Args:
-            fraction: Fractions in [0, 1], any shape; 1e-12 is rounding of the cumulated weights.
+            fraction: Fractions, any shape. Those of 0 or less give the smallest value, and those of
+                1 or more the largest one. 1e-12 is allowed for rounding of the cumulated weights.
         """
         # The first value at which the cumulated weight reaches the fraction
         row = np.searchsorted(self.cumulated, np.asarray(fraction) - 1e-12)
@@ -113,10 +116,14 @@ class AreaWeighted:
         return float(lower), float(upper)
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
-        """Return the values within limits of r_n, their weights scaled to the sum 1.
+        """Return a new sample of the values within limits of r_n, the weights scaled to the sum 1.
+
+        Args:
+            lower: Lower limit; a value that is equal to it is kept.
+            upper: Upper limit; likewise.
 
         Raises:
-            RefusedError: There are fewer than ten.
+            RefusedError: Fewer than ten values are within the limits.
         """
         inside = (self.values >= lower) & (self.values <= upper)
         count = int(inside.sum())
@@ -134,8 +141,15 @@ class AreaWeighted:
     def bootstrap_weights(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
         """Yield the weights of the values in each of `number` bootstrap samples.
 
-        A bootstrap sample has as many groups as there are, drawn with replacement. Its weights have
-        the shape (n,) and the sum 1.
+        A bootstrap sample has as many groups as there are, drawn with replacement. A group that is
+        not drawn has the weight 0 in it, one that is drawn twice has twice its weight.
+
+        Args:
+            number: Number of bootstrap samples.
+            generator: Source of the draws; its state moves on.
+
+        Yields:
+            Weights in the order of `values`, shape (n,), with the sum 1.
         """
         count = int(self.groups.max()) + 1
         for _ in range(number):
@@ -147,12 +161,13 @@ class AreaWeighted:
     def band_half_width(self, level: float, number: int, generator: np.random.Generator) -> float:
         """Return the half-width of the simultaneous bootstrap band of the distribution function F.
 
-        It is the quantile of sup |F* − F| over resampled functions F*.
+        It is the quantile of sup |F* − F| over resampled functions F*, a probability. The band
+        estimates where the distribution function lies; it proves nothing.
 
         Args:
-            level: Confidence of the band, the probability of the quantile.
-            number: Number of resampled functions.
-            generator: Source of the bootstrap samples.
+            level: Confidence of the band, the probability of the quantile, in (0, 1).
+            number: Number of resampled functions, at least 1.
+            generator: Source of the bootstrap samples; its state moves on.
 
         Raises:
             RefusedError: There are fewer than five groups to draw from.

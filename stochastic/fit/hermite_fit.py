@@ -56,11 +56,18 @@ class HermiteFit:
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
         """Return the slopes a2, a4 of the monotone cubic H nearest to a sample.
 
-        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample.
+        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, with Q the quantile function of the sample and
+        F_Θ, f_Θ the distribution function and the density of θ. H(θ) = a1 h1 + a2 h2 + a3 h3 + a4
+        h4 with the Hermite functions of ξ from 0 to 1 over the support of θ; a1 and a3 are its
+        ends, a2 and a4 the slopes dH/dξ there.
 
         Args:
-            sample: Reduced radii between the limits.
-            weights: Other weights of the values, by the bootstrap, shape (n,), sum 1.
+            sample: Reduced radii between the limits a1 and a3, with rising values.
+            weights: Other weights of the values, by the bootstrap, shape (n,), sum 1; None for
+                those of the sample.
+
+        Returns:
+            a2 and a4, 0 or more each.
         """
         cumulated = sample.cumulated
         if weights is not None:
@@ -77,6 +84,7 @@ class HermiteFit:
         best = np.asarray(np.linalg.solve(self._gram, of_sample - of_ends), float)
         if not self.is_monotone(best):
             best = self._nearest_monotone(best)
+        # Rounding may leave a slope just below 0, which no monotone map has.
         return float(max(best[0], 0)), float(max(best[1], 0))
 
     def map(self, slopes: tuple[float, float]) -> HermiteMap:
@@ -86,9 +94,12 @@ class HermiteFit:
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
         """Return the root mean square over θ of the sample's quantiles less the map.
 
+        It is in units of the reduced radius r_n.
+
         Args:
             sample: Reduced radii between the limits.
-            slopes: Slopes (a2, a4) of the map.
+            slopes: Slopes dr/dξ (a2, a4) of the map at the lower and at the upper end of θ, where ξ
+                = 0 and 1.
         """
         # Midpoints of equal probabilities: the mean over θ is the mean over them.
         probability = (np.arange(20_000) + 0.5) / 20_000
@@ -96,16 +107,17 @@ class HermiteFit:
         return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
 
     def _integrals(self, probability: Array) -> Array:
-        """Return ∫ h_i f_Θ dθ of h2 and h4 from the lower end of θ to some quantiles.
+        """Return integrals ∫ h_i f_Θ dθ from the lower end of θ to quantiles.
 
-        The moments m_k = ∫ θ^k f_Θ dθ follow from each other by partial integration. With f' = −θ f
-        of a normal density, m_k = (k − 1) m_{k−2} − [θ^{k−1} f].
+        h_i are the Hermite functions h2 and h4, which the slopes a2 and a4 multiply. The moments
+        m_k = ∫ θ^k f_Θ dθ follow from each other by partial integration. With f' = −θ f of a normal
+        density, m_k = (k − 1) m_{k−2} − [θ^{k−1} f].
 
         Args:
-            probability: Probabilities of the quantiles, shape (n,).
+            probability: Probabilities of the quantiles, in [0, 1], shape (n,).
 
         Returns:
-            Integrals of shape (2, n).
+            Integrals, shape (2, n): of h2 in the first row, of h4 in the second.
         """
         lower = self.distribution.lower
         theta = self.distribution.quantile(probability)
@@ -122,9 +134,10 @@ class HermiteFit:
 
     @cached_property
     def _hermite_at_nodes(self) -> tuple[Array, Array]:
-        """Weights (8,) of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8).
+        """Weights, shape (8,), of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8).
 
-        The rule is exact for polynomials of degree 15, and products of two cubics have degree 6.
+        h1 … h4 are the Hermite cubics of ξ in [0, 1], which runs over the support of θ. The rule is
+        exact for polynomials of degree 15, and products of two cubics have degree 6.
         """
         rule = gauss_rule(self.distribution, points=8)
         width = self.distribution.upper - self.distribution.lower
@@ -168,9 +181,11 @@ class HermiteFit:
     def _nearest_monotone(self, best: Array) -> Array:
         """Return the slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
 
-        With the Gram matrix L Lᵀ and x = Lᵀ (slopes − best) this is the shortest x with G x ≥ h, a
-        row for each ξ. It follows from a problem of non-negative least squares (least distance
-        programming: Lawson, Hanson 1974, chapter 23).
+        The distance is the root of the mean square over θ. With the Gram matrix L Lᵀ of the
+        functions that a2 and a4 multiply and x = Lᵀ (slopes − best), this is the shortest x with G
+        x ≥ h, a row for each of 401 ξ at which the slope of the map must not fall below a small
+        limit. It follows from a problem of non-negative least squares (least distance programming:
+        Lawson, Hanson 1974, chapter 23).
         """
         from scipy.optimize import nnls
 
@@ -198,8 +213,14 @@ class SlopeBand:
         """Return the largest part of the band around the fitted slopes with four monotone corners.
 
         Slopes beyond it belong to no radius map. The ends are cut at slopes from zero to three
-        times the chord's (Fritsch and Carlson 1980), and then moved towards the fitted slopes until
-        the maps at all corners rise.
+        times the chord's (Fritsch and Carlson 1980), and then moved towards the fitted slopes in
+        steps of 1/200 of the way, all together, until the maps at all corners rise.
+
+        Args:
+            fit: Fit that the band belongs to; its fitted slopes give a monotone map.
+
+        Returns:
+            New band with the same fitted slopes; without width in the worst case.
         """
         chord = fit.a3 - fit.a1
         min_end = MIN_SLOPE * chord
@@ -233,11 +254,16 @@ def slope_band(
     slopes shall lie in the band (Bonferroni), and halved again for the two sides.
 
     Args:
-        fit: Limits of the map.
-        sample: Reduced radii between the limits.
+        fit: Fit of cubic radius maps r(ξ) between two limits; their slopes dr/dξ at ξ = 0 and 1 are
+            a2 and a4.
+        sample: Reduced radii between the limits, in at least two groups.
         level: Confidence of the band in (0, 1).
-        resamples: Number of bootstrap samples.
-        generator: Source of the bootstrap samples.
+        resamples: Number of bootstrap samples, at least 2.
+        generator: Source of the bootstrap samples; its state moves on.
+
+    Returns:
+        Lower end, fitted value and upper end of a2 and of a4. The ends may be negative or belong to
+        no monotone map.
     """
     from scipy.special import stdtrit
 
@@ -272,7 +298,12 @@ class PBox:
     def bounds(self, theta: Array) -> tuple[Array, Array]:
         """Return the smallest and the largest radius at `theta`, two arrays of its shape.
 
-        The radius rises with a2 and falls with a4, since h2 is not negative and h4 not positive.
+        The radius rises with the slope a2 and falls with a4, since the Hermite function h2, which
+        a2 multiplies, is not negative and h4 not positive. So the smallest one has the lower end of
+        a2 and the upper end of a4, at all θ together.
+
+        Args:
+            theta: Values of θ in its support.
         """
         smallest = self.fit.map((self.a2.lower, self.a4.upper))
         largest = self.fit.map((self.a2.upper, self.a4.lower))
@@ -287,7 +318,11 @@ class PBox:
     def excess(self, sample: AreaWeighted) -> float:
         """Return the largest distance, a probability, of the sample's distribution from the p-box.
 
-        It is 0 where the distribution function of the sample lies inside.
+        It is 0 where the distribution function of the sample lies between the two of the p-box,
+        which are 0 below and 1 above the limits of the map.
+
+        Args:
+            sample: Reduced radii, at least one.
         """
         steps = sample.steps
         distribution = self.fit.distribution
@@ -308,16 +343,21 @@ def least_pbox(
 ) -> PBox:
     """Return the p-box of least area that contains a sample of r_n and the map fitted to it.
 
-    The supports are the solution of a linear program in their ends (a2 lower, a2 upper, a4 lower,
-    a4 upper).
+    A p-box is the region between two distribution functions: here those of the cubic maps r(θ) with
+    the smallest and with the largest radii that slopes a2 and a4 in two intervals (the supports)
+    give. The supports are the solution of a linear program in their ends.
 
     Args:
-        fit: Ends of the map and distribution of θ.
-        sample: Reduced radii within the ends.
+        fit: Ends a1 and a3 of the map, which are the limits of r_n, and distribution of θ.
+        sample: Reduced radii within the limits.
         band: Half-width of the band by which the p-box may miss the sample's distribution function,
             in probability, in [0, 1).
         required: Slopes that the supports must contain as well, as far as their maps are monotone,
             such as their bootstrap band: where data are few, the misfit alone is little fuzzy.
+
+    Returns:
+        The fit with both supports, each with the fitted slope inside. All maps at their corners
+        rise.
 
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
@@ -363,17 +403,21 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
 
     At each step of the sample's distribution function the largest radius must reach the value where
     the lower edge of the band rises, and the smallest radius must not pass the value where the
-    upper edge does.
+    upper edge does. Steps at which an edge is below 0 or above 1 give no inequality.
 
     Args:
-        fit: Ends of the map and distribution of θ.
+        fit: Ends a1 and a3 of the map and distribution of θ.
         sample: Reduced radii within the ends.
-        band: Half-width of the band.
+        band: Half-width of the band around the sample's distribution function, in probability, in
+            [0, 1).
 
     Returns:
         A of shape (inequalities, 4), for x = (a2 lower, a2 upper, a4 lower, a4 upper), and b of
         shape (inequalities,).
     """
+    # The p-box's function of the largest radius may exceed the sample's function before a step by
+    # the band, so that its quantile at this probability is the step's value or more. Likewise the
+    # function of the smallest radius may fall below the sample's function at the step.
     steps = sample.steps
     rises_in_lower_edge = steps.before + band < 1
     rises_in_upper_edge = steps.at - band > 0

@@ -39,7 +39,14 @@ class ThetaDistribution(Protocol):
 
 
 def require_distribution(distribution: object) -> None:
-    """Refuse what is no `ThetaDistribution`, as a name or a frozen distribution of SciPy."""
+    """Raise for what is no distribution of θ, such as a name or a frozen distribution of SciPy.
+
+    It must have numbers `lower` and `upper` and a function `pdf`. Whether these fit, and whether
+    there are `cdf` and `quantile`, is not looked at.
+
+    Raises:
+        RefusedError: One of the three is missing.
+    """
     has_lower = is_number(getattr(distribution, "lower", None))
     has_upper = is_number(getattr(distribution, "upper", None))
     if has_lower and has_upper and callable(getattr(distribution, "pdf", None)):
@@ -54,7 +61,7 @@ def require_distribution(distribution: object) -> None:
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support of θ that is not finite, not in order, or too narrow for its rounding.
+    """Raise for a support of θ that is not finite, not in order, or too narrow for its rounding.
 
     Its width must be 1e-4 of its larger end: then the rounding of θ, 1e-16 of the end, is 1e-12 of
     the width.
@@ -63,6 +70,9 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
         lower: Lower end of the support.
         upper: Upper end.
         unit: Magnitude that counts as an end as well, of distributions with a unit of their own.
+
+    Raises:
+        RefusedError: It is such a support.
     """
     min_width = 1e-4 * max(abs(lower), abs(upper), unit)
     is_ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
@@ -99,10 +109,13 @@ class TruncatedNormal:
         return float(self._below(self.upper))
 
     def _below(self, theta: ArrayLike) -> Array:
-        """Return the probability that the uncut normal distribution gives to [lower, theta].
+        """Return the probability that the standard normal distribution gives to [lower, theta].
 
-        It is a difference of the smaller tails, which keeps its digits: far above 0 the lower tails
-        are both nearly 1.
+        It is not divided by the probability of the support. It is a difference of the smaller
+        tails, which keeps its digits: far above 0 the lower tails are both nearly 1.
+
+        Args:
+            theta: Values in the support, any shape.
         """
         if self.lower > 0:
             return _normal(-self.lower) - _normal(-np.asarray(theta))
@@ -120,10 +133,15 @@ class TruncatedNormal:
         return np.asarray(self._below(inside) / self.mass, float)
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape.
+        """Return θ with P(Θ ≤ θ) = probability, in the shape of `probability`.
+
+        0 gives the lower and 1 the upper end of the support, but for rounding.
+
+        Args:
+            probability: Probabilities in [0, 1], any shape.
 
         Raises:
-            RefusedError: A probability is outside [0, 1].
+            RefusedError: A probability is outside [0, 1] or NaN.
         """
         from scipy.special import ndtri
 
@@ -143,10 +161,17 @@ class TruncatedNormal:
 
 
 def _normal(theta: ArrayLike) -> Array:
-    """Return the distribution function of the standard normal distribution, any shape.
+    """Return the distribution function of the standard normal distribution.
 
     SciPy has it, but takes a third of a second to be imported.
+
+    Args:
+        theta: Values in standard deviations, any shape, infinite ones too; NaN gives NaN.
+
+    Returns:
+        Probabilities, in the shape of `theta`.
     """
     values = np.asarray(theta, float)
+    # `erfc` keeps the digits of small tails, which 1 + erf would lose.
     probabilities = [erfc(-value / sqrt(2)) / 2 for value in values.ravel()]
     return np.array(probabilities).reshape(values.shape)

@@ -44,9 +44,10 @@ def _on_panels(edges: Array, rule: Rule) -> tuple[Array, Array]:
 
     Args:
         edges: Ends of the panels, rising, shape (panels + 1,).
-        rule: The rule on [−1, 1].
+        rule: Nodes and weights of the rule on [−1, 1], shape (points,) each.
     """
     x, weights = rule
+    # [−1, 1] is mapped to each panel; the derivative of the map scales the weights.
     half_width = np.diff(edges)[:, None] / 2
     return edges[:-1, None] + half_width * (1 + x), half_width * weights
 
@@ -65,16 +66,24 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
     Jacobi matrix (Golub & Welsch 1969).
 
-    The rules of distributions that are compared by value are cached.
+    Args:
+        distribution: Distribution of θ. The rules of distributions that are compared by value
+            (frozen dataclasses) are cached.
+        points: Number of nodes, at least 1.
+
+    Returns:
+        Nodes, rising, and positive weights of the sum 1, shape (points,) each, which cannot be
+        written to.
 
     Raises:
-        RefusedError: There is no point, or density and distribution function disagree.
+        RefusedError: `points` is no whole number of 1 or more, or density and distribution function
+            disagree.
 
     Example:
-        >>> from alphacut.stochastic import TruncatedNormal
-        >>> rule = gauss_rule(TruncatedNormal(), points=3)
-        >>> rule.mean(rule.nodes**2).round(4).item()
-        0.9733
+            >>> from alphacut.stochastic import TruncatedNormal
+            >>> rule = gauss_rule(TruncatedNormal(), points=3)
+            >>> rule.mean(rule.nodes**2).round(4).item()
+            0.9733
     """
     checked_number("points", points, whole=True, least=1)
     # An object that is compared by identity would keep its place in the cache for itself alone.
@@ -84,7 +93,18 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
 
 
 def _stieltjes_rule(distribution: ThetaDistribution, points: int) -> ThetaRule:
-    """Return the Gauss rule with so many points; its arrays cannot be written to."""
+    """Return the Gauss rule of the density of θ with so many points, made anew.
+
+    Args:
+        distribution: Distribution of θ.
+        points: Number of nodes, at least 1.
+
+    Returns:
+        Nodes, rising, and weights of the sum 1, shape (points,) each, which cannot be written to.
+
+    Raises:
+        RefusedError: The density is not the derivative of the distribution function.
+    """
     # A fine rule that integrates the density and polynomials of degree 2·points stands in for the
     # integral. Nodes of no weight are so far off that the polynomials overflow there.
     panels = min(math.ceil(distribution.upper - distribution.lower), 64)
@@ -124,16 +144,21 @@ _cached_rule = lru_cache(maxsize=256)(_stieltjes_rule)
 def _panel_edges(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Array:
     """Refine panels until a rule integrates the density of θ on each of them.
 
-    A panel on which the integral misses the difference of the distribution function is halved,
-    which resolves corners, jumps and narrow peaks of the density.
+    A panel on which the integral misses the difference of the distribution function is halved, at
+    most 48 times and up to some 400 panels, which resolves corners, jumps and narrow peaks of the
+    density.
 
     Args:
         distribution: Distribution of θ.
-        edges: Ends of the first panels, rising.
-        rule: The rule on [−1, 1].
+        edges: Ends of the first panels, rising, shape (panels + 1,).
+        rule: Nodes and weights of the rule on [−1, 1].
+
+    Returns:
+        Ends of the refined panels, rising.
 
     Raises:
-        RefusedError: The density is not the derivative of the distribution function.
+        RefusedError: The errors of the last panels add up to more than 1e-8 or to NaN: the density
+            is not the derivative of the distribution function.
     """
     max_halvings = 48  # of a panel; narrower ones are rounding
     max_panels = 400
@@ -166,7 +191,7 @@ def _mass_gaps(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Arr
     Args:
         distribution: Distribution of θ.
         edges: Ends of the panels, rising, shape (panels + 1,).
-        rule: The rule on [−1, 1].
+        rule: Nodes and weights of the rule on [−1, 1], shape (points,) each.
     """
     x, weights = rule
     theta, panel_weights = _on_panels(edges, rule)
@@ -180,11 +205,19 @@ def _mass_gaps(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Arr
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
-    """Interpolate values at rising nodes, both of shape (n,), at points `at` of any shape.
+    """Interpolate values at rising nodes.
 
     The polynomial through all nodes is taken if there are 10 to 40 nodes, and its Lebesgue function
-    is below 30 at the points, as for the nodes of one Gauss rule. Otherwise the interpolation is by
-    monotone cubic pieces (PCHIP), which are better with fewer nodes and safe with any others.
+    is at most 30 at the points, as for the nodes of one Gauss rule. Otherwise the interpolation is
+    by monotone cubic pieces (PCHIP), which are better with fewer nodes and safe with any others.
+
+    Args:
+        nodes: At least two rising nodes, shape (n,).
+        values: Values at the nodes, shape (n,).
+        at: Points, any shape. Beyond the nodes the interpolation is continued.
+
+    Returns:
+        Values at the points, in the shape of `at`.
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
