@@ -23,18 +23,27 @@ from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattic
 from alphacut.rve.series.means import SAFETY, finer_count
 from alphacut.stochastic import gauss_rule
 
-CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
-
 
 def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
-    """Return E_T, E_L, ν_LT, G_T, G_L and K_T of a result of round fibres.
+    """Return E_T, E_L, ν_LT, G_T, G_L and K_T of a cell with a round fibre, with their errors.
 
-    The declared errors are the largest changes of the constants over the corners of the intervals
-    of Hill's z̄, of G_T and of G_L, which their own errors give.
+    T is any direction across the fibres and L the one along them. With the plane-strain bulk
+    modulus k = K_T, l = C13 and n = C33 of the cell, E_L = n − l²/k, ν_LT = l/(2 k) and 1/E_T =
+    1/(4 G_T) + 1/(4 K_T) + ν_LT²/E_L. By Hill's relations l and n follow from k, by a number z̄
+    that is known within an interval.
+
+    The declared errors are the largest changes of the constants at the corners of the box of z̄,
+    G_T and G_L within their own errors.
+
+    Args:
+        result: Result of any model, with its cell; G_T and K_T are those of its average.
+
+    Returns:
+        Values and absolute errors by name: "E_T", "E_L", "nu_LT", "G_T", "G_L" and "K_T", moduli in
+        Pa. Errors but that of G_L are NaN if the result declares none.
 
     Raises:
-        RefusedError: The result does not come from a cell of round particles and two isotropic
-            phases.
+        RefusedError: The cell has no round particle and two isotropic phases.
     """
     cell = result.cell
     if cell is None or not cell.square:
@@ -46,6 +55,8 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
     G_T_error = float(result.error_of(result.shear_of)) / G_T
     z, lowest_z, highest_z = mixture.z_from_bulk(K_T, result.modulus_errors[0])
     values = _constants(mixture, z, K_T=K_T, G_T=G_T, G_L=G_L)
+    # To first order the constants are linear in the three numbers, so that they change most at a
+    # corner of the box.
     corners = []
     for z_end in (lowest_z, highest_z):
         for G_T_end in (G_T / (1 + G_T_error), G_T * (1 + G_T_error)):
@@ -55,7 +66,8 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
                 corners.append(corner)
     rounding = 1e-12 * np.abs(values)
     errors = np.abs(np.array(corners) - values).max(axis=0) + rounding
-    return DeclaredConstants.from_arrays(CONSTANTS, values, errors)
+    names = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
+    return DeclaredConstants.from_arrays(names, values, errors)
 
 
 def _constants(mixture: Mixture, z: float, *, K_T: float, G_T: float, G_L: float) -> Array:
@@ -68,10 +80,13 @@ def _constants(mixture: Mixture, z: float, *, K_T: float, G_T: float, G_L: float
 
 
 def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
-    """Return the mean of G_L over θ in Pa, and its declared relative error.
+    """Return the mean over θ of the shear modulus G_L along the fibres, and its relative error.
 
-    The mean is by Gauss quadrature with 32 nodes. Its error is the mean of those of G_L plus the
-    distance to two finer rules, times a safety factor.
+    The mean, in Pa, is by Gauss quadrature with 32 nodes. Its declared error is the mean of those
+    of G_L at the nodes plus 1.6 times the larger distance to two finer rules.
+
+    Args:
+        cell: Cell of a round fibre in a matrix, both isotropic.
     """
     matrix = cell.matrix
     inclusion = cell.inclusion
@@ -82,7 +97,7 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
     for _ in range(3):
         rules.append(gauss_rule(cell.radius_map.distribution, points=points))
         points = finer_count(points)
-    # the nodes of all rules at once, since one batch of small systems is faster than three
+    # The nodes of all rules are solved at once: one batch of small systems is faster than three.
     nodes = np.concatenate([rule.nodes for rule in rules])
     moduli, relative_errors = longitudinal_shear(cell.radius_map(nodes), matrix, inclusion)
     ends = np.cumsum([rule.nodes.size for rule in rules])[:-1]
@@ -94,20 +109,22 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
 
 
 def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
-    """Return the shear modulus G_L along the fibres in Pa, and its declared relative error.
+    """Return the shear modulus G_L along the fibres of a square array, and its relative error.
 
-    The number of harmonics is doubled from 4 until no modulus changes by more than 1e-12, or up to
-    128; the last change is the error.
+    The number of harmonics of Rayleigh's series (1892) is doubled from 4 until no modulus changes
+    by more than 1e-12, or up to 128; the last change is the error, plus 1e-12.
 
     Args:
-        radius: Radii over half the cell's side, in [0, 1), shape (n,).
-        matrix: Material around the fibres.
-        inclusion: Material of the fibres.
+        radius: Radii over half the cell's side, in [0, 1), shape (n,), one at least.
+        matrix: Isotropic material around the fibres.
+        inclusion: Isotropic material of the fibres.
 
     Returns:
-        Two arrays of shape (n,).
+        G_L in Pa and its relative errors, shape (n,) each. Where 128 harmonics do not suffice, for
+        fibres that nearly touch, the error says so.
     """
     tolerance = 1e-12
+    max_harmonics = 128  # more would cost their third power
     matrix_shear = float(matrix.stiffness[2, 2])
     inclusion_shear = float(inclusion.stiffness[2, 2])
     harmonics = 4
@@ -117,42 +134,47 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
         previous = moduli
         moduli = _rayleigh_moduli(radius, matrix_shear, inclusion_shear, harmonics=harmonics)
         change = np.abs(moduli / previous - 1)
-        if change.max() <= tolerance or harmonics >= MAX_HARMONICS:
+        if change.max() <= tolerance or harmonics >= max_harmonics:
             return moduli, change + tolerance
 
 
-MAX_HARMONICS = 128
-"""Largest number of harmonics for G_L; more would cost their third power."""
-
-
 def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, *, harmonics: int) -> Array:
-    """Return G_L by so many harmonics (Rayleigh 1892), in Pa, shape (n,).
+    """Return the shear modulus G_L along the fibres of a square array, by a number of harmonics.
 
-    The axial displacement outside the fibres is the real part of
-    A z + Σ_P Σ_n a_n (z − P)^-n, with odd n, over all fibres P. Its continuity, and that of the
-    traction, at the fibre at 0 give a linear system for the a_n.
+    The axial displacement outside the fibres is the real part of A z + Σ_P Σ_n a_n (z − P)^-n, with
+    odd n, over the axes P of all fibres (Rayleigh 1892). Its continuity, and that of the traction,
+    at the fibre at 0 give a linear system for the a_n.
 
     Args:
-        radius: Radii over half the cell's side, shape (n,).
+        radius: Radii over half the cell's side, in [0, 1), shape (n,).
         matrix: Shear modulus of the matrix, in Pa.
         inclusion: Shear modulus of the fibres, in Pa.
-        harmonics: Number of unknown a_n.
+        harmonics: Number of unknown a_n, for n = 1, 3, 5, ….
+
+    Returns:
+        Moduli in Pa, shape (n,).
     """
     images = _image_couplings(harmonics)
-    # with unknowns scaled by r^n / A, so that the system has entries of order one
+    # Unknowns are scaled by r^n / A, so that the system has entries of order one for any order n.
     scale = radius[:, None] ** (2 * np.arange(harmonics) + 1)
     contrast = (matrix - inclusion) / (matrix + inclusion)
     system = np.eye(harmonics) - contrast * images * scale[:, :, None] * scale[:, None, :]
     source = np.zeros((radius.size, harmonics, 1))
     source[:, 0, 0] = contrast * radius
     dipole = np.linalg.solve(system, source)[:, 0, 0]  # a_1
-    # the images' sum jumps across the cell by this; it is part of the mean strain
+    # The sum over the images, Weierstrass' ζ, is not periodic: it jumps across the cell by this
+    # (Legendre's relation), which is part of the mean strain.
     jump = ZETA_PERIOD * radius * dipole
     return np.asarray(matrix * (1 - jump) / (1 + jump))
 
 
 @cache
 def _image_couplings(harmonics: int) -> Array:
-    """Return what the a_n of all images add to the Taylor coefficients at 0, for odd orders."""
+    """Return what unit a_n of all images add to the Taylor coefficients at 0, for odd orders.
+
+    Rows are the orders k = 1, 3, … of the coefficients and columns the n = 1, 3, … of the a_n,
+    shape (harmonics, harmonics). The lattice has the period 2.
+    """
     orders = 2 * np.arange(harmonics) + 1
-    return lattice_images(lattice_sums(4 * MAX_HARMONICS).plain, orders, orders)
+    # Two orders add up to 4 · harmonics − 2 at most.
+    return lattice_images(lattice_sums(4 * harmonics).plain, orders, orders)

@@ -35,10 +35,11 @@ class LatticeSums:
 
     @cached_property
     def natanzon_period(self) -> float:
-        """Constant g in Q(z + P) − Q(z) = conj(P) ℘(z) + g P, Q Natanzon's function.
+        """Constant g in the jump Q(z + P) − Q(z) = conj(P) ℘(z) + g P of Natanzon's function Q.
 
-        It follows at z = −1 with P = 2, since Q is odd and Weierstrass' ℘ is even:
-        2 Q(1) = 2 ℘(1) + 2 g.
+        Q is Σ_P conj(P) [(z − P)^-2 − P^-2 − 2 z P^-3] over the images P ≠ 0, ℘ Weierstrass'
+        function, and P in the jump any period. The constant follows at z = −1 with P = 2, since Q
+        is odd and ℘ is even: 2 Q(1) = 2 ℘(1) + 2 g.
         """
         n = np.arange(2, len(self.plain))
         half = 0.5**n
@@ -49,11 +50,20 @@ class LatticeSums:
 
 @cache
 def lattice_sums(highest: int) -> LatticeSums:
-    """Return Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for all n up to `highest`.
+    """Return Σ p^-n and Σ conj(p) p^-n over all p = m + i j ≠ 0 with integers m and j.
 
     Sums of n < 40 follow from Riemann's ζ and Lipschitz' formula, in rows of the lattice: with
     conj(p) = p − 2 i j, the sum Σ p^(1−n) vanishes in the second family. For larger n the points
     near 0 are enough.
+
+    Args:
+        highest: Largest exponent n.
+
+    Returns:
+        `plain`, Σ p^-n, and `conjugate`, Σ conj(p) p^-n, at the index n, shape (highest + 1,) each.
+        Both are real. By symmetry they vanish but for n = 4, 8, … and n = 7, 11, …; n = 3 of the
+        second one, which converges conditionally, is set to 0. Equal arguments give the same
+        arrays, which must not be changed.
     """
     plain = np.zeros(highest + 1)
     conjugate = np.zeros(highest + 1)
@@ -71,22 +81,25 @@ def lattice_sums(highest: int) -> LatticeSums:
 
 
 def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
-    """Return Taylor coefficients at 0 of Σ (z − P)^-n over all images P ≠ 0.
+    """Return Taylor coefficients at 0 of Σ_P (z − P)^-n over all periodic images P ≠ 0.
 
-    For odd n the coefficient of z^k is −binomial(n + k − 1, k) Σ P^(−n−k), with P = 2 p.
+    For odd n the coefficient of z^k is −binomial(n + k − 1, k) Σ P^(−n−k), with P = 2 p and p over
+    the integer lattice.
 
     Args:
-        sums: `LatticeSums.plain`. With `LatticeSums.conjugate` and even n the result is that of
-            Σ conj(P)/2 (z − P)^-n, with the opposite sign.
-        k: Orders of the coefficients.
-        n: Orders n.
+        sums: Σ p^-N by its exponent N, shape (max(k) + max(n) + 1 or more,). With Σ conj(p) p^-N in
+            its place and even n the result is that of Σ conj(P)/2 (z − P)^-n, with the opposite
+            sign.
+        k: Orders of the coefficients, at least 0, shape (K,).
+        n: Orders n, at least 1, shape (N,).
 
     Returns:
-        Shape (len(k), len(n)).
+        Coefficients, shape (K, N).
     """
     k = k[:, None]
     n = n[None, :]
-    # ln Γ by the standard library: SciPy's functions take .12 s to import, a tenth of a sample
+    # ln Γ at whole numbers by the standard library: SciPy's functions take .12 s to import, a tenth
+    # of the time of a sample. Logarithms keep binomials of hundreds within range.
     log_gamma = np.array([0.0] + [lgamma(x) for x in range(1, int(n.max() + k.max()) + 2)])
     log_binomial = log_gamma[n + k] - log_gamma[n] - log_gamma[k + 1]
     return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums[n + k])
@@ -116,10 +129,14 @@ def _lipschitz(n: int, power: int) -> float:
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:
-    """Return Σ p^-n, or Σ conj(p) p^-n, over all lattice points p = m + i j ≠ 0, for n ≥ 40.
+    """Return Σ p^-n, or Σ conj(p) p^-n, over all lattice points p = m + i j ≠ 0, for large n.
 
     Points with |m| ≤ 2 and |j| ≤ 2 are enough. Each of the 8 k points with max(|m|, |j|) = k adds
     at most k^(1 − n), so that all with k ≥ 3 add less than 8 Σ k^-38 < 6e-18 to a sum of about 4.
+
+    Args:
+        n: Exponent, at least 40.
+        conjugate: Whether the terms have the factor conj(p).
     """
     m = np.arange(-2.0, 3.0)
     p = (m[:, np.newaxis] + 1j * m).ravel()

@@ -70,7 +70,7 @@ class CellModuli:
     @property
     def matrix(self) -> Array:
         """Stiffness matrices in Pa, shape (n, m, 3, 3) of plane cells, else (n, m, 6, 6)."""
-        return self.voigt(*np.moveaxis(self.moduli, -1, 0))
+        return self.voigt(self.moduli[..., 0], self.moduli[..., 1], self.moduli[..., 2])
 
 
 def _error_terms(terms: int) -> tuple[int, int]:
@@ -187,18 +187,20 @@ class Series:
         return CellModuli(moduli, errors, terms, self.voigt)
 
     def solve(self, radius: Array, materials: Sequence[Material], terms: int) -> Array:
-        """Return the moduli by so many terms, in batches that keep the matrices small.
+        """Return the moduli of cells by a number of terms, in batches that keep the matrices small.
 
         Args:
-            radius: Reduced radii, shape (n,).
-            materials: Matrix, then m inclusions.
-            terms: Number of terms.
+            radius: Radii over half the cell's side, shape (n,), one at least.
+            materials: Matrix, then m inclusions, one at least.
+            terms: Number of terms of the series.
 
         Returns:
-            Shape (n, m, 3), in Pa.
+            Three moduli of each cell in Pa, shape (n, m, 3): of plane cells C11 + C12, C11 − C12
+            and C33, in space K, (C11 − C12)/2 and C44. They are complex if a material is.
         """
-        entries_of_batch = 2_000_000
+        entries_of_batch = 2_000_000  # 16 MB of real numbers
         entries = radius.size * (len(materials) - 1) * self.unknowns(terms) ** 2
+        # The quotient is rounded up. No batch is empty, since there are at most as many as radii.
         batches = np.array_split(radius, min(radius.size, -(-entries // entries_of_batch)))
         return np.concatenate([self.moduli(batch, materials, terms) for batch in batches])
 
@@ -230,18 +232,26 @@ def converged_means(
 ) -> list[Mean]:
     """Return means over θ for each inclusion, by Gauss rules that are refined until they converge.
 
-    The declared error of a rule is its distance from two finer rules, times `SAFETY`. Each
-    inclusion has the first rule that is accurate enough for it, whatever the others need.
+    The declared error of a rule is its distance from two finer rules, times 1.6. Each inclusion has
+    the first rule that is accurate enough for it, whatever the others need.
 
     Args:
-        radius_map: Radius of the particle over θ.
-        cells: Function that returns the moduli at n radii for m inclusions.
-        points: Number of nodes of the rule; None for as many as the accuracy demands.
+        radius_map: Radius of the particle over θ, in halves of the cell's side.
+        cells: Function that returns the three moduli of cells at n radii for m inclusions, shape
+            (n, m, 3), with their errors and numbers of terms.
+        points: Number of nodes of the rule, whatever its error; None for as many as the accuracy
+            demands.
         accuracy: Relative error allowed for every mean modulus.
+
+    Returns:
+        For each inclusion `curve`, its stiffness at the nodes; `errors`, the declared relative
+        errors of the mean moduli by "space" (the series) and "theta" (the rule), shape (3,) each;
+        and `terms`, those of the series at the nodes.
 
     Raises:
         RuleError: No rule of up to 1200 nodes converges.
-        RefusedError: The radius jumps.
+        RefusedError: The radius jumps, or lies outside [0, 1).
+        SeriesError: The series does not converge at some radius, since particles nearly touch.
     """
     most_points = 1200
     rounding = 1e-13  # of a mean over θ
@@ -252,7 +262,7 @@ def converged_means(
     means: dict[int, Mean] = {}
     while True:
         counts = [count, finer_count(count), finer_count(finer_count(count))]
-        # each finer rule is the first one of the next round, so that none is solved twice
+        # Each finer rule is the first one of the next round, so that none is solved twice.
         for n in counts:
             if n not in solved:
                 rule = gauss_rule(distribution, points=n)
@@ -264,7 +274,9 @@ def converged_means(
             mean_modulus = rule.mean(of_rule.moduli)
             mean_moduli.append(mean_modulus)
             truncation_errors.append(rule.mean(of_rule.moduli * of_rule.errors) / mean_modulus)
-        errors = SAFETY * _largest_distance(*mean_moduli) + rounding
+        coarse_mean, finer_mean, finest_mean = mean_moduli
+        distance = _largest_distance(coarse_mean, finer_mean, finest_mean)
+        errors = SAFETY * distance + rounding
         rule, coarse = solved[count]
         for k in range(len(errors)):
             if k not in means and (points or errors[k].max() <= accuracy):
@@ -288,22 +300,28 @@ def finer_count(count: int) -> int:
 
 
 def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
-    """Return the mean parts of the moduli over θ that belong to K and G of each phase.
+    """Return the parts of the mean moduli over θ that belong to K and G of each phase.
 
     The part of a modulus c that belongs to a phase modulus X is X ∂c/∂X (Euler's theorem: c is
     homogeneous of degree 1 in all X). Derivatives are by complex steps of the series. Errors are
-    the distances from the means by two finer rules with more terms, times `SAFETY`.
+    the distances from the means by two finer rules with more terms, times 1.6.
 
     Args:
-        series: The series.
-        cell: Matrix, particle and radius map.
-        mean: What `converged_means` returned for this particle.
+        series: The multipole series of the kind of cell.
+        cell: Isotropic matrix and particle, and radius map.
+        mean: What `converged_means` returned for this particle: nodes, weights and numbers of
+            terms.
+
+    Returns:
+        `values` and their absolute `errors` in Pa, shape (phases, K and G, 3 moduli), matrix first;
+        and `moduli_at`, the function from complex K and G of the phases, shape (2,) each, to the
+        three mean moduli.
     """
     rule = ThetaRule(mean.curve.theta, mean.curve.weights)
     values = _rule_energies(series, cell, rule, mean.terms)
     node_radii = cell.radius_map(rule.nodes)
     order = np.argsort(node_radii)
-    # larger radii never need fewer terms, whatever single nodes happened to need
+    # Larger radii never need fewer terms, whatever single nodes happened to need.
     rising_terms = np.maximum.accumulate(mean.terms[order])
     distances = []
     finer = rule
@@ -322,19 +340,22 @@ def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Ints) -> 
     """Return the parts X ∂c/∂X of mean moduli c by one quadrature rule.
 
     Args:
-        series: The series.
-        cell: Matrix, particle and radius map.
+        series: The multipole series of the kind of cell.
+        cell: Isotropic matrix and particle, and radius map.
         rule: The rule, with n nodes.
         terms: Number of terms of the series at each node, shape (n,).
 
     Returns:
-        Shape (phases, K and G, 3 moduli), in Pa; the matrix comes first.
+        Parts in Pa for X = K and G of each phase, matrix first, shape (phases, K and G, 3 moduli).
+        The moduli are C11 + C12, C11 − C12 and C33 of plane cells, and K, (C11 − C12)/2 and C44 in
+        space.
     """
     moduli = np.array([phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)])
     energies = np.zeros((2, 2, 3))
     for phase in range(2):
         for kind in range(2):
-            # Im c(X (1 + iε)) / ε is X ∂c/∂X to rounding, without differences that cancel
+            # Im c(X (1 + i h)) / h is X ∂c/∂X to rounding for a small h: the series takes complex
+            # moduli, and no difference of nearly equal numbers cancels.
             stepped = moduli.astype(complex)
             stepped[phase, kind] *= 1 + 1j * STEP
             bulk, shear = stepped.T
@@ -346,15 +367,24 @@ def _rule_energies(series: Series, cell: Cell, rule: ThetaRule, terms: Ints) -> 
 def _mean_moduli(
     series: Series, cell: Cell, rule: ThetaRule, terms: Ints, bulk: Array, shear: Array
 ) -> Array:
-    """Return mean moduli over θ, shape (3,), for complex moduli of the phases.
+    """Return mean moduli over θ by one quadrature rule, for complex moduli of the phases.
 
-    `bulk` and `shear` are K and G of matrix and particle, shape (2,); other arguments are as for
-    `_rule_energies`.
+    Args:
+        series: The multipole series of the kind of cell.
+        cell: Cell whose radius map is used.
+        rule: The rule, with n nodes.
+        terms: Number of terms of the series at each node, shape (n,).
+        bulk: Complex bulk modulus K, of three dimensions, of matrix and particle in Pa, shape (2,).
+        shear: Complex shear modulus G of both in Pa, shape (2,).
+
+    Returns:
+        Complex means in Pa, shape (3,): C11 + C12, C11 − C12 and C33 of plane cells, and K, (C11 −
+        C12)/2 and C44 in space.
     """
     radii = cell.radius_map(rule.nodes)
     total = np.zeros(3, complex)
     materials = [ComplexMaterial(moduli) for moduli in zip(bulk, shear, strict=True)]
-    # nodes with equally many terms are one batch
+    # Nodes with equally many terms are solved as one batch.
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)
         total += rule.weights[nodes] @ series.solve(radii[nodes], materials, int(count))[:, 0]

@@ -38,16 +38,14 @@ from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
+from alphacut.rve.series.lattice_sums import (
+    ZETA_PERIOD,
+    LatticeSums,
+    lattice_images,
+    lattice_sums,
+)
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
 from alphacut.stochastic import RadiusMap
-
-MAX_HARMONICS = 160
-"""Largest number of harmonics of each potential and load; it reaches reduced radii of .999."""
-HIGHEST_SUM = 12 * MAX_HARMONICS + 8
-"""Highest order of the lattice sums that couple so many harmonics."""
-LOADS = ("hydrostatic", "deviator", "shear")
-MAX_ACCURACY = 0.1
 
 
 @dataclass(frozen=True)
@@ -70,11 +68,24 @@ class Contrast:
 
     @classmethod
     def of_materials(cls, materials: Sequence[Material]) -> Contrast:
-        """Return the factors for the materials of the matrix and of m inclusions, in this order."""
-        kappa, *inclusion_kappas = (3 - 4 * material.poisson for material in materials)
-        mu, *inclusion_mus = (material.bulk_and_shear[1] for material in materials)
-        kappa_i = np.array(inclusion_kappas)
-        ratio = mu / np.array(inclusion_mus)
+        """Return the factors of the interface conditions for a matrix and m inclusions.
+
+        With κ = 3 − 4ν and λ the shear modulus of the matrix over that of the inclusion they are
+        outer = (1 − λ)/(κ + λ), inner = (κ − λκ_i)/(1 + λκ_i) and swelling = 2 [(κ − 1) − λ(κ_i −
+        1)]/[2 + λ(κ_i − 1)].
+
+        Args:
+            materials: Matrix first, then the inclusions; their shear moduli are not 0.
+
+        Returns:
+            κ and the shear modulus μ in Pa of the matrix, and the three factors, shape (m,) each.
+        """
+        kappas = [3 - 4 * material.poisson for material in materials]
+        shear_moduli = [material.bulk_and_shear[1] for material in materials]
+        kappa = kappas[0]
+        mu = shear_moduli[0]
+        kappa_i = np.array(kappas[1:])
+        ratio = mu / np.array(shear_moduli[1:])
         return cls(
             kappa,
             mu,
@@ -106,10 +117,32 @@ class Family:
     b_to_q: Array
 
 
+def _sums() -> LatticeSums:
+    """Return the lattice sums up to the highest order that couples all harmonics of `CIRCLES`."""
+    # With N harmonics the orders of the coefficients are below 4 N. Couplings take the sums of two
+    # of them, up to 8 N; more cost nothing that matters.
+    return lattice_sums(12 * CIRCLES.steps[-1] + 8)
+
+
 @cache
 def family(harmonics: int, *, hydrostatic: bool) -> Family:
-    """Return the first so many harmonics of a hydrostatic or of a deviatoric load."""
-    sums = lattice_sums(HIGHEST_SUM)
+    """Return the first harmonics of a hydrostatic or of a deviatoric load, and their couplings.
+
+    The potentials of plane elasticity, φ = A z + Σ_P Σ_n a_n (z − P)^-n and ψ likewise with b_n and
+    n a_n conj(P) (z − P)^(-n-1), have poles at all particles P. By the symmetry of the square only
+    every fourth order n is excited.
+
+    Args:
+        harmonics: Number N of the a_n, and of the b_n, up to 160.
+        hydrostatic: Whether the load is hydrostatic (a_3, a_7, …, b_1, b_5, …); else it is one of
+            the two deviatoric ones (a_1, a_5, …, b_3, b_7, …).
+
+    Returns:
+        Orders `a` and `b`, shape (N,), and, at radius 1, what unit coefficients of all images add
+        to the Taylor coefficients p of φ and q of ψ at 0, shape (N, N): `to_p`, `to_next` (of
+        p_{k+2} times k + 2), `a_to_q` and `b_to_q`. Equal arguments give the same object.
+    """
+    sums = _sums()
     ones = 4 * np.arange(harmonics) + 1
     threes = 4 * np.arange(harmonics) + 3
     a = ones
@@ -132,15 +165,20 @@ def _system(
 ) -> tuple[Array, Array]:
     """Return the linear systems for the coefficients a_n, from which the b_n are eliminated.
 
+    With the Taylor coefficients p_k of φ and q_k of ψ that all images cause, and conjugates *, the
+    conditions at the interface are a_n = outer [(n + 2) p*_{n+2} + q*_n], b_n = inner p*_n + (n −
+    2) a_{n-2} for n ≥ 2, and b_1 = swelling Re p_1.
+
     Args:
-        orders: The N harmonics of the load.
-        radius: Reduced radii, shape (n,).
-        contrast: Factors of m inclusions.
+        orders: The N harmonics of the load, and their couplings at radius 1.
+        radius: Radii over half the cell's side, shape (n,).
+        contrast: The factors outer, inner and swelling of m inclusions, shape (m,) each.
         mirror: 1 if the coefficients are real, −1 if they are imaginary, which reverses the sign of
             conjugates.
 
     Returns:
-        Matrices, shape (n, m, N, N), and right-hand sides, shape (n, m, N).
+        Matrices, shape (n, m, N, N), and right-hand sides for a unit load, shape (n, m, N).
+        Unknowns are scaled by powers of the radius, so that entries stay of order one.
     """
     r_a = radius[:, None] ** orders.a
     r_b = radius[:, None] ** orders.b
@@ -149,7 +187,8 @@ def _system(
     a_to_q = orders.a_to_q * r_a[:, :, None] * r_a[:, None, :]
     b_to_q = orders.b_to_q * r_a[:, :, None] * r_b[:, None, :]
     is_deviatoric = orders.a[0] == 1
-    # q by the term (n − 2) a_{n-2} of b_n
+    # What the term (n − 2) a_{n-2} of b_n adds to q. The orders b − 2 are those of a, shifted by
+    # one for the hydrostatic load, whose b_1 has no such term.
     by_shift = np.zeros_like(b_to_q)
     if is_deviatoric:
         by_shift = b_to_q * (orders.b - 2)
@@ -163,7 +202,7 @@ def _system(
     if is_deviatoric:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
     else:
-        # b_1 has the factor `swelling` in place of `inner`
+        # b_1 has the factor `swelling` in place of `inner`, and is what the load itself excites.
         b1_to_q = b_to_q[:, None, :, 0]
         to_p1 = to_p[:, None, :1, :]
         excess = (contrast.swelling - contrast.inner)[:, None, None]
@@ -174,24 +213,23 @@ def _system(
 
 
 def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int) -> Array:
-    """Return C11 + C12, C11 − C12 or C33, which the load determines, in Pa.
+    """Return the plane modulus that a load determines, in Pa, shape (n, m).
 
-    The mean strain and the mean stress follow from the jumps across the cell of 2μu and of the
-    resultant force φ + z conj(φ') + conj(ψ).
+    The mean strain and the mean stress follow from the jumps across the cell of the displacement
+    2μu and of the resultant force φ + z conj(φ') + conj(ψ).
 
     Args:
-        load: "hydrostatic", "deviator" or "shear".
-        radius: Reduced radii, shape (n,).
-        contrast: Factors of m inclusions.
-        harmonics: Number of harmonics.
-
-    Returns:
-        Shape (n, m).
+        load: "hydrostatic" for C11 + C12, "deviator" for C11 − C12, or "shear" for C33.
+        radius: Radii over half the cell's side, in [0, 1), shape (n,).
+        contrast: Factors of the interface conditions of m inclusions.
+        harmonics: Number of harmonics of each potential, up to 160.
     """
     orders = family(harmonics, hydrostatic=load == "hydrostatic")
+    # The coefficients are real for loads that are symmetric about the x axis, and imaginary for
+    # shear, which is antisymmetric.
     mirror = 1.0
     if load == "shear":
-        mirror = -1.0  # its a_n are imaginary
+        mirror = -1.0
     matrices, sources = _system(orders, radius, contrast, mirror=mirror)
     a = np.linalg.solve(matrices, sources[..., None])[..., 0]  # scaled by rⁿ, shape (n, m, N)
     r = radius[:, None]
@@ -203,32 +241,33 @@ def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int
         jump = ZETA_PERIOD * r * b_1  # of ψ across the cell
         return np.asarray(mu * (4 + 2 * jump) / (kappa - 1 - jump))
     jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
-    natanzon_jump = lattice_sums(HIGHEST_SUM).natanzon_period * r * a[..., 0]
+    natanzon_jump = _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
         return np.asarray(2 * mu * (1 + natanzon_jump + jump) / (1 + natanzon_jump - kappa * jump))
     return np.asarray(mu * (1 + natanzon_jump - jump) / (1 + natanzon_jump + kappa * jump))
 
 
 def plane_moduli(radius: Array, materials: Sequence[Material], harmonics: int) -> Array:
-    """Return C11 + C12, C11 − C12 and C33 of square cells, in Pa.
+    """Return C11 + C12, C11 − C12 and C33 of square cells with a round particle, in plane strain.
 
     Args:
-        radius: Reduced radii, shape (n,).
-        materials: Matrix, then m inclusions.
-        harmonics: Number of harmonics of each potential and load.
+        radius: Radii over half the cell's side, in [0, 1), shape (n,).
+        materials: Matrix, then m inclusions, with real or complex moduli.
+        harmonics: Number of harmonics of each potential and load, up to 160.
 
     Returns:
-        Shape (n, m, 3).
+        Moduli in Pa, shape (n, m, 3).
     """
     contrast = Contrast.of_materials(materials)
-    columns = [modulus_of_load(load, radius, contrast, harmonics) for load in LOADS]
+    loads = ("hydrostatic", "deviator", "shear")
+    columns = [modulus_of_load(load, radius, contrast, harmonics) for load in loads]
     return np.stack(columns, axis=-1)
 
 
 CIRCLES = Series(
     moduli=plane_moduli,
     voigt=square_voigt,
-    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, MAX_HARMONICS),
+    steps=(3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64, 96, 128, 160),  # reaches radii of .999
     decay=8.0,
     start=1.0,
     unknowns=int,
@@ -268,23 +307,34 @@ class SeriesModel(AnyModel):
     convention: ClassVar[str] = AVERAGES[AXES]
     is_exact: ClassVar[bool] = True
     MIN_ACCURACY: ClassVar[float] = 1e-12
+    MAX_ACCURACY: ClassVar[float] = 0.1
     DEFAULT_TOLERANCE: ClassVar[float | None] = None
     series: ClassVar[Series] = CIRCLES
 
     def __post_init__(self) -> None:
         require_points(self.points)
         accuracy = self.accuracy
-        if not (is_number(accuracy) and self.MIN_ACCURACY <= accuracy <= MAX_ACCURACY):
-            allowed = f"values in [{self.MIN_ACCURACY:g}, {MAX_ACCURACY:g}]"
+        if not (is_number(accuracy) and self.MIN_ACCURACY <= accuracy <= self.MAX_ACCURACY):
+            allowed = f"values in [{self.MIN_ACCURACY:g}, {self.MAX_ACCURACY:g}]"
             raise RefusedError("the accuracy of the series", repr(accuracy), allowed)
 
     @classmethod
     def with_resolution(cls, resolution: Resolution) -> Self:
-        """Return the model for a tolerance of E; see `CellModel`."""
+        """Return the model whose E has at most the relative error that a resolution allows.
+
+        Args:
+            resolution: Its `tolerance` of E (None for `DEFAULT_TOLERANCE` of the class; if that is
+                None too, for the default accuracy) and whether strain `energies` of the phases are
+                wanted; all else concerns other models.
+
+        Raises:
+            RefusedError: The tolerance is so large that the accuracy would be above 0.1.
+        """
         tolerance = resolution.tolerance or cls.DEFAULT_TOLERANCE
         if tolerance is None:
             return cls(energies=resolution.energies)
-        # .4 of it for the series at each θ and .4 for the quadrature leave some for their sum
+        # The errors of the series at each θ and of the quadrature add up: .4 of the tolerance for
+        # each leaves some for terms of second order.
         accuracy = max(0.4 * tolerance, cls.MIN_ACCURACY)
         return cls(accuracy=accuracy, energies=resolution.energies)
 
@@ -294,7 +344,7 @@ class SeriesModel(AnyModel):
 
     def coarser(self) -> Self:
         """Return the model with 100 times the error, by which declared errors are tested."""
-        return replace(self, accuracy=min(100.0 * self.accuracy, MAX_ACCURACY))
+        return replace(self, accuracy=min(100.0 * self.accuracy, self.MAX_ACCURACY))
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -302,14 +352,21 @@ class SeriesModel(AnyModel):
         """Return the homogenised stiffness for each of the inclusions, in their order.
 
         Args:
-            radius_map: Radius of the particle over θ.
-            matrix: Material around the particle.
-            inclusions: Materials of the particle.
+            radius_map: Radius of the particle over θ, in halves of the cell's side.
+            matrix: Isotropic material around the particle.
+            inclusions: Isotropic materials of the particle, which is solved with each.
+
+        Returns:
+            Results with declared errors by "space" (series) and "theta" (quadrature), checks
+            against classical bounds, and the wall time of all together. Strain energies of the
+            phases are there if `self.energies` is set or a phase has a loss factor.
 
         Raises:
             SeriesError: Particles nearly touch.
             RuleError: No quadrature rule converges, since the radius map is not smooth.
-            RefusedError: An argument is not what it should be.
+            RefusedError: A phase is not isotropic, there is no inclusion, or the radius lies
+                outside [0, 1) or jumps.
+            CertificateError: A result violates a bound by more than its declared error.
         """
         require_solve_arguments(radius_map, matrix, inclusions)
         start = perf_counter()

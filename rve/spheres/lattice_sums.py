@@ -22,12 +22,15 @@ from alphacut.base.arrays import Array
 
 
 def harmonics(points: Array, highest: int, order: int) -> Array:
-    """Return the real parts of Racah's C_n^m of the directions of points, m being `order`.
+    """Return Re C_n^m of Racah's spherical harmonics in the directions of points, for one order m.
+
+    C_n^m = [(n − m)!/(n + m)!]^½ P_n^m(cos θ) exp(imφ), with the sign (−1)^m of Condon and
+    Shortley.
 
     Args:
-        points: Points other than the origin, shape (k, 3).
+        points: Cartesian coordinates other than the origin, shape (k, 3).
         highest: Highest degree n.
-        order: Order m.
+        order: Order m, at least 0.
 
     Returns:
         Values for n = 0 … `highest`, shape (highest + 1, k); zero where n < m.
@@ -62,14 +65,25 @@ class LatticeSums(NamedTuple):
 
 @cache
 def lattice_sums(highest: int) -> LatticeSums:
-    """Return the sums S_n^m and D_n^m up to a degree.
+    """Return sums of spherical harmonics over the points p of the integer lattice, but the origin.
 
-    By symmetry only even n ≥ 4 and orders that are multiples of 4 are not zero. The sums of degree
-    0 diverge and are left out.
+    With Racah's C_n^m = [(n − m)!/(n + m)!]^½ P_n^m(cos θ) exp(imφ) they are S_n^m = Σ C_n^m(p)
+    |p|^(−n−1) and D_n^m = Σ C_n^m(p) |p|^(1−n).
+
+    Args:
+        highest: Highest degree n.
+
+    Returns:
+        `harmonic`, S, and `biharmonic`, D, at the indices [n, m], shape (highest + 1, highest + 1).
+        By symmetry only even n ≥ 4 and orders that are multiples of 4 are not zero; n = 0, whose
+        sums diverge, is set to zero. Equal arguments give the same arrays, which must not be
+        changed.
     """
     shape = highest + 1, highest + 1
     sums = LatticeSums(np.zeros(shape), np.zeros(shape))
-    reach = 4  # of Ewald's sums: exp(−π 17) is the first term left out
+    # Ewald's sums fall like exp(−π |p|²). With all |p|² ≤ 20 the first term left out is exp(−21 π),
+    # or 2e-29.
+    reach = 4
     axis = np.arange(-reach, reach + 1.0)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     square = (points**2).sum(axis=1)
@@ -83,19 +97,23 @@ def lattice_sums(highest: int) -> LatticeSums:
 
 
 def _epstein(angular: Array, points: Array, n: int, *, power: int) -> float:
-    """Return Σ C_n^m(p) |p|^(−n − power) over the lattice, by Ewald's split.
+    """Return Σ C_n^m(p) |p|^(−n − power) over the points p ≠ 0 of the integer lattice.
+
+    The sum is an Epstein zeta function; Ewald's split of the theta function makes it a sum over the
+    lattice and one over its reciprocal, which is the lattice itself, both of which fall like exp(−π
+    |p|²).
 
     Args:
-        angular: C_n^m at lattice points near the origin.
-        points: These points.
-        n: Degree.
-        power: 1 or −1.
+        angular: C_n^m at the k lattice points near the origin, shape (k,).
+        points: These points, shape (k, 3).
+        n: Degree of the harmonic, even and at least 4.
+        power: 1 for harmonic multipoles, −1 for biharmonic ones.
     """
     square = (points**2).sum(axis=1)
     s = n + power / 2
     x = np.pi * square
     direct = angular @ (square ** (-(n + power) / 2) * gammaincc(s, x))
-    # the reciprocal lattice is the lattice itself: Γ(1, x)/x or Γ(2, x)/x²
+    # Incomplete gamma functions of the sum over the reciprocal lattice: Γ(1, x)/x or Γ(2, x)/x².
     gamma = np.exp(-x) * (1 / x if power == 1 else (1 + x) / x**2)
     scale = (-1) ** (n // 2) * np.exp(s * np.log(np.pi) - gammaln(s))
     return float(direct + scale * (angular * square ** (n / 2)) @ gamma)

@@ -17,21 +17,25 @@ from alphacut.rve.spheres.result import HILL, HomogenisedSpheres, cubic_voigt, s
 
 
 def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> Array:
-    """Return K, (C11 − C12)/2 and C44 of n cubic cells times m spheres, (n, m, 3), in Pa.
+    """Return K, (C11 − C12)/2 and C44 of cubic cells with a sphere at the centre.
 
-    They are the matrix's less the mean dipole stress.
+    They are the matrix's less the mean dipole stress, which the spheres add at a given mean strain.
 
     Args:
-        radius: Radii over half the cell's side, shape (n,).
-        materials: Materials of the matrix and of m spheres.
-        degree: Highest degree of the multipoles.
+        radius: Radii over half the cell's side, in [0, 1), shape (n,).
+        materials: Materials of the matrix and of m spheres, with real or complex moduli.
+        degree: Highest degree of the multipoles, at least 4.
+
+    Returns:
+        Moduli in Pa, shape (n, m, 3).
     """
     matrix, *spheres = materials
     bulk, mu = matrix.bulk_and_shear
     nu = matrix.poisson
     axial = _dipoles(radius, matrix, spheres, degree, shear=False)
     shear = _dipoles(radius, matrix, spheres, degree, shear=True)
-    # of hydrostatic and of tetragonal strain, (n, m, 2); the former in the latter's scale
+    # Dipoles of hydrostatic and of tetragonal strain, (n, m, 2); the former are put into the scale
+    # of the latter. Those of shear are the third column.
     dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
     scale = 8 * np.pi * mu * (1 - nu) * radius[:, np.newaxis] ** 3 / VOLUME
     return np.asarray(np.array([bulk, mu, mu]) - scale[..., np.newaxis] * dipoles)
@@ -86,7 +90,21 @@ class _Load(NamedTuple):
 
 
 def _loads(poles: Multipoles, poisson: complex, *, shear: bool) -> list[_Load]:
-    """Return the shear ε12, or the hydrostatic and the tetragonal strain."""
+    """Return the uniform strains at infinity whose responses give the moduli.
+
+    Each is a regular solution of Navier's equation, of one multipole. They are numbered by kind as
+    by Kushch (2013): 1 is the gradient of a harmonic, 2 torsional, 3 the one with dilatation.
+
+    Args:
+        poles: The multipoles that the loads excite, in which indices are counted.
+        poisson: Poisson's ratio of the matrix.
+        shear: Whether the load is the shear ε12 alone; else the loads are the hydrostatic and the
+            tetragonal strain, in this order.
+
+    Returns:
+        For each load `far_field`, the index of the regular multipole that it is, its `amplitude` at
+        unit strain, and `dipole`, the index of the singular multipole that gives the mean stress.
+    """
     order = 2 if shear else 0
     deviatoric = _Load(poles.index_of(1, 2, order), 1.0, poles.index_of(3, 2, order))
     if shear:
@@ -104,11 +122,12 @@ def _dipoles(
     C x of all images, and the T-matrix T of the sphere.
 
     Args:
-        radius: Radii over half the cell's side, shape (n,).
+        radius: Radii r over half the cell's side, in [0, 1), shape (n,).
         matrix: Material outside the spheres.
         inclusions: Materials of the spheres, m of them.
-        degree: Highest degree of the multipoles.
-        shear: Whether the load is ε12, else the loads are hydrostatic and tetragonal strain.
+        degree: Highest degree of the multipoles, at least 4.
+        shear: Whether the load is ε12, so that there is 1; else the 2 loads are hydrostatic and
+            tetragonal strain.
     """
     poles = Multipoles.up_to(degree, shear=shear)
     loads = _loads(poles, matrix.poisson, shear=shear)
@@ -118,7 +137,8 @@ def _dipoles(
     singular_scale = radius[:, np.newaxis] ** (poles.n + 3 - poles.kind)
     images = couplings(degree, matrix.poisson, shear=shear)
     images = images * regular_scale[..., np.newaxis] * singular_scale[:, np.newaxis]
-    kind = np.result_type(*(x for phase in (matrix, *inclusions) for x in phase.bulk_and_shear))
+    moduli = [phase.bulk_and_shear for phase in (matrix, *inclusions)]
+    kind = np.array(moduli).dtype  # complex if a modulus is
     far_field = np.zeros((poles.n.size, len(loads)), kind)
     for column, load in enumerate(loads):
         far_field[load.far_field, column] = load.amplitude

@@ -53,7 +53,18 @@ class Multipoles:
     @classmethod
     @lru_cache(maxsize=256)
     def up_to(cls, highest: int, *, shear: bool) -> Multipoles:
-        """Return all up to degree `highest`: m = 0, 4, … for axial loads, 2, 6, … for ε12."""
+        """Return all multipoles up to a degree that a load excites, sorted by their kind.
+
+        Args:
+            highest: Highest degree n.
+            shear: Whether the load is ε12, with the orders m = 2, 6, …; else it is axial, with 0,
+                4, ….
+
+        Returns:
+            Degrees `n`, orders `m` and kinds `kind`, shape (N,) each. Kinds 1 and 3 have even n,
+            from 2 on for ε12 and from 0 on else; kind 2 has odd n and m > 0. In each kind n rises,
+            and m within it. Equal arguments give the same object.
+        """
         first = 2 if shear else 0
         even = [(n, m) for n in range(first, highest + 1, 2) for m in range(first, n + 1, 4)]
         odd = [(n, m) for n in range(3, highest + 1, 2) for m in range(first or 4, n + 1, 4)]
@@ -68,16 +79,22 @@ class Multipoles:
 
 @lru_cache(maxsize=96)  # as many Poisson ratios and degrees as a fuzzy modulus takes
 def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
-    """Return the regular amplitudes at one sphere by unit multipoles at all its images.
+    """Return the regular amplitudes at one sphere by unit multipoles at all its periodic images.
+
+    The displacement is expanded in solutions of Navier's equation of three kinds: 1 is the gradient
+    of a solid harmonic, 2 is torsional, 3 has dilatation. Regular ones are finite at the centre of
+    the sphere; singular ones, the multipoles, decay from it.
 
     Args:
-        highest: Highest degree of the multipoles.
-        poisson: Poisson's ratio of the matrix.
-        shear: Whether the load is ε12.
+        highest: Highest degree of the multipoles, at least 4.
+        poisson: Poisson's ratio of the matrix, real or complex.
+        shear: Whether the load is ε12; else hydrostatic or tetragonal strain.
 
     Returns:
-        Matrix in the order of `Multipoles.up_to`, at r = 1: rows are the regular amplitudes,
-        columns the multipoles.
+        Matrix for spheres in a cell of side 2, with radius 1 as the unit of amplitudes: rows are
+        the regular amplitudes, columns the multipoles, both in the order of
+        `Multipoles.up_to(highest, shear=shear)`. Equal arguments give the same array, which must
+        not be changed.
     """
     poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
@@ -93,7 +110,9 @@ def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
         )
         of_m = _coupling(target, source, pair, poisson, sums)
         of_minus_m = _coupling(target, source, pair._replace(m=-pair.m), poisson, sums)
-        # the multipole of −m has the same amplitude, or its negative for one of both
+        # Multipoles of orders m and −m are listed once. By the symmetry of the load the one of −m
+        # has the same amplitude or its negative: under axial loads the negative for torsion
+        # (kind 2), under ε12 for the other kinds.
         is_opposite = (source == 2) != shear
         of_minus_m = np.where(pair.m > 0, -of_minus_m if is_opposite else of_minus_m, 0.0)
         coupling[np.ix_(rows, columns)] = of_m + of_minus_m
@@ -119,16 +138,25 @@ class _Pair(NamedTuple):
 
 
 def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: LatticeSums) -> Array:
-    """Return the amplitudes of regular Lamé solutions by the images of multipoles.
+    """Return the amplitudes of regular solutions of one kind by the images of multipoles.
 
-    The formulas are those at the head of this file.
+    Solutions of Navier's equation are of kind 1 (gradient of a solid harmonic), 2 (torsional) or 3
+    (with dilatation), as by Kushch (Micromechanics of Composites, 2013). The irregular solid
+    harmonics of all images, expanded about the sphere, are sums over the lattice; the factors
+    before them follow from the invariants div u, x·curl u and x·u of the displacement, by which the
+    three kinds are told apart.
 
     Args:
         target: Kind of the regular solutions.
         source: Kind of the multipoles, at least `target`.
-        pair: Degrees and orders of both.
+        pair: Degrees `n` and orders `m` of the multipoles, as a row, and `k`, `j` of the regular
+            solutions, as a column.
         poisson: Poisson's ratio of the matrix.
-        sums: Lattice sums.
+        sums: Sums over the lattice of harmonic and of biharmonic multipoles, at [degree, order].
+
+    Returns:
+        Amplitudes, shape (regular solutions, multipoles); 0 for kind 1 or 3 and degree k = 0 where
+        there is no such regular solution.
     """
     n = pair.n
     k = np.maximum(pair.k, 1) if target == 1 else pair.k  # a regular solution 1 of degree 0 is none
@@ -140,6 +168,8 @@ def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: Lat
         if target == 1:
             return np.asarray(-rotated / k)
         return np.asarray(4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * rotated)
+    # A multipole of kind 3 is α_d r² ∇h + c_d x h with d = −n − 1: α_d = d + 5 − 4ν = 4 − 4ν − n
+    # and c_d = −2 [3 d + 1 − 2ν (2 d + 1)] = 2 [3 n + 2 − 2ν (2 n + 1)].
     alpha = 4 - 4 * poisson - n
     c = 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
     projection = (2 * alpha * (k - 1) + c) / (2 * (n + k) - 1)
@@ -150,10 +180,19 @@ def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: Lat
 
 
 def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
-    """Return Σ_P f_N^M(P) (−1)^n w_N^M/(w_n^m w_k^j) with N = n + k + `lower`, M = m − j, or 0.
+    """Return a lattice sum of irregular solid harmonics, with the weights of a pair of multipoles.
 
-    The f_N^M are irregular solid harmonics at P = 2p, and w_n^m = √((n − m)! (n + m)!) makes them
-    Racah's, whose lattice sums over p are `sums`. The result is 0 where N < |M|.
+    It is Σ_P f_N^M(P) (−1)^n w_N^M/(w_n^m w_k^j) with N = n + k + `lower` and M = m − j. The f_N^M
+    are irregular solid harmonics at P = 2p, and w_n^m = √((n − m)! (n + m)!) makes them Racah's,
+    whose sums over the integer lattice p are known.
+
+    Args:
+        sums: Lattice sums at the indices [N, |M|], up to the largest N.
+        pair: Degrees n, k and orders m, j, in shapes that broadcast to that of the result.
+        lower: 0, −1 or −2.
+
+    Returns:
+        The sums in that shape; 0 where N < |M| or N < 0.
     """
     degree = pair.n + pair.k + lower
     order = abs(pair.m - pair.j)
@@ -171,7 +210,15 @@ def _log_weight(n: Array, m: Array) -> Array:
 
 
 def _projection_factor(pair: _Pair) -> Array:
-    """Return the factor of f_{n+k-2}^{m-j}(P) in H[(x·P) F]_k, times (2k − 1)(2n + 2k − 1)."""
+    """Return a factor in the harmonic part of degree k of (x·P) F, for the image P of a multipole.
+
+    F is the irregular solid harmonic (n, m) about P, expanded about the origin. The result is the
+    factor of f_{n+k-2}^{m-j}(P) in that part, times (2k − 1)(2n + 2k − 1); f is an irregular solid
+    harmonic.
+
+    Args:
+        pair: Degrees n, k and orders m, j, in shapes that broadcast to that of the result.
+    """
     degree = pair.n + pair.k - 1
     order = pair.m - pair.j
     p = pair.k - pair.j
@@ -195,9 +242,16 @@ class TMatrices(NamedTuple):
     torsion: Array
 
     def apply(self, regular: Array) -> Array:
-        """Return the singular amplitudes by regular ones, both of shape (…, N, columns).
+        """Return the singular amplitudes of a sphere by regular ones.
 
-        The rows are solutions 1, then 2, then 3.
+        The rows of both are multipoles of kinds 1, then 2, then 3, with the degrees that these
+        T-matrices were made for.
+
+        Args:
+            regular: Regular amplitudes, shape (…, N multipoles, columns).
+
+        Returns:
+            New array in the shape of `regular`.
         """
         ends = [len(self.pair), len(self.pair) + self.torsion.size]
         first, second, third = np.split(regular, ends, axis=-2)
@@ -211,30 +265,44 @@ class TMatrices(NamedTuple):
 
 
 def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> TMatrices:
-    """Return the T-matrices of a sphere of radius 1 for k degrees.
+    """Return what a sphere of radius 1 makes of incoming regular fields: its T-matrices.
 
-    On it the Lamé solutions 1 and 3 have displacements and tractions along x Y and ∇Y (Y the
-    spherical harmonic), solution 2 along x × ∇Y alone; continuity of both leaves 2 × 2 systems for
-    each degree, whatever the order m. Lamé solutions are numbered as by Kushch (2013): 1 is the
-    gradient of a harmonic, 2 torsional, 3 the one with dilatation. The inclusion may be as soft as
-    a pore or as stiff as rigid.
+    On it the solutions of Navier's equation of kinds 1 and 3 have displacements and tractions along
+    x Y and ∇Y (Y the spherical harmonic), kind 2 along x × ∇Y alone; continuity of both leaves 2 ×
+    2 systems for each degree, whatever the order m. Kinds are numbered as by Kushch (2013): 1 is
+    the gradient of a harmonic, 2 torsional, 3 the one with dilatation. The inclusion may be as soft
+    as a pore or as stiff as rigid.
+
+    Args:
+        degrees: Degrees n of the spherical harmonics, whole numbers from 0, shape (k,).
+        matrix: Material outside.
+        inclusion: Material of the sphere.
+
+    Returns:
+        `pair`, from regular to singular amplitudes of kinds 1 and 3, shape (k, 2, 2) with singular
+        ones as rows; and `torsion`, the factors of kind 2, shape (k,).
     """
     n = np.asarray(degrees, float)
     ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
-    # weights of tractions outside and inside, finite for pores and rigid spheres
+    # Weights of the tractions outside and inside: their ratio is that of the shear moduli, and both
+    # stay finite for pores and rigid spheres.
     outside = 1 / (1 + ratio)
     inside = ratio / (1 + ratio)
     displacement, traction = _surface_fields(n, inclusion.poisson)
-    displacement[n == 0, 1, 0] = 1.0  # ∇1 is no displacement: keeps the matrix invertible
+    # For n = 0 solution 1 is ∇1, no displacement: this keeps the matrix invertible.
+    displacement[n == 0, 1, 0] = 1.0
     stiffness = traction @ np.linalg.inv(displacement)  # traction over μ of the solid sphere
 
     def traction_mismatch(degree: Array) -> Array:
+        """Return the traction outside less that inside, (k, 2, 2), for equal displacements."""
         displacement, traction = _surface_fields(degree, matrix.poisson)
         return outside * traction - inside * stiffness @ displacement
 
+    # The mismatch of the singular waves (degree −n − 1) and that of the regular ones (degree n)
+    # must vanish together: singular @ T = regular.
     singular = traction_mismatch(-n - 1)
     regular = -traction_mismatch(n)
-    # of degree 0 there are the singular solution 1 and the regular solution 3 alone
+    # Of degree 0 there are the singular solution 1 and the regular solution 3 alone.
     is_radial = n == 0
     singular[is_radial, :, 1] = 0.0
     singular[is_radial, 1, :] = 0.0
@@ -248,13 +316,16 @@ def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> TMatric
 def _surface_fields(degree: Array, poisson: complex) -> tuple[Array, Array]:
     """Return displacements and tractions of the Lamé solutions 1 and 3 on the unit sphere.
 
+    With a solid harmonic h of degree d and Y its values on the sphere, solution 1 is ∇h and
+    solution 3 is α r² ∇h + c x h with α = d + 5 − 4ν and c = −2 [3 d + 1 − 2ν (2 d + 1)].
+
     Args:
-        degree: Degrees d of the solid harmonics, shape (k,).
+        degree: Degrees d, shape (k,): n of regular and −n − 1 of singular solutions.
         poisson: Poisson's ratio ν.
 
     Returns:
-        Displacements, and tractions over μ, shape (k, 2, 2) each: rows are the components along x Y
-        and ∇Y, columns the solutions.
+        Displacements, and tractions over the shear modulus, shape (k, 2, 2) each: rows are the
+        components along x Y and ∇Y, columns the solutions 1 and 3.
     """
     d = degree
     alpha = d + 5 - 4 * poisson

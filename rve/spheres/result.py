@@ -22,7 +22,13 @@ HILL = "Hill's isotropic average"
 
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Return the stiffness in Voigt order, shape (…, 6, 6), from K, (C11 − C12)/2 and C44, (…,)."""
+    """Return stiffnesses of cubic symmetry in Voigt order 11, 22, 33, 23, 13, 12, shape (…, 6, 6).
+
+    Args:
+        bulk: Bulk modulus K, of any shape (…).
+        deviator: (C11 − C12)/2, of the same shape and unit.
+        shear: C44, of the same shape and unit.
+    """
     voigt = np.zeros((*np.shape(bulk), 6, 6))
     voigt[..., :3, :3] = np.asarray(bulk - 2 / 3 * deviator)[..., None, None]
     for i in range(3):
@@ -41,9 +47,12 @@ def cubic_moduli(stiffness: Array) -> Array:
 
 
 def hill_shear(moduli: Array) -> Array:
-    """Return Hill's shear modulus (1952), the mean of Voigt's and of Reuss's average, shape (…,).
+    """Return the shear modulus of Hill's isotropic average (1952) of cubic stiffnesses, shape (…,).
 
-    `moduli` are K, (C11 − C12)/2 and C44, shape (…, 3).
+    It is the mean of Voigt's average (2 D + 3 C44)/5 and Reuss's 5/(2/D + 3/C44).
+
+    Args:
+        moduli: K, D = (C11 − C12)/2 and C44, positive, shape (…, 3), in one unit.
     """
     deviator = moduli[..., 1]
     shear = moduli[..., 2]
@@ -53,9 +62,13 @@ def hill_shear(moduli: Array) -> Array:
 
 
 def hill_average(moduli: Array) -> Array:
-    """Return Young's modulus and Poisson's ratio of Hill's average, shape (…, 2).
+    """Return Young's modulus and Poisson's ratio of Hill's isotropic average of cubic stiffnesses.
 
-    `moduli` are K, (C11 − C12)/2 and C44, shape (…, 3), in whose unit Young's modulus is.
+    Args:
+        moduli: K, (C11 − C12)/2 and C44, positive, shape (…, 3), in one unit.
+
+    Returns:
+        E in that unit and ν, shape (…, 2).
     """
     bulk = moduli[..., 0]
     shear = hill_shear(moduli)
@@ -103,7 +116,18 @@ class HomogenisedSpheres(HomogenisedStiffness):
 
 
 def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
-    """Return a result with its checks: relative violations of symmetry and of Hashin's bounds."""
+    """Return a copy of a result with checks: violations of symmetry and of classical bounds.
+
+    Args:
+        result: Result with its cell, of isotropic phases, and its stiffness in space.
+
+    Returns:
+        Copy with `checks` by name, 0 for none: "symmetry", "reuss" and "voigt" of the stiffness,
+        and "hashin_shtrikman" of the bulk modulus.
+
+    Raises:
+        CertificateError: A violation exceeds the declared error of the result.
+    """
     cell = result.cell
     assert cell is not None
     fraction = SPHERES.fractions(cell.radius_map(result.curve.theta))
