@@ -75,9 +75,13 @@ class AnyModel(Protocol):
     def for_samples(self, moduli: tuple[float, float] | None, *, energies: bool) -> Self:
         """Return the model for many samples of one cell.
 
-        It declares no error that takes a reference solution. `moduli` are the smallest and the
-        largest Young's modulus of the particle in Pa, if samples differ in it; `energies` says
-        whether the strain energies of the phases are needed, for loss factors.
+        It declares no error that takes a reference solution. This default returns the model itself;
+        models that can save work return another one.
+
+        Args:
+            moduli: Smallest and largest Young's modulus of the particle in Pa, if samples differ in
+                it; else None. A model may solve for a few moduli in this range and interpolate.
+            energies: Whether the strain energies of the phases are needed, for loss factors.
         """
         return self
 

@@ -21,48 +21,58 @@ class CertificateError(FailedError):
     """A result lacks a property that every correct one has."""
 
 
-WHAT = {
-    "residual": "the linear system is not solved",
-    "hill_mandel": "mean stress times mean strain is not the mean of their product (Hill–Mandel)",
-    "symmetry": "the effective stiffness is not symmetric",
-    "reuss": "the effective stiffness is below the Reuss bound",
-    "voigt": "the effective stiffness is above the Voigt bound",
-    "hashin_shtrikman": "the bulk modulus is outside the Hashin–Shtrikman bounds",
-}
-
-
 def checks_within_limits(
     checks: Mapping[str, float], *, discretisation: float = ROUND_OFF
 ) -> dict[str, float]:
-    """Return a copy of relative violations by the names of `WHAT`, none of which is too large.
+    """Return a copy of violations of properties that right results have; none is too large.
 
     Args:
-        checks: Relative violations.
-        discretisation: Limit of those of bounds, by which the error of a mesh may violate them.
+        checks: Relative violations, 0 for none, by the names "residual" and "hill_mandel" (of
+            finite elements), "symmetry", "reuss", "voigt" and "hashin_shtrikman"; another name that
+            is too large is a KeyError.
+        discretisation: Largest violation of the last three, which are bounds, by the error of a
+            mesh. That of all others is 1e-7.
 
     Raises:
-        CertificateError: A violation is too large; the message names it, its value and its limit.
+        CertificateError: A violation is NaN or too large; the message names it, its value and its
+            limit.
     """
-    algebraic = 1e-7  # by which what holds in exact arithmetic may be violated
+    meanings = {
+        "residual": "the linear system is not solved",
+        "hill_mandel": "mean stress times mean strain is not the mean of their product"
+        " (Hill–Mandel)",
+        "symmetry": "the effective stiffness is not symmetric",
+        "reuss": "the effective stiffness is below the Reuss bound",
+        "voigt": "the effective stiffness is above the Voigt bound",
+        "hashin_shtrikman": "the bulk modulus is outside the Hashin–Shtrikman bounds",
+    }
+    # What holds in exact arithmetic for any mesh may be violated by rounding and by the tolerance
+    # of iterative solvers; bounds may be violated by the error of the mesh as well.
+    algebraic = 1e-7
     for name, value in checks.items():
         is_bound = name in ("reuss", "voigt", "hashin_shtrikman")
         limit = discretisation if is_bound else algebraic
         if not value <= limit:
             raise CertificateError(
-                f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed",
+                f"{meanings[name]}: relative violation {value:.2e}, {limit:.2e} is allowed",
                 "do not use this result",
             )
     return dict(checks)
 
 
 def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """Return a copy of a result with its violations of symmetry and bounds as checks.
+    """Return a copy of a plane result with its violations of symmetry and bounds as checks.
 
     Args:
-        result: Result with its stiffness and its cell.
+        result: Result with its cell, its plane stiffness at each θ, and declared errors.
+
+    Returns:
+        Copy with `checks` by name, 0 for none: "symmetry", "reuss", "voigt" and, of isotropic
+        phases, "hashin_shtrikman".
 
     Raises:
-        CertificateError: A violation exceeds the declared error of the result.
+        CertificateError: A violation of a bound exceeds the declared error of the result, one of
+            symmetry 1e-7, or no error is declared.
     """
     curve = result.curve
     cell = result.cell
@@ -84,11 +94,15 @@ def stress_checks(
     of the loads, under which alone the stiffness is known.
 
     Args:
-        stress: Homogenised (σ11, σ22, σ12) at the nodes of θ, shape (n, 3, loads), in Pa.
+        stress: Homogenised (σ11, σ22, σ12) at the n nodes of θ, shape (n, 3, loads), in Pa.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3), ε11 = ε22 in their span.
         fractions: Area fractions of the phases at the nodes, shape (phases, n).
-        weights: Weights of the nodes, shape (n,).
+        weights: Weights of the nodes with the density of θ inside, shape (n,), sum 1.
         phases: Materials, in the order of their fractions.
+
+    Returns:
+        Violations by name: "symmetry", "reuss" and "voigt" over the largest energy and, of
+        isotropic phases, "hashin_shtrikman" over the bulk modulus.
     """
     energy = loads @ mean(weights, stress)
     stiffness = [phase.stiffness for phase in phases]
@@ -106,29 +120,39 @@ def order_checks(
 ) -> dict[str, float]:
     """Return relative violations of symmetry and of Reuss ≤ energy ≤ Voigt in Loewner's sense.
 
+    A ≤ B if B − A has no negative eigenvalue. All are divided by the largest entry of `energy`.
+
     Args:
-        energy: Mean energy of pairs of the loads, shape (loads, loads), in Pa.
-        loads: Macroscopic strains, shape (loads, 3).
-        fractions: Fractions of the phases at the nodes, shape (phases, n).
-        weights: Weights of the nodes, shape (n,).
-        stiffness: Stiffness of each phase, in Pa.
+        energy: Mean energy of pairs of the loads, load · stiffness · load, shape (loads, loads), in
+            Pa.
+        loads: Macroscopic strains in Voigt's order, shape (loads, k).
+        fractions: Fractions of the phases at the n nodes of θ, shape (phases, n).
+        weights: Weights of the nodes with the density of θ inside, shape (n,), sum 1.
+        stiffness: Positive definite stiffness of each phase, shape (k, k), in Pa.
+
+    Returns:
+        Violations by the names "symmetry", "reuss" and "voigt", 0 for none.
     """
     scale = float(abs(energy).max())
     reuss_energy = loads @ mean(weights, reuss(fractions, stiffness)) @ loads.T
     voigt_energy = loads @ mean(weights, voigt(fractions, stiffness)) @ loads.T
     return {
         "symmetry": float(abs(energy - energy.T).max()) / scale,
+        # The most negative eigenvalue of each difference; 0 where there is none.
         "reuss": _below(energy - reuss_energy) / scale,
         "voigt": _below(voigt_energy - energy) / scale,
     }
 
 
 def bulk_check(bulk: float, bounds: Array) -> dict[str, float]:
-    """Return the relative violation of the Hashin–Shtrikman bounds by a bulk modulus.
+    """Return the relative violation of the Hashin–Shtrikman bounds by a bulk modulus, 0 for none.
 
     Args:
-        bulk: Bulk modulus in Pa.
+        bulk: Bulk modulus in Pa, positive; the violation is relative to it.
         bounds: Lower and upper bound in Pa, shape (2,).
+
+    Returns:
+        The violation by the name "hashin_shtrikman".
     """
     low, high = bounds
     return {"hashin_shtrikman": float(max(0.0, low - bulk, bulk - high) / bulk)}

@@ -46,11 +46,19 @@ class EngineeringConstants:
 
     @classmethod
     def of_stiffness(cls, stiffness: Array, errors: Array) -> EngineeringConstants:
-        """Return the constants of a stiffness C.
+        """Return the engineering constants of a plane stiffness C, from its inverse S.
+
+        They are E_x = 1/S_11, E_y = 1/S_22, ν_xy = −S_21/S_11 and G_xy = 1/S_33.
 
         Args:
-            stiffness: C, shape (3, 3), in Pa.
-            errors: Declared absolute errors of its entries, shape (3, 3), in Pa.
+            stiffness: C in Voigt's order 11, 22, 12, shape (3, 3), in Pa.
+            errors: Declared absolute errors of its entries, shape (3, 3), in Pa; NaN where unknown.
+
+        Returns:
+            Values and absolute errors, which are of first order with a margin of a tenth.
+
+        Raises:
+            numpy.linalg.LinAlgError: C is singular.
         """
         # To first order the compliance S = C⁻¹ changes by δS = −S δC S. The margin stands for what
         # is of second order.
@@ -70,9 +78,19 @@ class EngineeringConstants:
 
 
 def engineering_constants(result: HomogenisedStiffness) -> dict[str, EngineeringConstants]:
-    """Return E_x, E_y, ν_xy and G_xy by `PLANE_STRAIN` and, of two isotropic phases, `FREE`.
+    """Return E_x, E_y, ν_xy and G_xy of a result by each definition, with their declared errors.
 
-    It is empty for a result without its plane stiffness.
+    Args:
+        result: Result of any model.
+
+    Returns:
+        Values and absolute errors, shape (4,) each, moduli in Pa, by definition: "plane strain"
+        and, of two isotropic phases, "no stress along the fibres" (generalised plane strain).
+        Errors are NaN where the result declares none. Empty for a result without its plane
+        stiffness.
+
+    Raises:
+        numpy.linalg.LinAlgError: The stiffness is singular.
     """
     stiffness = result.stiffness
     errors = result.stiffness_errors
@@ -109,7 +127,20 @@ class Mixture:
 
     @classmethod
     def of_cell(cls, cell: Cell) -> Self:
-        """Return moduli, mean area fractions and bounds of z̄ of a cell of two isotropic phases."""
+        """Return what Hill's relations need of a cell of two isotropic phases, with fibres along z.
+
+        With k the plane-strain bulk modulus, l = C13 and n = C33 of the phases, Δ their differences
+        and ⟨⟩ means by area, the cell has the bulk modulus ⟨k⟩ − z̄ Δk², C13 = ⟨l⟩ − z̄ Δk Δl and
+        C33 = ⟨n⟩ − z̄ Δl².
+
+        Args:
+            cell: Cell whose phases are both isotropic.
+
+        Returns:
+            `moduli` k, l and n of matrix and inclusion, shape (3, 2), in Pa; `fractions`, their
+            mean area fractions over θ by Gauss quadrature with 32 nodes, shape (2,); and `bounds`
+            of z̄ by Hashin and Shtrikman, in 1/Pa.
+        """
         rule = gauss_rule(cell.radius_map.distribution, points=32)
         inclusion = cell.fraction(rule.nodes)
         stiffness = np.array(cell.stiffness)
@@ -137,10 +168,19 @@ class Mixture:
         return np.asarray(np.diff(self.moduli, axis=1)[:, 0])
 
     def z_from_bulk(self, bulk: float, relative_error: float) -> Interval:
-        """Return z̄ in bulk = ⟨k⟩ − z̄ (k₂ − k₁)² with its bounds, in 1/Pa.
+        """Return Hill's number z̄, by which phases share strain, from a cell's bulk modulus.
 
-        Where the error of the bulk modulus (in Pa) hides z̄, they are those of Hashin and Shtrikman
-        alone, with their midpoint.
+        With k the plane-strain bulk moduli of the phases and ⟨k⟩ their mean by area, the bulk
+        modulus of the cell is ⟨k⟩ − z̄ (k₂ − k₁)². The result is clipped to Hashin and Shtrikman's
+        bounds of z̄; where the error of the bulk modulus hides z̄, it is their midpoint with these
+        bounds.
+
+        Args:
+            bulk: Plane-strain bulk modulus of the cell in Pa.
+            relative_error: Declared relative error of it; NaN makes the bounds NaN.
+
+        Returns:
+            z̄ with its lower and upper bound, in 1/Pa.
         """
         low, high = self.bounds
         contrast_squared = float(self.differences[0] ** 2)
@@ -149,7 +189,7 @@ class Mixture:
             return Interval((low + high) / 2, low, high)
         drop = self.fractions @ self.moduli[0] - bulk
         candidates = (drop + np.array([0, -tolerance, tolerance])) / contrast_squared
-        return Interval(*np.clip(candidates, low, high).tolist())
+        return Interval._make(np.clip(candidates, low, high).tolist())
 
     def bulk(self, z: float) -> float:
         """Return the in-plane bulk modulus in Pa from z̄ in 1/Pa."""
@@ -181,9 +221,21 @@ class AxialStiffness:
 
     @classmethod
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
-        """Return the stiffness along the fibres from the plane stiffness by Hill's relations.
+        """Return the stiffness along the fibres, from the plane stiffness by Hill's relations.
 
-        None without a cell of two isotropic phases, a plane stiffness and its errors.
+        Strains along the fibres and in the plane that leave both phases at one uniform strain
+        (Hill, J. Mech. Phys. Solids 12, 199, 1964) tie C13, C23, C63 and C33 to the plane stiffness
+        C. With k, l = C13 and n = C33 of the phases, Δ their differences and ⟨⟩ means by area,
+        (C13, C23, C63) = ⟨l⟩ (1, 1, 0) − z Δk Δl and C33 = ⟨n⟩ − z̄ Δl², where C (1, 1, 0)/2 = ⟨k⟩
+        (1, 1, 0) − z Δk² and z̄ = (z1 + z2)/2.
+
+        Args:
+            result: Result of any model.
+
+        Returns:
+            `lateral`, (C13, C23, C63), and `axial`, C33, in Pa, with their absolute errors; these
+            are NaN if the result declares no errors. None without a cell of two isotropic phases,
+            or without a plane stiffness.
         """
         cell = result.cell
         stiffness = result.stiffness
@@ -216,14 +268,21 @@ class AxialStiffness:
         )
 
     def free_constants(self, stiffness: Array, errors: Array) -> EngineeringConstants:
-        """Return the constants of C − c cᵀ/C33, in which there is no stress along the fibres.
+        """Return the engineering constants without stress along the fibres.
+
+        In this generalised plane strain they are those of C − c cᵀ/C33 with c = (C13, C23, C63) of
+        `self.lateral` and C33 of `self.axial`.
 
         Args:
-            stiffness: C of plane strain, shape (3, 3), in Pa.
-            errors: Declared absolute errors of its entries, shape (3, 3), in Pa.
+            stiffness: C of plane strain in Voigt's order 11, 22, 12, shape (3, 3), in Pa.
+            errors: Declared absolute errors of its entries, shape (3, 3), in Pa; NaN where unknown.
+
+        Returns:
+            E_x, E_y, ν_xy and G_xy with their absolute errors, shape (4,) each, moduli in Pa.
         """
         c = self.lateral
         reduction = np.outer(c, c) / self.axial
+        # To first order the error of c cᵀ/C33 is that of each factor c, and that of C33, in turn.
         by_lateral = np.outer(abs(c), self.lateral_errors) / self.axial
         by_axial = abs(reduction) * self.axial_error / self.axial
         return EngineeringConstants.of_stiffness(

@@ -33,13 +33,20 @@ second order, which is declared, is small."""
 def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> DeclaredConstants:
     """Return the effective loss factors of E, G and K with their declared errors.
 
-    They are of first order in the loss factors of the phases. Where a phase has more than
-    `MAX_FIRST_ORDER`, and the model takes complex moduli (series), they come from these.
+    They are Σ η ∂ln c/∂ln X over the moduli X = K, G of the phases, to first order in the loss
+    factors η of the phases. Where one of these exceeds 0.1, and the model takes complex moduli
+    (series), the loss factors are Im c/Re c at the complex moduli X (1 + iη), without that
+    approximation.
 
     Args:
-        result: Result of any model, with the energies of its phases.
-        losses: Loss factors of K and G of each phase, shape (phases, 2); those that the phases of
-            the cell state if not given, 0 where one states none.
+        result: Result of any model, with the strain energies of its phases; K is that of plane
+            strain, of spheres that of space.
+        losses: Loss factors of K and G of each phase, shape (phases, 2), matrix first; if not
+            given, those that the phases of the cell state for both, 0 where one states none.
+
+    Returns:
+        Values and absolute errors by "E", "G" and "K". Errors hold those of the energies and, of
+        the first-order formula, a term of second order; NaN where the model declares none.
 
     Raises:
         RefusedError: The result has no energies, or neither it nor the arguments have losses.
@@ -61,7 +68,8 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
         constants = young_shear_bulk(cell_moduli, result.constants_of)
         values = constants.imag / constants.real
     else:
-        # Terms of second order vanish where all phases have equal losses.
+        # Declared, not proved: terms of second order vanish where all phases have equal losses, and
+        # are of the size of the squared differences.
         errors = errors + np.ptp(losses) ** 2 * values
     round_off = 1e-12 * abs(values)
     return DeclaredConstants.from_arrays(CONSTANTS, values, errors + round_off)
@@ -70,14 +78,22 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
 def first_order(
     energies: PhaseEnergies, losses: Array, *, constants_of: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """Return the loss factors of E, G and K to first order, and their errors, shape (3,) each.
+    """Return the effective loss factors of E, G and K to first order, and their errors.
 
-    The errors are those of the energies, not that of the first-order formula.
+    The loss factor of an effective modulus c is Σ_X f η_X with f = ∂ln c/∂ln X, where X runs over
+    the bulk and the shear modulus of each phase and η_X is the loss factor of X. The f are
+    fractions of the strain energy (Ungar and Kerwin, J. Acoust. Soc. Am. 34, 954, 1962).
 
     Args:
-        energies: Parts of the phases in the strain energy.
+        energies: Parts of the strain energy of the cell that belong to the moduli X, with their
+            errors.
         losses: Loss factors η of K and G of each phase, shape (phases, 2).
-        constants_of: Function that returns E and ν for the three moduli.
+        constants_of: Function that returns E and ν, shape (2,), for the three moduli of the cell
+            that `energies` belong to, shape (3,): in the plane C11 + C12, C11 − C12 and C33.
+
+    Returns:
+        Loss factors of E, G and K, shape (3,), and their absolute errors, shape (3,): those of the
+        energies, not that of the first-order formula; NaN where unknown.
     """
     fractions, fraction_errors = energies.energy_fractions(constants_of)  # (phases, 2, 3)
     factors = np.tensordot(losses, fractions)

@@ -27,11 +27,14 @@ from alphacut.rve.cell.cell import AnyPhase, Phase
 
 
 def voigt(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Return the stiffness at uniform strain: the mean of those of the phases, shape (…, k, k).
+    """Return Voigt's average, the stiffness at uniform strain: the mean of those of the phases.
 
     Args:
-        fractions: Fractions of the phases, shape (phases, …).
-        stiffness: Stiffness of each phase, shape (k, k).
+        fractions: Fractions of the phases, shape (phases, …), where … is any shape.
+        stiffness: Stiffness of each phase in one unit, shape (k, k).
+
+    Returns:
+        Averages, shape (…, k, k).
     """
     return np.asarray(np.tensordot(fractions, np.stack(stiffness), axes=([0], [0])))
 
@@ -43,7 +46,7 @@ def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
 
 
 def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: bool = False) -> Array:
-    """Return the bounds of K and of G of a composite of the plane or of space.
+    """Return the bounds of K and of G of a composite of isotropic phases, of the plane or of space.
 
     In the plane of fibres by Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119,
     1965), of space by Hashin and Shtrikman (ibid. 11, 127, 1963); of any number of phases and with
@@ -51,15 +54,19 @@ def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: boo
     strain of any arrangement of fibres, and of any cubic one; those of G for isotropic ones.
 
     Args:
-        fractions: Fractions of the phases, shape (phases, …).
-        phases: The materials, isotropic in the plane or in space.
-        space: Whether K is that of three dimensions, else of plane strain.
+        fractions: Fractions of the phases, shape (phases, …), where … is any shape; their sum over
+            the phases is 1.
+        phases: The materials, isotropic in the plane or in space, with positive moduli.
+        space: Whether K is that of three dimensions and the composite one of space; else K is that
+            of plane strain.
 
     Returns:
-        Lower and upper bound of K, then of G, in Pa, shape (2, 2, …).
+        Bounds in Pa, shape (2, 2, …): the first axis is K, G, the second one lower, upper.
     """
     bulk, shear = _bulk_and_shear(phases, space)
     bounds = []
+    # The bounds are the means with the softest and with the stiffest moduli of all phases as
+    # reference.
     for extreme in (np.min, np.max):
         bulk_term, shear_term = _reference_terms(extreme(bulk), extreme(shear), space)
         mean_bulk = _mean_with(bulk, fractions, bulk_term)
@@ -74,9 +81,10 @@ def mori_tanaka(fraction: Array, phases: Sequence[AnyPhase], *, space: bool = Fa
     particles.
 
     Args:
-        fraction: Fraction of the particles, of any shape.
-        phases: Matrix and particle.
-        space: Whether the particles are spheres, else fibres.
+        fraction: Fraction of the particles, of any shape (…).
+        phases: Isotropic matrix and particle, in this order.
+        space: Whether the particles are spheres and K is that of three dimensions; else they are
+            fibres, and K is that of plane strain.
     """
     bulk, shear = _bulk_and_shear(phases, space)
     fractions = np.stack([1 - fraction, fraction])
@@ -101,11 +109,14 @@ def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, flo
 
 
 def _mean_with(moduli: Array, fractions: Array, term: float) -> Array:
-    """Return X of 1/(X + term) = Σ fraction/(modulus + term), in Pa, shape (…).
+    """Return the modulus X with 1/(X + term) = Σ_k fraction_k/(modulus_k + term), in Pa, shape (…).
+
+    This is the common form of the bounds of Hashin and Shtrikman; `term` belongs to a reference
+    material. It may not be 0 where a modulus is.
 
     Args:
         moduli: Modulus of each phase, shape (phases,), in Pa.
-        fractions: Fractions of the phases, shape (phases, …).
+        fractions: Fractions of the phases, shape (phases, …), where … is any shape.
         term: Term of the reference material, in Pa.
     """
     return np.asarray(1 / np.tensordot(1 / (moduli + term), fractions, axes=1) - term)
@@ -124,15 +135,19 @@ def require_average(average: str) -> None:
 
 
 def shear_modulus(moduli: Array, average: str) -> Array:
-    """Return the in-plane shear modulus G_T, shape (…), in Pa.
+    """Return the in-plane shear modulus G_T of an average over directions, shape (…).
 
     Args:
-        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3), in Pa.
-        average: "axes" for C33 alone, "isotropic" for Hill's mean over all directions.
+        moduli: C11 + C12, C11 − C12 and C33 in one unit, shape (…, 3), where … is any shape; "axes"
+            does not use the first two.
+        average: "axes" for C33 alone; any other name, such as "isotropic", for Hill's mean (1952)
+            of Voigt's and Reuss's averages over all directions.
     """
     along_axes = moduli[..., 2]
     if average == AXES:
         return np.asarray(along_axes)
+    # The shear modulus along the diagonals of the square. Over all directions it lies between this
+    # and C33, so that both averages are of these two.
     along_diagonals = moduli[..., 1] / 2
     voigt_mean = (along_axes + along_diagonals) / 2
     reuss_mean = 2 / (1 / along_axes + 1 / along_diagonals)
@@ -140,11 +155,19 @@ def shear_modulus(moduli: Array, average: str) -> Array:
 
 
 def plane_constants(moduli: Array, average: str) -> Array:
-    """Return E in Pa and ν by an average of `AVERAGES`, shape (…, 2).
+    """Return E in Pa and ν of an isotropic solid in plane strain, by an average of the stiffness.
+
+    The solid has the bulk modulus (C11 + C12)/2 and the shear modulus G_T of the average, so that ν
+    = (1 − 2 G_T/(C11 + C12))/2 and E = 2 G_T (1 + ν).
 
     Args:
-        moduli: C11 + C12, C11 − C12 and C33, shape (…, 3), in Pa.
-        average: Name of the average.
+        moduli: C11 + C12, C11 − C12 and C33 in Pa, shape (…, 3), where … is any shape. They may be
+            complex.
+        average: "axes" for G_T = C33, eq. 16 of the paper, where C11 − C12 is not used; "isotropic"
+            for Hill's mean over all directions of the plane.
+
+    Returns:
+        E and ν, shape (…, 2). E is negative where 2 G_T > 3 (C11 + C12).
     """
     hydrostatic = moduli[..., 0]
     shear = shear_modulus(moduli, average)
@@ -170,13 +193,16 @@ def square_moduli(stiffness: Array) -> Array:
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, shape (…, 1 or 3, 3).
-
-    First with the mean of C11 and C22; if not `square`, then also with C11 and with C22 alone.
+    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, by which C11 is taken.
 
     Args:
-        stiffness: Plane stiffnesses, shape (…, 3, 3).
+        stiffness: Plane stiffnesses in Voigt's order 11, 22, 12, shape (…, 3, 3).
         square: Whether C11 and C22 are equal but for the mesh.
+
+    Returns:
+        The three moduli (last axis) with the mean of C11 and C22, shape (…, 1, 3); if not `square`,
+        then also with C11 and with C22 alone, shape (…, 3, 3) with these three on the last but one
+        axis.
     """
     moduli = [square_moduli(stiffness)]
     if not square:

@@ -34,9 +34,16 @@ def reference_bounds(
 
     Args:
         phases: The materials.
-        fractions: Volume fraction of each phase; their sum is 1.
-        space: Whether the composite is isotropic in space; else in the plane across fibres, in
-            plane strain.
+        fractions: Volume fraction of each phase; their sum is 1, which is not checked.
+        space: Whether the composite is isotropic in space, and K that of three dimensions; else in
+            the plane across fibres, and K that of plane strain.
+
+    Returns:
+        Lower and upper bound in Pa of K (`bulk`), G (`shear`) and E (`young`); that of E is E at
+        the lower, and at the upper bounds of K and G.
+
+    Raises:
+        ValueError: The numbers of phases and fractions differ.
 
     Example:
         >>> bounds = reference_bounds([Phase(20e9), Phase(80e9)], fractions=[0.8, 0.2])

@@ -23,10 +23,12 @@ from alphacut.stochastic import ThetaRule
 
 
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
-    """Young's modulus (Pa) and Poisson's ratio by the paper's convention, eq. 16.
+    """Return Young's modulus (Pa) and Poisson's ratio by the paper's convention, eq. 16.
+
+    With A = 2 C33 and B = C11 + C12 they are ν = (1 − A/B)/2 and E = A (1 + ν).
 
     Args:
-        s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa.
+        s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa; not 0.
         s12: Mean homogenised σ12 under ε12 = 0.01, in Pa.
     """
     moduli = np.array([s11, np.nan, s12 / 2]) / STRAIN
@@ -112,15 +114,19 @@ class PhaseEnergies:
     moduli_at: Callable[[Array, Array], Array] | None = None
 
     def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """Return the fractions ∂ln c/∂ln X of X = K, G of each phase in c = E, G, K.
+        """Return the fractions ∂ln c/∂ln X of c = E, G, K that belong to X = K, G of each phase.
 
-        They follow by the chain rule from ∂ln c of the three moduli.
+        They follow by the chain rule from X ∂c/∂X of the three moduli of the cell, `self.values`.
 
         Args:
-            constants_of: Function that returns E and ν for the three moduli, also complex ones.
+            constants_of: Function that returns E and ν, shape (2,), for the three moduli of the
+                cell, shape (3,), also complex ones: of the plane C11 + C12, C11 − C12 and C33,
+                where one that was not computed is NaN and must not be used.
 
         Returns:
-            The fractions and their declared absolute errors, shape (phases, 2, 3) each.
+            The fractions and their declared absolute errors (NaN where unknown), shape (phases, K
+            and G of the phase, E, G and K of the cell) each. K of the cell is that of plane strain,
+            of spheres that of space.
         """
         moduli = self.values.sum(axis=(0, 1))
 
@@ -153,7 +159,7 @@ class HomogenisedStiffness:
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
             C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
             were estimated.
-        checks: Measured violation of each property of `checks.WHAT`, by name, within its bound.
+        checks: Measured relative violation of each property that right results have, by name.
         cell: What was homogenised.
         average: Average that E and ν belong to, a name in `moduli.AVERAGES`.
         energies: Parts of the phases in the strain energy, for loss factors, where computed.
@@ -180,10 +186,15 @@ class HomogenisedStiffness:
     energies: PhaseEnergies | None = None
 
     def with_average(self, average: str) -> HomogenisedStiffness:
-        """Copy whose E and ν are those of another average of `moduli.AVERAGES`.
+        """Return a copy whose E and ν are those of another average of the plane stiffness.
+
+        Args:
+            average: "axes" for eq. 16 of the paper, with the shear modulus C33, or "isotropic" for
+                Hill's mean over all directions of the plane.
 
         Raises:
-            RefusedError: The name is none, or the average needs C11 − C12, which was not computed.
+            RefusedError: The name is another, or the average needs C11 − C12, which was not
+                computed.
         """
         require_average(average)
         if average != AXES and self.stiffness is None:
@@ -197,7 +208,7 @@ class HomogenisedStiffness:
         return AVERAGES[self.average]
 
     def __repr__(self) -> str:
-        """One line with E, ν, the declared error of E, the model and its wall time."""
+        """Return a line with E, ν, the relative error of E if declared, the model and its time."""
         error = f"{self.estimated_error:.2g}" if self.errors else "not declared"
         return (
             f"HomogenisedStiffness(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}"
@@ -269,9 +280,10 @@ class HomogenisedStiffness:
 
     @property
     def stiffness_errors(self) -> Array | None:
-        """Declared absolute errors of the entries of the mean plane stiffness, (3, 3), in Pa.
+        """Declared absolute errors of the entries of the mean plane stiffness, shape (3, 3), in Pa.
 
-        None without a plane stiffness.
+        They follow from the relative errors of C11 + C12, C11 − C12 and C33, and are NaN where
+        these are unknown. None without a plane stiffness.
         """
         C = self.stiffness
         if C is None or C.shape != (3, 3):
@@ -328,13 +340,20 @@ class HomogenisedStiffness:
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     def _error_of_modulus(self, errors: Array) -> float:
-        """Return the relative error of E for relative errors of the three moduli, shape (3,).
+        """Return the relative error of Young's modulus E for given errors of the three moduli.
 
-        It is the larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre.
+        It is the larger of E/E₀ − 1 and E₀/E − 1 at the corners of the box of the moduli, with E₀
+        at its centre; infinite if E is not positive at a corner.
+
+        Args:
+            errors: Relative errors of C11 + C12, C11 − C12 and C33 (of spheres K, (C11 − C12)/2 and
+                C44), shape (3,). Those of moduli that were not computed do not count; another NaN
+                gives NaN.
         """
         modulus = self.modulus
 
         def ratios(moduli: Array) -> Array:
+            """Return E/E₀ and E₀/E, which is infinite for E ≤ 0."""
             changed = float(self.constants_of(moduli)[0])
             inverse = modulus / changed if changed > 0 else np.inf
             return np.array([changed / modulus, inverse])
@@ -348,9 +367,14 @@ def largest_change(
     """Return the largest change of a function at the corners of a box around its arguments.
 
     Args:
-        function: Monotone in each of its n arguments over the box.
-        values: Arguments, positive, shape (n,).
-        errors: Each argument runs from value/(1 + error) to value·(1 + error); nan gives nan.
+        function: Function of an array of n numbers, monotone in each of them over the box; its
+            result is a number or an array.
+        values: Centre of the box, positive, shape (n,).
+        errors: Relative errors, shape (n,): each argument runs from value/(1 + error) to value·(1 +
+            error). If one is NaN or infinite, all changes are NaN.
+
+    Returns:
+        Largest magnitudes of the changes, in the shape of the function's result.
     """
     value = np.asarray(function(values))
     if not np.isfinite(errors).all():
