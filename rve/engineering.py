@@ -8,11 +8,18 @@ from alphacut.rve.series.fibre_constants import fibre_constants
 
 
 def constants(result: HomogenisedStiffness) -> DeclaredConstants:
-    """Return the engineering constants of a cell with their declared errors.
+    """Return the engineering constants of a cell by name, moduli in Pa, with their declared errors.
 
-    These are E and ν of the result's average; of round fibres in a matrix E_T, E_L, nu_LT, G_T, G_L
-    and K_T, across (T) and along (L) them; of a plane stiffness E_x, E_y, nu_xy and G_xy in plane
-    strain, and with the ending _free without stress along the fibres.
+    These are E and nu of the result's average; of round fibres in a matrix E_T, E_L, nu_LT, G_T,
+    G_L and K_T, across (T) and along (L) them; of a plane stiffness E_x, E_y, nu_xy and G_xy in
+    plane strain, and, of two isotropic phases, with the ending _free without stress along the
+    fibres.
+
+    Args:
+        result: Result of any model.
+
+    Returns:
+        `values` and absolute `errors`, NaN where the result declares none.
 
     Example:
         >>> from alphacut.rve import Phase, SeriesModel

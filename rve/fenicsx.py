@@ -30,13 +30,17 @@ if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of 
 
 @contextmanager
 def _without_numba() -> Iterator[None]:
-    """Hides Numba while DOLFINx is imported, which imports it for helpers of no use here.
+    """Hide Numba within a block in which DOLFINx is imported.
 
-    That saves .3 s of each command, and of each worker, by ``python -m benchmarks.start_up``.
-    Whoever wants `dolfinx.utils.numba_utils` imports Numba or DOLFINx first.
+    DOLFINx imports it for helpers of no use here. Hiding it saves .3 s of each command, and of each
+    worker, by ``python -m benchmarks.start_up``. An import of Numba in the block raises
+    ImportError, with which DOLFINx copes; its ImportWarning is silenced. If Numba has been imported
+    before, it stays visible. Whoever wants `dolfinx.utils.numba_utils` imports Numba or DOLFINx
+    first.
     """
     if is_hidden := "numba" not in sys.modules:
-        sys.modules["numba"] = None  # type: ignore[assignment]  # import raises ImportError
+        # Python's way to say that a module cannot be imported: an entry of None.
+        sys.modules["numba"] = None  # type: ignore[assignment]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ImportWarning)  # by which DOLFINx says so
@@ -94,19 +98,27 @@ def at_points(value: Any, points: Array) -> fem.Expression:
 def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
     """Return a DOLFINx mesh with all coordinates 0, to be set later.
 
-    The cells are divided evenly: rank r keeps the r-th part of them.
+    The cells are divided evenly among the ranks: rank r keeps the r-th part of them, in their
+    order. All ranks call the function together.
 
     Args:
         comm: Communicator.
-        cells: Nodes of all cells, in Basix's order, shape (cells, nodes of a cell).
-        nodes: Number of nodes.
-        element: Coordinate element.
+        cells: Nodes of all cells, the same on all ranks, in Basix's order, shape (cells, nodes of a
+            cell).
+        nodes: Number of nodes of the whole mesh.
+        element: Coordinate element of UFL or Basix, whose reference value has the geometric
+            dimension.
     """
     coordinates = np.zeros((nodes, element.reference_value_shape[0]))
     rank_cells = np.array_split(cells, comm.size)[comm.rank]
     rank_coordinates = np.array_split(coordinates, comm.size)[comm.rank]
 
     def keep_on_rank(*_: object) -> object:
+        """Return the graph that sends each cell of this rank to the rank itself.
+
+        DOLFINx calls it with the communicator, the number of parts and the cells, which are not
+        needed.
+        """
         destinations = np.full((len(rank_cells), 1), comm.rank, np.int32)
         graph = dolfinx.graph.adjacencylist(destinations)
         return getattr(graph, "_cpp_object", graph)  # DOLFINx 0.9 has no Python class
@@ -118,19 +130,30 @@ def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfi
 
 
 def option_is_used(name: str) -> bool:
-    """True if PETSc has asked for the option; by C, since petsc4py 3.22 has no call for it."""
+    """Return whether PETSc has asked for an option since it was set.
+
+    It is asked by PETSc's C library, since petsc4py 3.22 has no call for it.
+
+    Args:
+        name: Name of the option without its dash, such as "rve_ksp_type". Of one that is not set
+            the answer is False.
+    """
     interface = cffi.FFI()
     interface.cdef("int PetscOptionsUsed(void *options, const char *name, char *used);")
-    used = interface.new("char[8]")  # as large as any PetscBool
+    # PetscBool is an enumeration or a C bool, by the version: 8 bytes hold either, and any byte
+    # that is not 0 says true.
+    used = interface.new("char[8]")
     library: Any = interface.dlopen(PETSc.__file__)
     library.PetscOptionsUsed(interface.NULL, name.encode(), used)
     return any(byte != b"\0" for byte in used)
 
 
 def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
-    """Return a PETSc matrix of this rank alone on the values of a SciPy one.
+    """Return a sparse PETSc matrix of this rank alone that shares the values of a SciPy one.
 
-    The indices of `matrix` are to be sorted. The PETSc matrix follows changes of its values.
+    Args:
+        matrix: Matrix in compressed rows, whose column indices are sorted in each row. The result
+            follows changes of its values in place.
     """
     indptr = np.asarray(matrix.indptr, PETSc.IntType)
     indices = np.asarray(matrix.indices, PETSc.IntType)
@@ -141,10 +164,17 @@ def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
 
 
 def columns(vectors: Array) -> PETSc.Mat:
-    """Return a dense PETSc matrix whose columns are the rows of an array, shape (n, size).
+    """Return a dense PETSc matrix of this rank alone whose columns are the rows of an array.
 
     PETSc stores a dense matrix column by column, which is the layout of the transpose of a
-    contiguous array. The matrix then has its values in the array, else in a copy.
+    C-contiguous array. The matrix of such an array has its values in the array itself, so that what
+    PETSc writes appears there; of another array it has a copy.
+
+    Args:
+        vectors: Array of floats, shape (n, size).
+
+    Returns:
+        Assembled matrix of shape (size, n).
     """
     vectors = np.ascontiguousarray(vectors)
     result = PETSc.Mat().createDense(vectors.T.shape, array=vectors.T, comm=PETSc.COMM_SELF)
@@ -153,9 +183,14 @@ def columns(vectors: Array) -> PETSc.Mat:
 
 
 def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
-    """Return a Cholesky solver of a matrix by CHOLMOD, or by MUMPS where PETSc is without it.
+    """Return a solver by the Cholesky factors of a matrix.
 
-    Options of PETSc with this prefix override that.
+    The factors are by CHOLMOD, or by MUMPS where PETSc has been built without it; they are computed
+    at the first solution.
+
+    Args:
+        matrix: Symmetric positive definite matrix; it is marked as such.
+        prefix: Prefix of the PETSc options that override these settings.
     """
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(matrix.comm)

@@ -49,9 +49,19 @@ QUANTITIES = (
     "nu",
     "s11",
     "s12",
-    *FIBRES,
-    *NAMES,
-    *(name + SUFFIXES[FREE] for name in NAMES),
+    "E_T",
+    "E_L",
+    "nu_LT",
+    "G_T",
+    "G_L",
+    "E_x",
+    "E_y",
+    "nu_xy",
+    "G_xy",
+    "E_x_free",
+    "E_y_free",
+    "nu_xy_free",
+    "G_xy_free",
 )
 """Outputs with α-cuts: moduli and stresses in Pa; s11 and s12 are mean stresses, eq. 15."""
 
@@ -148,7 +158,12 @@ class FuzzyStiffness:
         return self.bounds.samples.values.output(output)
 
     def __str__(self) -> str:
-        """Return a line for each constant with its lowest and highest α-cut."""
+        """Return a text of some lines without a newline at the end.
+
+        The first two have the model, the number of samples, the time in s, the average and the
+        relative error of E. Then follows a line for each constant and loss factor with its α-cuts
+        on the first and the last level, in SI, and their guarantee.
+        """
         error = f"{sum(self.error.values()):.1e}" if self.error else "not declared"
         lines = [
             f"fuzzy stiffness by {self.model}: {self.bounds.evaluations} samples,"
@@ -162,7 +177,13 @@ class FuzzyStiffness:
         return "\n".join(lines)
 
     def _cut_text(self, name: str, cuts: Array, guarantee: Nature) -> str:
-        """Return a constant's cuts on the lowest and the highest level, shape (levels, 2)."""
+        """Return a line with a constant's cuts on the first and last level, and their guarantee.
+
+        Args:
+            name: Name at the beginning of the line.
+            cuts: Lower and upper bounds at rising levels, shape (levels, 2), in SI.
+            guarantee: Written in brackets at the end.
+        """
         first, last = self.bounds.alpha[[0, -1]]
         lowest, highest = cuts[0], cuts[-1]
         return (
@@ -178,7 +199,14 @@ class FuzzyStiffness:
     __repr__ = __str__
 
     def to_csv(self, path: str) -> None:
-        """Write a row for each constant and level: bounds in SI, and their guarantee."""
+        """Write a CSV file with a row for each constant and each α-level.
+
+        The columns are constant, alpha, lower and upper (bounds in SI: moduli and stresses in Pa)
+        and guarantee. Loss factors are not written.
+
+        Args:
+            path: Name of the file, which is replaced; an OSError if it cannot be written.
+        """
         lines = ["constant,alpha,lower,upper,guarantee"]
         for name in self.constants:
             guarantee = self.bounds.nature_of(name)
@@ -190,10 +218,15 @@ class FuzzyStiffness:
             file.write("\n".join(lines) + "\n")
 
     def to_dataset(self) -> xarray.Dataset:
-        """Return a dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples.
+        """Return a dataset in SI of α-cuts, of the inputs that reach them, and of the samples.
 
-        Each constant has its values NAME_sample, `point` has the inputs of the samples and
-        `curve11` their stresses σ11 over θ, with `curve_error` as attribute "relative_error".
+        Returns:
+            Dataset with, for each constant NAME, the variables NAME, bounds of shape (alpha,
+            bound); NAME_at, the inputs at which they are attained, shape (alpha, bound, parameter);
+            and NAME_sample, its values at all samples. Then loss_NAME, shape (alpha, bound), where
+            phases have loss factors; `point`, the inputs of the samples, shape (sample, parameter);
+            and `curve11`, their stresses σ11 over θ, shape (sample, theta), whose attribute
+            "relative_error" is the error of a stress at a single θ.
         """
         import xarray
 
@@ -223,7 +256,13 @@ class FuzzyStiffness:
 
 
 def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
-    """Return the fuzzy number of α-cuts (levels, 2); the mean of both ends on level 1 alone."""
+    """Return the fuzzy number of α-cuts; between two levels the wider cut holds.
+
+    Args:
+        alpha: Rising levels, shape (levels,).
+        cuts: Lower and upper ends, shape (levels, 2). Of the level 1 alone the result is the crisp
+            mean of both ends.
+    """
     if tuple(alpha) == (1.0,):
         return Crisp(float(cuts.mean()))
     return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
@@ -328,10 +367,24 @@ class FuzzyCell:
         phases: Phases,
         inputs: Mapping[str, FuzzyNumber | float],
     ) -> FuzzyCell:
-        """Return the cell of arguments of `fuzzy_stiffness`.
+        """Return the cell with fuzzy inputs that the arguments of `fuzzy_stiffness` describe.
+
+        Args:
+            radius: Radius map over θ at the nominal inputs; of the user's own mesh the distribution
+                of θ.
+            phases: Matrix and inclusion at the nominal inputs, or a mapping from names to phases of
+                a mesh.
+            inputs: Numbers or fuzzy numbers in SI by the names of parameters: the float fields of
+                `radius`, and NAME_modulus, NAME_poisson and NAME_loss of phase NAME.
+
+        Returns:
+            Cell whose `inputs` are all but the loss factors, or a crisp "unchanged" if there are no
+            others, since a campaign needs one; and whose `losses` are those of all phases in their
+            order, by `inputs` or else as the phase states, and empty if all are 0.
 
         Raises:
-            RefusedError: An input is no parameter of the radius or of a phase.
+            RefusedError: An input is no parameter of the radius or of a phase, or there are not two
+                phases without names.
         """
         named = _named(phases)
         parameters = _parameters(radius, named)
@@ -373,9 +426,12 @@ class FuzzyCell:
         return cast("RadiusMap", replace(cast("Any", self.radius), **changes))
 
     def phases_at(self, values: Mapping[str, float]) -> dict[str, AnyPhase]:
-        """Return the phases by name at values of the inputs.
+        """Return the phases by name, with the fields that inputs replace.
 
-        An input NAME_FIELD is the field of the phase NAME.
+        Args:
+            values: Values of the inputs in SI by name. NAME_FIELD, such as matrix_modulus, is the
+                field FIELD of the phase NAME; other inputs are ignored, and fields without one stay
+                nominal.
         """
         found = {}
         for name, phase in self.phases.items():
@@ -441,7 +497,18 @@ class CellSamples:
         return np.asarray(np.linspace(distribution.lower, distribution.upper, 61))
 
     def solve(self, points: Sequence[Mapping[str, float]]) -> list[HomogenisedStiffness]:
-        """Return the result at each point; points differ in the particle's modulus alone."""
+        """Return the results of the cell at some points of the fuzzy inputs, in their order.
+
+        Args:
+            points: Values of the inputs in SI by name, one point at least. They differ in the
+                Young's modulus of the particle alone, so that matrix and radius are those of the
+                first point.
+
+        Raises:
+            RefusedError: The model refuses the phases or the radius, or the results lack what the
+                average needs.
+            FailedError: The model does not reach its accuracy.
+        """
         cells = [self.cell.phases_at(point) for point in points]
         radius = self.cell.radius_at(points[0])
         if self.cell.has_particle:
@@ -457,14 +524,42 @@ class CellSamples:
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Return the outputs at each point by name, moduli and stresses in Pa.
 
-        Beside `QUANTITIES` these are the number of linear systems, the stress curve "curve11" at
-        `theta` with its error, errors of E by source, checks, and bounds of the loss factors, shape
-        (levels, 3).
+        Args:
+            points: Values of the inputs in SI by name, one point at least, which differ in the
+                Young's modulus of the particle alone.
+
+        Returns:
+            For each point "E", "nu", the mean stresses "s11" and "s12" of the paper's eq. 15, and
+            the constants across and along fibres and along x and y that the result has; "systems",
+            the number of linear systems; the stress curve "curve11" over `self.theta` with the
+            error "curve_error"; "error:space" and "error:theta" of E; "check:NAME"; and, with loss
+            factors, "loss_lower" and "loss_upper", shape (levels, 3) for E, G, K, with
+            "loss_error".
+
+        Raises:
+            FailedError: The model does not reach its accuracy, or no isotropic solid has such
+                moduli.
+            RefusedError: The model refuses the phases or the radius.
         """
         return [self._outputs(result) for result in self.solve(points)]
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
-        """Return the outputs of one result; see `__call__`."""
+        """Return the outputs of one result by name, moduli and stresses in Pa.
+
+        Args:
+            result: Result of the cell; with strain energies where `self.loss_cuts` is set.
+
+        Returns:
+            "E", "nu", the mean stresses "s11" and "s12", and those of the constants across and
+            along fibres and along x and y that the result has; "systems", the number of linear
+            systems; "curve11", σ11 at `self.theta`, with "curve_error"; "error:space" and
+            "error:theta", relative errors of E, 0 if not declared; "check:NAME", relative
+            violations; and, if `self.loss_cuts` is set, "loss_lower" and "loss_upper", shape
+            (levels, 3) for E, G and K, with "loss_error", shape (3,), 0 if not declared.
+
+        Raises:
+            FailedError: No isotropic solid has such moduli: 2 G_T exceeds 3 (C11 + C12).
+        """
         require_isotropic(result)
         curve = result.curve
         s11, s12 = curve.mean
@@ -489,6 +584,7 @@ class CellSamples:
             bounds, errors = loss_bounds(result, self.loss_cuts)
             outputs["loss_lower"] = bounds[:, 0]
             outputs["loss_upper"] = bounds[:, 1]
+            # Arrays of samples hold no NaN: an error that is not declared is 0 here.
             outputs["loss_error"] = np.nan_to_num(errors)
         return outputs
 
@@ -510,13 +606,23 @@ def plane_constants_by_name(result: HomogenisedStiffness) -> dict[str, float]:
 
 
 def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
-    """Return the signs of the inputs' effects on E where mechanics proves them, else none.
+    """Return the signs of the inputs' effects on E where mechanics proves them, else no knowledge.
 
     If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all values,
     more of it can only stiffen the cell: A = 2 C33 and B = C11 + C12 of fibres rise (the paper's
     eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both averages of the
     shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, since h_i ≥ 0, and falls with
     a4, since h4 ≤ 0 (the paper's eq. 12).
+
+    Args:
+        model: Model of the cell; only one whose errors are of rounding keeps these signs.
+        cell: The cell with its fuzzy inputs.
+
+    Returns:
+        For each input of a1 … a4, fraction, matrix_modulus and inclusion_modulus that the cell has,
+        1 if E rises with it and −1 if it falls; empty if a condition is not met: an inexact model,
+        no particle, phases that are not isotropic, Poisson's ratios that differ, are fuzzy or
+        negative, or moduli whose supports overlap.
     """
     is_isotropic = all(isinstance(phase, Phase) for phase in cell.phases.values())
     if not (model.is_exact and cell.has_particle and is_isotropic):
@@ -527,6 +633,7 @@ def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
         return Knowledge()
     matrix = cell.support("matrix_modulus")
     inclusion = cell.support("inclusion_modulus")
+    # Where both moduli are equal, more of either phase changes nothing.
     if inclusion.lower >= matrix.upper:
         effect = 1  # of more inclusion on E
     elif inclusion.upper <= matrix.lower:
@@ -552,12 +659,13 @@ def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> 
     The points are the midpoints of the narrowest and of the widest cut of the inputs.
 
     Args:
-        bounds: The cuts.
-        coarse: Samples by the coarser model.
+        bounds: The cuts of E and of the inputs, at rising levels.
+        coarse: Samples by the coarser model; two are solved here.
         error: Relative error of E that the cuts declare.
 
     Raises:
-        FailedError: E at such a point lies outside a cut by more than the errors of both.
+        FailedError: E at such a point lies outside a cut that contains the point by more than the
+            errors of both.
     """
     cuts = np.stack(bounds.bounds("E"), axis=1)
     for alpha in bounds.alpha[[-1, 0]]:
@@ -574,7 +682,13 @@ def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> 
 
 
 def _largest_by_name(bounds: Bounds, *, kind: str) -> dict[str, float]:
-    """Return the largest value over all samples of each output KIND:NAME, by NAME."""
+    """Return the largest value over all samples of each output whose name is KIND:NAME, by NAME.
+
+    Args:
+        bounds: Bounds with their samples.
+        kind: The kind, such as "check" or "error". Without outputs of this kind the result is
+            empty.
+    """
     assert bounds.samples is not None
     values = bounds.samples.values
     return {
@@ -600,20 +714,26 @@ def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Ar
 def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:
     """Return bounds of the loss factors of E, G and K over the α-cuts of those of the phases.
 
+    To first order they are linear in the loss factors of the phases, so that each is extreme at
+    ends of the cuts.
+
     Args:
-        result: Result of a cell, with the energies of its phases.
-        cuts: α-cuts of each phase's loss factor, the same of its K and G, shape (levels, 2,
-            phases).
+        result: Result of a cell, with the strain energies of its phases.
+        cuts: Lower and upper end at each α-level of each phase's loss factor, the same of its K and
+            G, shape (levels, 2, phases).
 
     Returns:
-        Lower and upper bounds, shape (levels, 2, 3), and the declared errors, shape (3,).
+        Lower and upper bounds, shape (levels, 2, 3), and the declared absolute errors where each is
+        largest in the first cut, shape (3,), NaN where the model declares none; the last axis is E,
+        G, K.
     """
     assert result.energies is not None
     fractions, _ = result.energies.energy_fractions(result.constants_of)  # (phases, 2, 3)
 
     # To first order the loss factor of a constant is the sum of those of the phases times their
     # energy fractions. So it is extreme where each phase has the end of its cut that the sign of
-    # its fraction says.
+    # its fraction says. A fraction may be negative: E of the plane can fall
+    # where a phase becomes stiffer in shear.
     slopes = fractions.sum(axis=1).T  # (constants, phases)
     lower = cuts[:, 0, np.newaxis]
     upper = cuts[:, 1, np.newaxis]
@@ -642,12 +762,28 @@ def _cuts_of_losses(
     *,
     has_particle: bool,
 ) -> LossCuts:
-    """Return the loss factors' α-cuts: from the least lower bound of all samples to the greatest.
+    """Return the α-cuts of the loss factors of E, G and K over all samples of a campaign.
 
-    Errors are those of the reference, else the largest of the samples; none of the user's own mesh.
+    They reach from the smallest lower bound of all samples in a cut to the largest upper one.
+
+    Args:
+        bounds: Bounds of the samples' outputs "loss_lower[level][constant]" and "loss_upper…",
+            where the constants 0, 1 and 2 are E, G and K, with the samples.
+        reference: Result at the nominal inputs whose errors are declared; None for those of the
+            samples.
+        phase_cuts: α-cuts of each phase's loss factor, shape (levels, 2, phases).
+        has_particle: Whether the phases are matrix and particle. On a mesh of the user's own no
+            error is declared without a reference.
+
+    Returns:
+        `E`, `G` and `K`, lower and upper bounds of shape (levels,) each; `error`, their absolute
+        errors by name, of the reference or else the largest of the samples, or empty; and `nature`,
+        which says that the bounds are attained.
     """
     lower: Array = np.empty((len(CONSTANTS), len(bounds.alpha)))
     upper: Array = np.empty_like(lower)
+    # The bounds of sample outputs are over each α-cut of the inputs; of an output that itself
+    # belongs to a level only the cut of this level is used.
     for constant, level in np.ndindex(lower.shape):
         column = f"[{level}][{constant}]"
         lower[constant, level] = bounds.bounds(f"loss_lower{column}").lower[level]

@@ -13,28 +13,38 @@ STOP_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasat
 
 
 def end_on_second(number: int) -> None:
-    """Lets a second signal end the process while the first waits for the end of compiled code.
+    """Let a second signal end the process while the first waits for the end of compiled code.
 
     The C library's one-shot handler, where it has one, is that of Python for the first signal and
-    the system's default after it.
+    the system's default after it. Python's own handler, as `signal.getsignal` shows it, stays.
+    Without `sysv_signal` in the C library nothing is changed.
+
+    Args:
+        number: Number of a signal, for which Python has a handler.
     """
     library = ctypes.CDLL(None)
     if hasattr(library, "sysv_signal"):
         library.sysv_signal.restype = ctypes.c_void_p
         library.sysv_signal.argtypes = (ctypes.c_int, ctypes.c_void_p)
+        # The only way to learn the address of Python's handler is to replace it. What arrives
+        # between these two calls is lost.
         handler = library.sysv_signal(number, int(signal.SIG_IGN))  # returns the one before
         library.sysv_signal(number, handler)
 
 
 @contextmanager
 def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
-    """Context that delays Ctrl-C to its end, and restores the signal handlers there.
+    """Delay Ctrl-C to the end of a block, and restore the signal handlers there.
 
     PETSc loses exceptions that Python raises below it; basix and DOLFINx abort while they are
-    imported, and MPI replaces handlers. Outside the main thread the context does nothing.
+    imported, and MPI replaces handlers. At the end of the block the last Ctrl-C that came meanwhile
+    is handed to the handler from before, by default one that raises KeyboardInterrupt; it is
+    dropped if Ctrl-C was ignored before. Outside the main thread, and where Ctrl-C has the system's
+    default handler or one that Python does not know, the block is not changed.
 
     Args:
-        second_ends: Whether a second Ctrl-C, SIGTERM or SIGHUP ends the process at once.
+        second_ends: Whether a second Ctrl-C, SIGTERM or SIGHUP in the block ends the process at
+            once.
     """
     handler_before = signal.getsignal(signal.SIGINT)
     stop_handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
@@ -50,6 +60,7 @@ def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
     try:
         yield
     finally:
+        # MPI, PETSc and DOLFINx may have replaced any of them.
         for number, handler in {signal.SIGINT: handler_before, **stop_handlers}.items():
             if handler is not None:
                 signal.signal(number, handler)
