@@ -169,7 +169,7 @@ def examine_items(
         target: Values of side × output below which problems are closed, shape (N,).
         frontier: All open items, ordered by sub-box and then by problem.
         piece: Which sub-boxes of the frontier, and which items, are examined; the items must be all
-            items of these sub-boxes.
+            items of these sub-boxes, at least one.
 
     Returns:
         For each item, in order: `code` (0: closed; 1 + i: bisect along input i; from 16 on: confine

@@ -190,8 +190,9 @@ def bound_cell(
         cell: Index of the cell.
         node: Index of the time node.
         side: −1 or 1.
-        data: Models and tables of the output.
-        effort: Limits of the work: `steps`, `patience` and `ascents`.
+        data: Models and tables of the output; they are read only.
+        effort: Limits of the work: at most `steps` of the minimisation of the bound, `patience`
+            steps after which it expects less, and at most `ascents` steps of the ascent.
         target: Value of the dual function at which its minimisation ends.
         cells: All cells; `ends` of this one must be set, and `mu` is where the minimisation begins.
         model_value: Largest value of side × output in the model that is known before.
@@ -273,14 +274,17 @@ def model_and_gradient(
     """Return side × output in the model at inputs u, without its constants, and its gradient.
 
     The model takes frequencies, decays and participation factors of the modes as quadratic
-    polynomials of the inputs, responses by bilinear interpolation in tables, and truncated modes as
-    a quadratic.
+    polynomials z of the inputs, responses by bilinear interpolation in tables, and truncated modes
+    as a quadratic. The constants, its terms that no input changes, are those of truncated modes.
 
     Args:
         u: Inputs in [−1, 1], shape (L,).
         node: Index of the time node.
         side: −1 or 1.
-        data: Models and tables of the output.
+        data: `linear` (Z, L) and `quadratic` (Z, L (L + 1)/2) coefficients of z, the latter packed
+            by rows i ≤ j; `truncated_response` (terms, T), by which `truncated_linear` and
+            `truncated_quadratic`, coefficients in the same order, are multiplied; and the tables
+            that `response_and_gradient` reads.
         gradient: Overwritten with the derivatives by the inputs, shape (L,).
     """
     u_products = np.empty(data.quadratic.shape[1])
@@ -386,7 +390,8 @@ def ascend(u: Array, node: int, side: float, data: DualFunctionData, steps: int)
         u: Inputs to begin at, shape (L,); overwritten with the best ones.
         node: Index of the time node.
         side: −1 or 1.
-        data: Models and tables of the output.
+        data: Models and tables of the output, as `model_and_gradient` takes them; they are read
+            only.
         steps: Most evaluations after the first; 0 leaves u as it is.
     """
     # Inputs are rounded to multiples of 1/grid, so that their path does not depend on rounding.

@@ -295,8 +295,9 @@ class Chords(NamedTuple):
             times: Rising, shape (N,), in s.
 
         Returns:
-            For each time the index `before` of the node at or before it, `after` of the next one,
-            and `fraction`, its place between both, 0 at a node, shape (N,) each.
+            For each time the index `before` of the node at or before it, `after` of the next node
+            (of the last one itself at the last node), and `fraction`, its place between both, 0 at
+            a node, shape (N,) each.
         """
         count = np.diff(node)
         before = np.repeat(node, np.append(count, 1))

@@ -70,6 +70,9 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
 
     Raises:
         StepError: The step is too coarse for a trajectory that attains a bound.
+        RefusedError: A trajectory does not exist, or is not finite.
+        FailedError: The reference method that the peaks of a system that is not linear are compared
+            with does not reach the last time.
     """
     if not flow.flow.exact:
         steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
@@ -99,6 +102,8 @@ def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
 
     Raises:
         StepError: The step is too coarse at inputs that attain a peak.
+        RefusedError: A trajectory does not exist, or is not finite.
+        FailedError: The method of another kind does not reach the last time.
     """
     d = len(bounds.inputs)
     inputs = np.stack([bounds.lower_at, bounds.upper_at])  # (2, A, T, m, d)
@@ -129,6 +134,7 @@ def _distance_from_reference(bounds: Envelope, flow: LagrangianFlow, points: Arr
         StepError: A trajectory is off by more than a fiftieth of the output's peak. Bounds are then
             attained by other trajectories than those they name.
         FailedError: The reference method does not reach the last time.
+        RefusedError: A trajectory does not exist, or is not finite.
     """
     inputs = []
     for point in points:
@@ -157,6 +163,10 @@ def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
     Args:
         bounds: The envelope.
         flow: Its trajectories as functions of the inputs.
+
+    Raises:
+        RefusedError: A trajectory does not exist, or is not finite.
+        StepError: A time step of one did not converge.
     """
     if bounds.between is not None:
         return bounds
@@ -183,6 +193,10 @@ def node_deviation(flow: Flow, points: Array) -> Array:
     Returns:
         Shape (T, m), in the units of the outputs. Row j belongs to the step that ends at node j;
         the first one is 0.
+
+    Raises:
+        RefusedError: A trajectory does not exist, or is not finite.
+        StepError: A time step of one did not converge.
     """
     finer, substeps = flow.finer()
     deviation: Array = np.zeros((len(flow.time) - 1, len(flow.outputs)))
