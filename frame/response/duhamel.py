@@ -151,8 +151,8 @@ def _absolute_moments(load: LinearPieces, offset: Array, decay: float, out: Arra
     """Write bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ, n = 0 … 4, at T time nodes t.
 
     A time x later than the beginning of an interval, at which the integrals are moments_j, they are
-    exp(−g x) Σ_j C(n, j) x^(n − j) moments_j + ∫₀ˣ τⁿ exp(−g τ) |f| dτ. The last integral is at most
-    the least of: the area under |f| times xⁿ; the largest |f| times xⁿ⁺¹/(n + 1), both times
+    exp(−g x) Σ_j C(n, j) x^(n − j) moments_j + ∫₀ˣ τⁿ exp(−g τ) |f| dτ. The last integral is at
+    most the least of: the area under |f| times xⁿ; the largest |f| times xⁿ⁺¹/(n + 1), both times
     max(exp(−g x), 1); the largest |f| times n!/gⁿ⁺¹, which is looked at where g x > 1.
 
     Args:
