@@ -102,6 +102,7 @@ class Jet:
         Args:
             units: Unit u of each parameter p, shape (d,): d/d(p/u) = u d/dp.
         """
+        # One factor for each row: the values, the first and the second derivatives.
         pairs = _pairs(self.directions)
         factors = np.concatenate([[1.0], units, units[pairs.i] * units[pairs.j]])
         return self.map(lambda x: x * factors.reshape(-1, *[1] * (x.ndim - 1)))

@@ -294,7 +294,9 @@ def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
         beginning of the step, then of each load at its end.
     """
     moments = np.array([load_moments(load, step, count, 2) for load in loads])
-    mean, first_moment = np.moveaxis(moments.reshape(len(loads), count, 2) / step, -1, 0)
+    by_load = moments.reshape(len(loads), count, 2) / step  # also without loads
+    mean = by_load[..., 0]
+    first_moment = by_load[..., 1]
     # of a line from a to b: mean (a + b)/2 and first moment a/3 + b/6, so that a − b = 6 tilt
     tilt = 2 * first_moment - mean
     return np.concatenate([mean + 3 * tilt, mean - 3 * tilt]).T

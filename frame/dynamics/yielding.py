@@ -293,11 +293,16 @@ def load_substeps(loads: Sequence[History], time: Array, *, longest: float) -> L
     for load in loads:
         sample_times.append(load.start + np.arange(len(load.samples)) * load.step)
     samples = np.unique(np.concatenate(sample_times))
-    # samples that lie on a node, or on another load's sample, but for rounding, make no new edge
-    is_new = np.abs(samples - np.round(samples / step) * step) > SAME * step
-    is_new &= (samples < time[-1]) & (np.diff(samples, prepend=-1.0) > SAME * step)
+    # Samples that lie on a node, or on another load's sample, but for rounding, make no new edge.
+    nearest_nodes = np.round(samples / step) * step
+    is_new = np.abs(samples - nearest_nodes) > SAME * step
+    is_new &= samples < time[-1]
+    is_new &= np.diff(samples, prepend=-1.0) > SAME * step
     segments = np.union1d(time, samples[is_new])
-    edges_before = np.append(0, np.cumsum(np.ceil(np.diff(segments) / longest)))
+    # Each segment is divided into equal substeps. The number of edges before each end of a segment
+    # is known, and the times of all edges lie on straight lines between these ends.
+    substeps = np.ceil(np.diff(segments) / longest)
+    edges_before = np.append(0, np.cumsum(substeps))
     edges = np.interp(np.arange(edges_before[-1] + 1), edges_before, segments)
     first = np.zeros((len(edges) - 1, len(loads)))
     last = np.zeros((len(edges) - 1, len(loads)))

@@ -249,7 +249,9 @@ class _Table:
         times = [Decimal(cells[0]) for cells in self.rows.values()]
         finest = min(int(time.as_tuple().exponent) for time in times)
         digits = max(len(time.as_tuple().digits) for time in times)
-        return float(10.0 ** max(finest, max(times).adjusted() + 1 - digits))
+        # `adjusted` is the exponent of the first digit of a decimal number.
+        last_of_largest = max(times).adjusted() + 1 - digits
+        return float(10.0 ** max(finest, last_of_largest))
 
 
 def _with_units(heads: Sequence[str]) -> str:

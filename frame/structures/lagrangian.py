@@ -99,7 +99,8 @@ class LagrangianSystem(StructureModel):
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """Return the initial state (q0, v0) as expressions in the parameters, n of each."""
-        p, n = self.symbols.p, self.coordinates
+        p = self.symbols.p
+        n = self.coordinates
         q0 = _expressions("initial", lambda: self.initial(p)[0], p, n)
         v0 = _expressions("initial", lambda: self.initial(p)[1], p, n)
         return q0, v0
@@ -114,7 +115,8 @@ class LagrangianSystem(StructureModel):
         Raises:
             RefusedError: The function of the output does not give one expression.
         """
-        q, p = list(self.symbols.q), self.symbols.p
+        q = list(self.symbols.q)
+        p = self.symbols.p
         function = self.observed[name]
         values = _expressions(f"observed: {name}", lambda: [function(q, list(velocity), p)], p)
         return values[0]

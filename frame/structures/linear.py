@@ -258,7 +258,8 @@ class Matrices:
         Raises:
             numpy.linalg.LinAlgError: There is a static force and K is singular.
         """
-        q0, v0 = self.q0, self.v0
+        q0 = self.q0
+        v0 = self.v0
         # A static force has acted for ever, so that the structure rests under it, K q = f. An
         # impulse changes momenta M v at once.
         if self.static is not None:
@@ -345,17 +346,20 @@ def evaluate(
         # the nominal parameters may still be uncertain.
         if factor.value.any() or factor.first.any():
             damping = damping + factor[:, None, None] * matrix
-    mass, stiffness = full.mass, full.stiffness
+    mass = full.mass
+    stiffness = full.stiffness
     rows: Jet | Array = full.rows
 
-    size, a = len(full.pattern), full.massive
+    size = len(full.pattern)
+    a = full.massive
     if len(a) < size:
         # Unknowns b without mass, damping and loads are in equilibrium with the others (Guyan
         # 1965): q_b = T q_a with T = −K_bb⁻¹ K_ba. Then K_aa + K_ab T is the stiffness.
         b = np.setdiff1d(np.arange(size), a)
         follow = -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
         inner = (slice(None), a[:, None], a)
-        mass, damping = mass[inner], damping[inner]
+        mass = mass[inner]
+        damping = damping[inner]
         stiffness = stiffness[inner] + stiffness[:, a[:, None], b] @ follow
         on_displacements = full.rows[:, a] + full.rows[:, b] @ follow
         on_velocities = full.rows[:, a + size] + full.rows[:, b + size] @ follow
@@ -532,7 +536,8 @@ def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
 
     # 2 (√x − √y) / (x − y) = 2 / (√x + √y) has no cancellation where both modes are inside.
     quotients = (f[:, :, None] - f[:, None]) / safe_gaps
-    first = np.where(both_inside, 2 / sums, np.where(one_inside, quotients, 0.0))
+    mixed_first = np.where(one_inside, quotients, 0.0)
+    first = np.where(both_inside, 2 / sums, mixed_first)
 
     # Inside, f[x, y, z] = −2 / ((√x + √y) (√y + √z) (√z + √x)). Else it is the quotient
     # (f[x, y] − f[y, z]) / (x − z) by a pair of which one mode is inside and one outside. Divided
@@ -541,8 +546,10 @@ def _divided_differences(omega: Array, inside: Mask) -> _DividedDifferences:
     closed = -2 / (sums[..., None] * sums[:, None] * sums[:, :, None])
     by_i_k = (first[:, :, None] - first[:, None]) / safe_gaps[..., None]
     by_i_j = (first[..., None] - first[:, None]) / safe_gaps[:, :, None]
-    mixed = np.where(one_inside[..., None], by_i_k, np.where(one_inside[:, None], by_i_j, 0.0))
-    second = np.where(both_inside[..., None] & inside, closed, mixed)
+    by_i_j_or_none = np.where(one_inside[:, None], by_i_j, 0.0)
+    mixed = np.where(one_inside[..., None], by_i_k, by_i_j_or_none)
+    all_inside = both_inside[..., None] & inside
+    second = np.where(all_inside, closed, mixed)
     return _DividedDifferences(first, second)
 
 
@@ -586,7 +593,8 @@ def nominal_modes(system: LinearSystem) -> NominalModes:
         numpy.linalg.LinAlgError: The mass, or the stiffness of unknowns without mass, is singular.
     """
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
-    mass, damping = matrices.mass.value[0], matrices.damping.value[0]
+    mass = matrices.mass.value[0]
+    damping = matrices.damping.value[0]
     squared, shapes = undamped_modes(mass, matrices.stiffness.value[0])
     omega = np.sqrt(np.maximum(squared, 0.0))
     # The damping matrix need not be diagonal in the modes. Its diagonal φᵀ D φ = 2 ζ ω is what

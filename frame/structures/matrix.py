@@ -207,8 +207,10 @@ class MatrixStructure(LinearSystem):
                 whose sign is probably wrong.
         """
         mass = self.nominal_terms("mass").sum(axis=0)
-        a, b = self.massive, self.massless
-        is_definite = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
+        massive = self.massive
+        massless = self.massless
+        of_massive = mass[np.ix_(massive, massive)]
+        is_definite = len(massive) > 0 and np.linalg.eigvalsh(of_massive).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
         cure = "all rows and columns of unknowns that move have mass, coupled by a positive matrix"
         # An element's matrix is semidefinite, with a positive trace: a negative one tells which
@@ -221,12 +223,13 @@ class MatrixStructure(LinearSystem):
         self._require_stable(total)
         # Condensation divides by K_bb. An eigenvalue below 1e-14 of the largest entry is the
         # rounding of a zero one, of an unknown that no spring holds.
-        if not len(b):
+        if not len(massless):
             return
-        smallest = np.linalg.eigvalsh(total[np.ix_(b, b)]).min() / np.abs(total).max()
-        allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
+        of_massless = total[np.ix_(massless, massless)]
+        smallest = np.linalg.eigvalsh(of_massless).min() / np.abs(total).max()
+        allowed = f"springs that hold the unknowns without mass, {massless[:5].tolist()}"
         require(smallest > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
-        damped = [int(k) for k in b if self._arrays["damping"][:, k].any()]
+        damped = [int(k) for k in massless if self._arrays["damping"][:, k].any()]
         value = f"of unknowns {damped[:5]} without mass"
         require(not damped, "damping", value, "dampers between those with mass")
 

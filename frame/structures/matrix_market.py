@@ -55,9 +55,11 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     _require_numbers_alone(name, body)
 
     sizes = _numbers(name, body[0]) if body else np.empty(0)
-    n_sizes, cure = 2, "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
+    n_sizes = 2
+    cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
     if is_sparse:
-        n_sizes, cure = 3, "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
+        n_sizes = 3
+        cure = "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
     # A size beyond 64 bits stays one that is too large. Numbers were read as floats, and NumPy's
@@ -79,7 +81,8 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     matrix = dense_of_entries(name, shape, rows=rows - 1, columns=columns - 1, values=values)
     if is_symmetric:
         # The format asks for the lower triangle; programs that write the upper one are read, too.
-        lower, upper = np.tril(matrix, -1), np.triu(matrix, 1)
+        lower = np.tril(matrix, -1)
+        upper = np.triu(matrix, 1)
         has_both = bool(((lower != 0) & (upper.T != 0)).any())
         cure = "write general in the first line, or leave one triangle out"
         value = "symmetric, with entries on both sides of the diagonal"

@@ -205,8 +205,10 @@ class StoreyFrame(LinearSystem):
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
-        # Lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys
+        # Lengths that each list may have: 0 of optional ones, 1 of a moment of all storeys.
         sizes = dict.fromkeys(SYMBOLS, (0, n)) | {"second_moment": (1, n), "damping_ratio": (n,)}
+        # Fields that may be one number, and the parameters whose ranges they have. Rayleigh's two
+        # factors have the same range.
         single = {"modulus": "E", "damping_ratio": "zeta", "rayleigh": "rayleigh_mass"}
         for name, symbol in (SYMBOLS | single).items():
             values = getattr(self, name)
@@ -222,7 +224,8 @@ class StoreyFrame(LinearSystem):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
             if name in sizes and not (is_single and name in single):
-                size, allowed = np.size(values), f"{n}, as masses has, from below"
+                size = np.size(values)
+                allowed = f"{n}, as masses has, from below"
                 require(size in sizes[name], name, f"a list of {size}", allowed)
         require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
         require_choice("rayleigh_of", self.rayleigh_of, ("initial", "tangent"))
@@ -241,13 +244,15 @@ class StoreyFrame(LinearSystem):
         names = ("modulus", "second_moment", "columns", "lengths")
         given = [x for x in names if getattr(self, x) is not None and np.size(getattr(self, x))]
         examples = {"modulus": "200e9", "second_moment": "1e-6", "lengths": "[3.0]"}
-        needed, alternative = list(examples), ", or stiffness, as [30e6]"
+        needed = list(examples)
+        alternative = ", or stiffness, as [30e6]"
         if len(self.stiffness):
             beside = ", ".join(name for name in given if name != "lengths")
             allowed = "either stiffness or what makes it"
             require(not beside, beside, value="there", allowed=allowed)
             # Weights act over the height of a storey, which given stiffnesses do not tell.
-            needed, alternative = [], ""
+            needed = []
+            alternative = ""
             if self.gravity:
                 needed = ["lengths"]
         for name in needed:
@@ -397,6 +402,7 @@ class StoreyFrame(LinearSystem):
         """
         groups: dict[str, tuple[str, ...]] = {}
         for pattern in (*SYMBOLS.values(), "zeta{}"):
+            # A moment or a damping ratio of all storeys or modes has no number, and is no list.
             if pattern.format(1) in self.parameters:
                 short = pattern.format("").replace("_", "")
                 groups[short] = tuple(pattern.format(z + 1) for z in range(self.floors))
@@ -661,7 +667,8 @@ def chain_matrix(links: Array) -> Array:
         a mass, the others the negative of the link between two masses.
     """
     place = np.arange(links.shape[-1])
-    below, above = place[:-1], place[1:]
+    below = place[:-1]
+    above = place[1:]
     matrix = diagonal(links)
     matrix[..., below, below] += links[..., 1:]
     matrix[..., below, above] = -links[..., 1:]
