@@ -76,8 +76,8 @@ class Box:
         """Return models of the response over the box, with tables of its modes' responses.
 
         Args:
-            nodes: Indices of the time nodes that the models are for, rising, or a slice of them;
-                all unless given.
+            nodes: Indices of the time nodes that the models are for, rising, shape (nodes,), or a
+                slice of them; all unless given.
             truncation_tolerance: Allowed error of each selected output by modes that are not
                 enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
                 unless it is given.

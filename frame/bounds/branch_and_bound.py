@@ -403,7 +403,7 @@ def refine(
     Args:
         model: The modal model, whose outputs are maximised with the sign of the problem's side.
         optima: Points, shape (N, d), in unit coordinates, and values, shape (N,), of all problems.
-        problems: Numbers of the problems to improve, each once; none is allowed.
+        problems: Numbers of the problems to improve, each once, shape (P,); it may be empty.
         lower: Lower ends of the box, shape (d,), in unit coordinates.
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.

@@ -258,8 +258,11 @@ def _linked(pairs: Mask, modes: Ints, free: Ints) -> Ints:
 
     Args:
         pairs: Which modes are linked to which, shape (modes, modes), symmetric.
-        modes: Indices of the modes to begin with, without repetitions.
-        free: Indices of the modes that may be added.
+        modes: Indices of the modes to begin with, shape (begun,), without repetitions.
+        free: Indices of the modes that may be added, shape (free,).
+
+    Returns:
+        Indices of the modes, rising, shape (linked,).
     """
     while True:
         neighbours = np.intersect1d(free, np.flatnonzero(pairs[modes].any(axis=0)))

@@ -114,7 +114,8 @@ class BlockParticipation:
                 constant but for rounding.
             patterns: Vectors v of the sources in the same coordinates, shape (sources, n), as
                 functions of all inputs.
-            used: Which of all inputs are those of the block, rising indices.
+            used: Indices, among all inputs, of those of the block, rising, shape (inputs of the
+                block,).
 
         Returns:
             r X (p, m), Xᵀ M v and N⁻¹ Xᵀ M v (p, sources) as functions of all inputs; of the inputs
@@ -242,7 +243,7 @@ def damped_ranges(
         structure: The structure over the box, whose damping factors a, b and ζ vary in it.
         low: In 1/s², positive.
         high: In 1/s².
-        modes: Indices of the modes, at least one, for their damping ratios.
+        modes: Indices of the modes, shape (p,), p ≥ 1, for their damping ratios.
 
     Returns:
         `omega`, lower and upper end in rad/s, and `quotient`, those of g/ω.

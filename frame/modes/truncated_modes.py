@@ -586,8 +586,8 @@ def response_slopes(
 
     Args:
         source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
-        G: Bounds of |G| = |σ^ν ρ|, where ν is the order of the derivative by time and ρ the Duhamel
-            integral of the source, or exp(σ t).
+        G: Bounds of |G| = |σ^ν ρ|, of any shape, where ν is the order of the derivative by time and
+            ρ the Duhamel integral of the source, or exp(σ t).
         G_slope: Bounds of |dG/dσ|, same shape.
         omega: Smallest ω, in rad/s, positive; a number, or in the shape of G.
         quotient: Largest g/ω, likewise.

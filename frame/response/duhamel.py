@@ -281,7 +281,7 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
     """Check that the integrals of exponents σ are computed to rounding.
 
     Args:
-        sigma: Exponents σ in 1/s, of any shape; none of them passes.
+        sigma: Exponents σ in 1/s, of any shape; an empty array passes.
         step: Length of the intervals of the load, in s: |σ| step may be at most `MAX_PHASE` = 1e8.
         duration: Time over which ρ may grow, in s: Re σ duration may be at most 700.
 
