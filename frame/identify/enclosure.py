@@ -131,9 +131,10 @@ class LinearRelaxation:
         return float(ends[0]), float(ends[1])
 
     def product(self, x: Array, y: Array) -> Array:
-        """Return an expression for the product of two expressions, with bounds of it as rows.
+        """Return an expression for the product of two expressions, and enclose it by inequalities.
 
-        A variable z is added to the linear program for x y. With x in [a, b] and y in [c, d], the
+        A variable z is added to the linear program for x y, and rows, which are expressions that
+        must not exceed 0. With x in [a, b] and y in [c, d], the
         nonnegative products (x - a)(y - c), (b - x)(d - y), (b - x)(y - c) and (x - a)(d - y) give
         four rows that are linear in x, y and z (McCormick, Mathematical Programming 10, 147, 1976).
         If an expression is constant, the product is exact and nothing is added.
@@ -156,9 +157,10 @@ class LinearRelaxation:
         return z
 
     def exponential(self, y: Array) -> Array:
-        """Return an expression for exp(y), with bounds of it as rows.
+        """Return an expression for exp(y), and enclose it by inequalities.
 
-        A variable is added to the linear program. Since the exponential is convex, it lies above
+        A variable is added to the linear program, and rows, which are expressions that must not
+        exceed 0. Since the exponential is convex, it lies above
         its tangents at both ends and at the midpoint of the range of y, and below the secant of
         this range. The ends and the secant are widened by a few units of rounding. If y is
         constant, nothing is added.
