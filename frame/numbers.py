@@ -1,8 +1,9 @@
-"""Tuned numbers of the methods of this room.
+"""Tuned numbers of the proofs of this room.
 
-They decide how long a method takes and how wide its bounds are, never whether the bounds hold:
+They decide how long a proof takes and how wide its bounds are, never whether the bounds hold:
 `tests/frame/test_numbers.py` halves and doubles each of them and checks the same bounds. Each says
-what a larger number would do.
+what a larger number would do. Numbers that only say how long attained values are searched for, or
+how work is forecast, stand where they are used.
 """
 
 # Branch and bound over boxes of inputs (`bounds.spatial_branch_and_bound`).
@@ -86,20 +87,3 @@ computed. More narrow the bound between the nodes slightly."""
 NEWTON_GAP = 0.02
 """Fraction of the gap that Newton's method may leave. A larger number saves steps and leaves less
 of the gap to the search."""
-NEWTON_SAMPLES = 256
-"""Trajectories of the model at which the first optima begin. More find better optima in more
-time."""
-NEWTON_PIECE = 6000
-"""Largest number of problems of six inputs that are solved together. More would not fit into the
-cache of the processor."""
-NEWTON_LOCAL_STEPS = 6
-"""Newton steps by local maxima of the quadratic models. Problems that need more lie on ridges, and
-their models are maximised over all faces of the box, which takes longer."""
-NEWTON_RADIUS = 0.4
-"""First radius of the trust region in unit coordinates. With a larger one more first steps fail."""
-NEWTON_SOUND = 0.1
-"""Relative error of a predicted gain up to which the radius grows five times instead of twice. A
-larger number trusts the models more."""
-NEWTON_STEPS = 300
-"""Newton steps after which a problem that has not converged is left as it is; its optimum is still
-attained. More are almost never needed."""

@@ -25,7 +25,6 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.progress_bar import Progress
 from alphacut.base.threads import KernelThreads
-from alphacut.frame import numbers
 from alphacut.frame.bounds.kernel import (
     FACES,
     BoxTables,
@@ -379,7 +378,8 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
         Points, shape (2 T m, d), and values of side × output there, shape (2 T m,). They are
         attained by the model and thus lower bounds of the maxima, not guaranteed to be global.
     """
-    samples = chebyshev_points(len(lower), int(numbers.NEWTON_SAMPLES))
+    # Tuned: more samples find better optima in more time.
+    samples = chebyshev_points(len(lower), 256)
     unit = np.vstack([np.zeros((1, len(lower))), samples])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
     chunks = [model.values(points[k : k + 64]) for k in range(0, len(points), 64)]
@@ -408,7 +408,9 @@ def refine(
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.
     """
-    size = max(int(numbers.NEWTON_PIECE) * 6 // max(lower.size, 6), 1)
+    # Tuned: the arrays of more than 6000 problems of six inputs do not fit into the cache of a
+    # processor.
+    size = max(6000 * 6 // max(lower.size, 6), 1)
     for piece in np.array_split(problems, -(-len(problems) // size) or 1):
         _newton(model, optima, piece, lower, upper, min_gain)
 
@@ -442,15 +444,19 @@ def _newton(
         min_gain: In units of the outputs.
     """
     box_width = 2.0  # of the unit box [−1, 1]^d
-    radius: Array = np.full(len(problems), numbers.NEWTON_RADIUS)
+    # Tuned: with a larger first radius more first steps fail.
+    radius: Array = np.full(len(problems), 0.4)
     jets = _jets(model, optima.point[problems], problems)
     gradient = jets.gradient
     hessian = jets.hessian
-    for number in range(int(numbers.NEWTON_STEPS)):
+    # A problem that has not converged after 300 steps, which is rare, keeps an attained value.
+    for number in range(300):
         point = optima.point[problems]
         low = np.maximum(lower - point, -radius[:, np.newaxis])
         high = np.minimum(upper - point, radius[:, np.newaxis])
-        if number < numbers.NEWTON_LOCAL_STEPS:
+        # Problems that need more than six steps lie on ridges. Their models are maximised over all
+        # faces of the box, which takes longer (tuned).
+        if number < 6:
             step = local_maximum(gradient, hessian, low, high, rounds=2)
         else:
             step = global_maximum(gradient, hessian, low, high)
@@ -480,7 +486,9 @@ def _newton(
         hessian[is_better] = jets.hessian[is_better]
 
         ratio = actual / predicted
-        expansion = np.where(np.abs(ratio - 1) < numbers.NEWTON_SOUND, 5, 2)
+        # A gain within 10 % of the predicted one shows that the model is good far beyond the step
+        # (tuned).
+        expansion = np.where(np.abs(ratio - 1) < 0.1, 5, 2)
         wider = np.minimum(expansion * radius, box_width)
         narrower = 0.3 * np.abs(step).max(axis=1)
         radius = np.select([ratio > 0.75, ratio < 0.25], [wider, narrower], radius)

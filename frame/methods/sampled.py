@@ -21,8 +21,6 @@ from alphacut.fuzzy.plans.single_linkage import MIN_SAMPLES, SEED, SingleLinkage
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 
-SAMPLES = 64
-"""Independent points of each kind on each level (tuned: the estimate of an error rests on them)."""
 SKIPPED = 100_003
 """Points of the quasi-random sequence between those of two levels; no search reaches that far."""
 SAFETY = 2.0
@@ -280,7 +278,8 @@ def independent_excess(
 def independent_points(boxes: Boxes, level: int) -> Array:
     """Return points of a box that no search has used, in unit coordinates, (points, inputs)."""
     lower, upper = boxes.unit_ends(level)
-    return spread_points(lower, upper, SAMPLES, SKIPPED * (level + 1))
+    # 64 points of each kind (tuned: the estimate of an error rests on them, and each takes time).
+    return spread_points(lower, upper, 64, SKIPPED * (level + 1))
 
 
 def spread_points(lower: Array, upper: Array, count: int, skip: int) -> Array:
