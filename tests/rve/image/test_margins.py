@@ -19,6 +19,7 @@ from alphacut.rve.image.fields.energy import (
     energies,
     modes_of,
 )
+from alphacut.rve.image.losses import mean_loss
 from alphacut.rve.result.moduli import AVERAGES, AXES
 
 LOST = UNIT * (1 - 2.0**-20)  # just too little to change 1
@@ -69,6 +70,18 @@ def random_stiffness(rng):
     """A positive definite stiffness of space, (6, 6)."""
     factor = rng.normal(size=(6, 6))
     return factor @ factor.T + 3 * np.eye(6)
+
+
+def test_the_mean_of_losses_by_known_fractions_of_energy(rng):
+    """Against exact sums: dyadic fractions have the sum 1 without rounding."""
+    for _ in range(50):
+        fractions = np.diff(np.sort([0, *rng.choice(1023, 4, replace=False) + 1, 1024])) / 1024
+        losses = rng.uniform(0, 0.1, len(fractions))
+        ends = np.stack([fractions, fractions], axis=1)
+        low, high = (Fraction(x) for x in mean_loss(ends, losses, losses))
+        exact = sum(Fraction(f) * Fraction(x) for f, x in zip(fractions, losses, strict=True))
+        assert low <= exact <= high
+        assert high - low < 200 * Fraction(UNIT) * Fraction(losses.max())
 
 
 def test_the_sum_of_products():
