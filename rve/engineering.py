@@ -35,6 +35,7 @@ def constants(result: HomogenisedStiffness) -> DeclaredConstants:
         of_fibres = fibre_constants(result)
         values |= of_fibres.values
         errors |= of_fibres.errors
+    # Both definitions of the constants along x and y have the same names but for the ending.
     for definition, plane in engineering_constants(result).items():
         names = [f"{name}_free" if definition == FREE else name for name in NAMES]
         values |= dict(zip(names, map(float, plane.values), strict=True))

@@ -110,6 +110,7 @@ def mesh_of(comm: MPI.Intracomm, cells: Ints, nodes: int, element: Any) -> dolfi
             dimension.
     """
     coordinates = np.zeros((nodes, element.reference_value_shape[0]))
+    # Every rank knows the whole mesh and makes its own part, so that the partitioner sends no cell.
     rank_cells = np.array_split(cells, comm.size)[comm.rank]
     rank_coordinates = np.array_split(coordinates, comm.size)[comm.rank]
 
@@ -155,6 +156,7 @@ def aij(matrix: sp.csr_matrix) -> PETSc.Mat:
         matrix: Matrix in compressed rows, whose column indices are sorted in each row. The result
             follows changes of its values in place.
     """
+    # PETSc may be built for indices of 32 or of 64 bits; SciPy chooses by the size.
     indptr = np.asarray(matrix.indptr, PETSc.IntType)
     indices = np.asarray(matrix.indices, PETSc.IntType)
     csr = indptr, indices, matrix.data
@@ -192,13 +194,16 @@ def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
         matrix: Symmetric positive definite matrix; it is marked as such.
         prefix: Prefix of the PETSc options that override these settings.
     """
+    # Positive definite matrices alone have a Cholesky factor: PETSc is told that this one is.
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(matrix)
+    # The factors are the whole solution: no iteration follows them.
     ksp.setType("preonly")
     ksp.pc.setType("cholesky")
     library = "cholmod" if PETSc.Sys.hasExternalPackage("cholmod") else "mumps"
     ksp.pc.setFactorSolverType(library)
+    # Last, so that options of the user override all of the above.
     ksp.setFromOptions()
     return ksp

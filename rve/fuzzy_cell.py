@@ -263,6 +263,7 @@ def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
         cuts: Lower and upper ends, shape (levels, 2). Of the level 1 alone the result is the crisp
             mean of both ends.
     """
+    # On level 1 alone there is no support to give the fuzzy number a width.
     if tuple(alpha) == (1.0,):
         return Crisp(float(cuts.mean()))
     return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
@@ -306,11 +307,15 @@ def fuzzy_stiffness(
     cell = FuzzyCell.of(radius, phases, inputs)
     alpha_levels = tuple(levels(4) if alpha is None else alpha)
     loss_cuts = cell.loss_cuts(alpha_levels)
+    # Models may solve for a few moduli of the particle and interpolate between them; so they are
+    # told the range.
     modulus = cell.inputs.get("inclusion_modulus")
     sample_model = model.for_samples(
         None if modulus is None else modulus.support, energies=loss_cuts is not None
     )
     function = CellSamples(sample_model, cell, average=average, loss_cuts=loss_cuts)
+    # Samples that are alike in these inputs differ in the particle's modulus alone, and share a
+    # mesh.
     shared = tuple(name for name in cell.inputs if name != "inclusion_modulus")
     bounds = propagate(
         function,
@@ -321,6 +326,7 @@ def fuzzy_stiffness(
         knowledge=proved_signs(model, cell),
         **campaign,
     )
+    # A reference solution costs more than a sample: one at the nominal inputs stands for all.
     reference = None
     if model.errors_by_reference:
         reference = replace(function, model=model).solve([cell.nominal])[0]
@@ -329,6 +335,7 @@ def fuzzy_stiffness(
     if loss_cuts is not None:
         losses = _cuts_of_losses(bounds, reference, loss_cuts, has_particle=cell.has_particle)
     if bounds.nature_of("E") is Nature.GUARANTEED:
+        # A proof is tested by solutions of another resolution.
         coarse = replace(function, model=sample_model.coarser())
         require_consistent(bounds, coarse, error=sum(error.values()))
     return FuzzyStiffness(
@@ -394,6 +401,8 @@ class FuzzyCell:
             numbers[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
 
         # Loss factors are no coordinates of the samples. A campaign needs one input at least.
+        # The stiffness does not depend on loss factors, and theirs on those of the phases is
+        # linear.
         sampled = {name: x for name, x in numbers.items() if not name.endswith("_loss")}
         if not sampled:
             sampled = {"unchanged": Crisp(1.0)}
@@ -493,6 +502,7 @@ class CellSamples:
     @property
     def theta(self) -> Array:
         """Values of θ at which stress curves are kept, shape (61,)."""
+        # On a mesh of the user's own the radius map is replaced by the distribution of θ itself.
         distribution: Any = getattr(self.cell.radius, "distribution", self.cell.radius)
         return np.asarray(np.linspace(distribution.lower, distribution.upper, 61))
 
@@ -671,6 +681,7 @@ def require_consistent(bounds: Bounds, coarse: CellSamples, *, error: float) -> 
     for alpha in bounds.alpha[[-1, 0]]:
         midpoint = {name: float(np.mean(x.cut(alpha))) for name, x in bounds.inputs.items()}
         result = coarse.solve([midpoint])[0]
+        # Both models have errors: the cut by its declared one, the coarse one by its own.
         value = result.modulus
         slack = value * (error + sum(result.error.values()))
         # The point lies in the cuts of the inputs on this level and on all lower ones.

@@ -49,9 +49,12 @@ def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
     handler_before = signal.getsignal(signal.SIGINT)
     stop_handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     in_main_thread = threading.current_thread() is threading.main_thread()
+    # Python sets handlers in the main thread alone. Without a handler of Python, Ctrl-C ends the
+    # process by itself, which cannot be delayed from here.
     if not in_main_thread or handler_before in (None, signal.SIG_DFL):
         yield
         return
+    # A signal handler may only take notes: code below Python does not see its exceptions.
     received: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: received.append(number))
     if second_ends:

@@ -35,12 +35,13 @@ class ModelEntry:
         return found
 
 
-FIBRES = frozenset({"cylinders", "ellipses"})
 MODELS = [
+    # The order is that of preference: series are exact to rounding, slices are plane finite
+    # elements at nodes of θ, and prisms are finite elements that have θ as a third axis.
     ModelEntry("series", "series.model", "SeriesModel", frozenset({"cylinders"}), True),
     ModelEntry("series", "spheres.model", "SpheresModel", frozenset({"spheres"}), True),
-    ModelEntry("slices", "slices.model", "SlicesModel", FIBRES),
-    ModelEntry("prism", "prism.model", "PrismModel", FIBRES),
+    ModelEntry("slices", "slices.model", "SlicesModel", frozenset({"cylinders", "ellipses"})),
+    ModelEntry("prism", "prism.model", "PrismModel", frozenset({"cylinders", "ellipses"})),
 ]
 """All models; where a case says "auto", the first that fits is taken."""
 

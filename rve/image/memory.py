@@ -8,10 +8,12 @@ from collections.abc import Sequence
 
 from alphacut.base.errors import RefusedError
 
-BYTES_PER_ELEMENT = {2: 1450, 3: 1600}
-"""Memory of an element in the solutions of cuts with their first guess, by dimension; measured
-within 1.25 of peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of one, 64³ … 128³
-voxels."""
+
+def _bytes_per_element(dimension: int) -> float:
+    """Return the memory of an element in the solutions of all cuts with their first guess."""
+    # Measured within 1.25 of peaks at 128² … 512² pixels of two elements a side, 512² and 1024² of
+    # one, and 64³ … 128³ voxels.
+    return {2: 1450.0, 3: 1600.0}[dimension]
 
 
 def needed_memory(shape: Sequence[int], division: int = 1) -> float:
@@ -24,7 +26,7 @@ def needed_memory(shape: Sequence[int], division: int = 1) -> float:
     """
     program = 1e8  # of Python and its libraries, which are small beside any grid that matters
     elements = math.prod([n * division for n in shape])
-    return program + BYTES_PER_ELEMENT[len(shape)] * elements
+    return program + _bytes_per_element(len(shape)) * elements
 
 
 def require_memory(shape: Sequence[int], division: int = 1) -> None:
@@ -43,7 +45,7 @@ def require_memory(shape: Sequence[int], division: int = 1) -> None:
     # now counts where a file is read.
     if needed > available:
         n = len(shape)
-        side = int((available / BYTES_PER_ELEMENT[n]) ** (1 / n) / division)
+        side = int((available / _bytes_per_element(n)) ** (1 / n) / division)
         cells = {2: "pixels", 3: "voxels"}[n]
         what = f"{' × '.join(map(str, shape))} {cells}"
         allowed = f"up to {available / 1e9:.0f} GB of memory"

@@ -48,11 +48,6 @@ if TYPE_CHECKING:
 
 GUARANTEE = Nature.GUARANTEED
 """Guarantee of all bounds: they are proved of the image as segmented, repeated periodically."""
-CONSTANT_NAMES = {
-    2: NAMES,
-    3: ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy"),
-}
-"""Constants along the axes of an image in plane strain, and of a volume, by the dimension."""
 SIDES = "lower", "upper"
 """Names of the two bounds."""
 AlphaLevel = float | None
@@ -414,7 +409,10 @@ class FuzzyImageStiffness:
     def constants(self) -> dict[str, Array]:
         """Bounds of the constants along the axes by name, shape (A, 2) each, moduli in Pa."""
         values = np.moveaxis(np.array([cut.constants for cut in self.cuts]), 1, 0)
-        return dict(zip(CONSTANT_NAMES[len(self.lengths)], values, strict=True))
+        names: tuple[str, ...] = NAMES  # of an image in plane strain
+        if len(self.lengths) == 3:
+            names = ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy")
+        return dict(zip(names, values, strict=True))
 
     def __str__(self) -> str:
         """Return a text of some lines without a newline at the end.

@@ -104,6 +104,8 @@ def stress_checks(
         Violations by name: "symmetry", "reuss" and "voigt" over the largest energy and, of
         isotropic phases, "hashin_shtrikman" over the bulk modulus.
     """
+    # By the lemma of Hill and Mandel the mean stress under a load, times a load, is the mean energy
+    # of the pair of their fields.
     energy = loads @ mean(weights, stress)
     stiffness = [phase.stiffness for phase in phases]
     checks = order_checks(energy, loads, fractions, weights, stiffness)
@@ -133,6 +135,7 @@ def order_checks(
     Returns:
         Violations by the names "symmetry", "reuss" and "voigt", 0 for none.
     """
+    # Only energies of the loads are compared: of the bounds, too, only what these loads see.
     scale = float(abs(energy).max())
     reuss_energy = loads @ mean(weights, reuss(fractions, stiffness)) @ loads.T
     voigt_energy = loads @ mean(weights, voigt(fractions, stiffness)) @ loads.T
@@ -165,4 +168,5 @@ def mean(weights: Array, values: Array) -> Array:
 
 def _below(difference: Array) -> float:
     """Return by how much the smallest eigenvalue of a matrix's symmetric part lies below 0."""
+    # Rounding makes the matrix slightly unsymmetric; symmetry has a check of its own.
     return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0]))

@@ -185,9 +185,12 @@ class Mixture:
         low, high = self.bounds
         contrast_squared = float(self.differences[0] ** 2)
         tolerance = relative_error * bulk
+        # The error of the bulk modulus then covers as much of z̄ as the bounds do; equal bulk
+        # moduli of the phases say nothing of z̄ at all.
         if 2 * tolerance >= contrast_squared * (high - low) or contrast_squared == 0:
             return Interval((low + high) / 2, low, high)
         drop = self.fractions @ self.moduli[0] - bulk
+        # The value, and z̄ at both ends of the bulk modulus: z̄ falls with it.
         candidates = (drop + np.array([0, -tolerance, tolerance])) / contrast_squared
         return Interval._make(np.clip(candidates, low, high).tolist())
 
@@ -197,6 +200,7 @@ class Mixture:
 
     def lateral_and_axial(self, z: float) -> tuple[float, float]:
         """Return C13 = C23 of a cell of square symmetry, and C33, in Pa, from z̄ in 1/Pa."""
+        # Hill's relations: C13 = ⟨l⟩ − z̄ Δk Δl and C33 = ⟨n⟩ − z̄ Δl², with means ⟨⟩ by area.
         _, lateral, axial = self.moduli @ self.fractions
         bulk_contrast, lateral_contrast, _ = self.differences
         coupling = bulk_contrast * lateral_contrast
@@ -246,6 +250,7 @@ class AxialStiffness:
             return None
         mixture = Mixture.of_cell(cell)
         equibiaxial = np.array([1.0, 1.0, 0.0])
+        # Half of C (1, 1, 0): its mean normal component is the plane-strain bulk modulus.
         response = stiffness @ equibiaxial / 2
         bulk = float(response @ equibiaxial / 2)
         z, lower, upper = mixture.z_from_bulk(bulk, float(result.modulus_errors[0]))
@@ -258,6 +263,8 @@ class AxialStiffness:
         is_contrast = abs(bulk_contrast) > 1e-9 * mixture.moduli[0].max()
         ratio = lateral_contrast / bulk_contrast if is_contrast else 0.0
         anisotropic = response - bulk * equibiaxial
+        # The error of z̄ acts on C13 and C33 by Δk Δl and Δl²; the part that is not of square
+        # symmetry has the errors of C.
         mean_error = z_error * abs(bulk_contrast * lateral_contrast)
         anisotropic_errors = abs(ratio) * (errors @ equibiaxial) / 2
         return cls(

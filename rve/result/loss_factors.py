@@ -62,6 +62,8 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
     values, errors = first_order(energies, losses, constants_of=result.constants_of)
     if losses.max() > MAX_FIRST_ORDER and energies.moduli_at is not None:
         assert result.cell is not None
+        # Correspondence principle (Hashin, J. Appl. Mech. 32, 630, 1965): the cell has the elastic
+        # moduli at the complex moduli of its phases.
         phases = [phase for phase in result.cell.phases if isinstance(phase, Phase)]
         moduli = np.array([phase.bulk_and_shear for phase in phases]) * (1 + 1j * losses)
         cell_moduli = energies.moduli_at(moduli[:, 0], moduli[:, 1])
@@ -71,6 +73,7 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
         # Declared, not proved: terms of second order vanish where all phases have equal losses, and
         # are of the size of the squared differences.
         errors = errors + np.ptp(losses) ** 2 * values
+    # Rounding of the energies, which no model declares.
     round_off = 1e-12 * abs(values)
     return DeclaredConstants.from_arrays(CONSTANTS, values, errors + round_off)
 
@@ -96,6 +99,7 @@ def first_order(
         energies, not that of the first-order formula; NaN where unknown.
     """
     fractions, fraction_errors = energies.energy_fractions(constants_of)  # (phases, 2, 3)
+    # The sum is over the phases and over their bulk and shear modulus, the first two axes.
     factors = np.tensordot(losses, fractions)
 
     # The fractions of each modulus add up to 1, and their errors δf to 0, so that

@@ -97,6 +97,7 @@ def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
     """Return K of space or of plane strain, and G, of each phase, shape (2, phases), in Pa."""
     if space:
         return np.array([phase.bulk_and_shear for phase in phases if isinstance(phase, Phase)]).T
+    # In plane strain K is (C11 + C12)/2 and G is C33, whatever the phase is along the fibres.
     moduli = square_moduli(np.array([phase.stiffness for phase in phases]))
     return np.array([moduli[:, 0] / 2, moduli[:, 2]])
 
@@ -104,7 +105,10 @@ def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
 def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, float]:
     """Return what a reference material adds to K and to G of each phase, in Pa."""
     if space:
+        # By Hashin and Shtrikman (1963) the terms are those of a spherical inclusion in the
+        # reference, of Eshelby's tensor.
         return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
+    # By Hashin (1965) they are those of a cylinder across its axis.
     return shear, shear * bulk / (bulk + 2 * shear)
 
 

@@ -52,8 +52,10 @@ def reference_bounds(
     """
     bulk, shear = hashin_shtrikman(np.asarray(fractions, float), phases, space=space)
     if space:
+        # E rises with K and with G, so that its bounds are at those of both.
         young = 9 * bulk * shear / (3 * bulk + shear)
     else:
+        # C11 + C12 = 2 K and C11 − C12 = 2 G of an isotropic material in plane strain.
         moduli = np.stack([2 * bulk, 2 * shear, shear], axis=-1)
         young = plane_constants(moduli, AXES)[:, 0]
     return ReferenceBounds(_ends(bulk), _ends(shear), _ends(young))

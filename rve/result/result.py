@@ -60,6 +60,8 @@ class StressCurve:
     @classmethod
     def from_stiffness(cls, rule: ThetaRule, stiffness: Array) -> StressCurve:
         """Stress under the loads of eq. 15 from the stiffness at the nodes."""
+        # The loads of eq. 15 are ε11 = ε22 = STRAIN, and ε12 = STRAIN, whose Voigt component is 2
+        # ε12.
         s11 = STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1])
         return cls(rule.nodes, rule.weights, s11, 2 * STRAIN * stiffness[:, -1, -1], stiffness)
 
@@ -135,6 +137,8 @@ class PhaseEnergies:
             constants = young_shear_bulk(moduli + 1j * STEP * change, constants_of)
             return np.asarray(constants.imag / (STEP * constants.real))
 
+        # X ∂c/∂X is how the moduli c change with ln X. Through E, G and K it is a change of their
+        # logarithms: the fraction.
         fractions = np.apply_along_axis(logarithmic_change, -1, self.values)
         slopes = abs(np.array([logarithmic_change(unit) for unit in np.eye(3)]))
         is_unknown = np.isnan(moduli)
@@ -276,6 +280,7 @@ class HomogenisedStiffness:
         """Declared relative errors of the three mean moduli, all sources, (3,); nan if unknown."""
         if not self.errors:
             return np.full(3, np.nan)
+        # Errors of several sources are factors of a modulus, so that they are multiplied.
         return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
 
     @property
@@ -325,6 +330,8 @@ class HomogenisedStiffness:
         total = sum(errors.values())
         if total == 0:
             return errors
+        # E is no linear function of the moduli: its errors by source are scaled to add up to its
+        # whole error.
         return {name: self.estimated_error * error / total for name, error in errors.items()}
 
     @property
@@ -379,6 +386,7 @@ def largest_change(
     value = np.asarray(function(values))
     if not np.isfinite(errors).all():
         return np.full(value.shape, np.nan)
+    # A function that is monotone in each argument has its extremes at corners of the box.
     changes = []
     for signs in product((-1, 1), repeat=len(values)):
         changed = np.asarray(function(values * (1 + errors) ** np.array(signs)))

@@ -19,7 +19,7 @@ from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import Cell, Phase
 from alphacut.rve.result.engineering_constants import Mixture
 from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness
-from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
+from alphacut.rve.series.lattice_sums import LatticeSums, lattice_images, lattice_sums
 from alphacut.rve.series.means import SAFETY, finer_count
 from alphacut.stochastic import gauss_rule
 
@@ -164,7 +164,7 @@ def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, *, harmonic
     dipole = np.linalg.solve(system, source)[:, 0, 0]  # a_1
     # The sum over the images, Weierstrass' ζ, is not periodic: it jumps across the cell by this
     # (Legendre's relation), which is part of the mean strain.
-    jump = ZETA_PERIOD * radius * dipole
+    jump = LatticeSums.ZETA_PERIOD * radius * dipole
     return np.asarray(matrix * (1 - jump) / (1 + jump))
 
 

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import lgamma
+from typing import ClassVar
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.rve.cell.cell import AREA
-
-ZETA_PERIOD = np.pi / AREA
-"""Factor of conj(P) in ζ(z + P) − ζ(z), by Legendre's relation on the square lattice."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,10 @@ class LatticeSums:
 
     plain: Array
     conjugate: Array
+
+    # Factor of conj(P) in the jump ζ(z + P) − ζ(z) of Weierstrass' function over a period P, by
+    # Legendre's relation on the square lattice.
+    ZETA_PERIOD: ClassVar[float] = np.pi / AREA
 
     @cached_property
     def natanzon_period(self) -> float:

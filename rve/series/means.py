@@ -164,6 +164,7 @@ class Series:
                 finer, finest = (
                     self.solve(radius[rows], materials, n) for n in _error_terms(count)
                 )
+                # Two better values: the distance from one alone may be small by chance.
                 distance = _largest_distance(coarse, finer, finest)
                 i, j = np.nonzero(chosen[np.ix_(rows, columns)])
                 cells = (rows[i], columns[j])

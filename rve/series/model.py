@@ -38,12 +38,7 @@ from alphacut.rve.result.cell_model import AnyModel, Resolution
 from alphacut.rve.result.checks import with_checks
 from alphacut.rve.result.moduli import AVERAGES, AXES, square_voigt
 from alphacut.rve.result.result import HomogenisedStiffness
-from alphacut.rve.series.lattice_sums import (
-    ZETA_PERIOD,
-    LatticeSums,
-    lattice_images,
-    lattice_sums,
-)
+from alphacut.rve.series.lattice_sums import LatticeSums, lattice_images, lattice_sums
 from alphacut.rve.series.means import Material, Series, converged_means, mean_energies
 from alphacut.stochastic import RadiusMap
 
@@ -196,6 +191,8 @@ def _system(
         by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
     outer = mirror * contrast.outer[:, None, None]
     inner = mirror * contrast.inner[:, None, None]
+    # The b_n are put into the equations of the a_n: q* by their factor times p*, and by the term (n
+    # − 2) a_{n-2}.
     coupling = (to_next + a_to_q + by_shift)[:, None] + inner * (b_to_q @ to_p)[:, None]
     shape = len(radius), contrast.outer.size, orders.a.size
     source = np.zeros(shape, np.result_type(outer))
@@ -237,10 +234,11 @@ def modulus_of_load(load: str, radius: Array, contrast: Contrast, harmonics: int
     mu = contrast.mu
     if load == "hydrostatic":
         to_first = orders.to_p[0] * r ** (orders.a + 1)
+        # For the hydrostatic load ψ jumps by b_1, whose factor differs from those of the other b_n.
         b_1 = contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + r)
-        jump = ZETA_PERIOD * r * b_1  # of ψ across the cell
+        jump = LatticeSums.ZETA_PERIOD * r * b_1  # of ψ across the cell
         return np.asarray(mu * (4 + 2 * jump) / (kappa - 1 - jump))
-    jump = ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
+    jump = LatticeSums.ZETA_PERIOD * r * a[..., 0]  # of φ across the cell
     natanzon_jump = _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
         return np.asarray(2 * mu * (1 + natanzon_jump + jump) / (1 + natanzon_jump - kappa * jump))

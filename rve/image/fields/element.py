@@ -62,25 +62,33 @@ class Basis:
     places: tuple[Place, ...] = (Place(),)
 
 
-BASES = {
-    # values at both ends
-    (3, False): Basis(((1, -1), (0, 1)), ((0, 0), (0, 1))),
-    # quadratic B-splines, which sum to 2
-    (3, True): Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2))),
-    # values at 0, 1/2 and 1
-    (2, False): Basis(
-        functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
-        owners=((0, 0), (1, 0), (0, 1)),
-        places=(Place(), Place(0.5)),
-    ),
+def _basis(dimension: int, *, stress: bool) -> Basis:
+    """Return the functions of one coordinate of stresses or of displacements.
+
+    Stresses are second derivatives of potentials, so that the slopes of these are continuous.
+
+    Args:
+        dimension: 2 for pixels, 3 for voxels.
+        stress: Whether the unknowns are potentials of stresses; else they are displacements.
+    """
+    if dimension == 3 and not stress:  # values at both ends
+        return Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
+    if dimension == 3:  # quadratic B-splines, which sum to 2
+        return Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2)))
+    if not stress:  # values at 0, 1/2 and 1
+        return Basis(
+            functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
+            owners=((0, 0), (1, 0), (0, 1)),
+            places=(Place(), Place(0.5)),
+        )
     # Hermite's functions, with value and slope at 0, and value and slope at 1
-    (2, True): Basis(
+    return Basis(
         functions=((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1)),
         owners=((0, 0), (1, 0), (0, 1), (1, 1)),
         places=(Place(), Place(is_odd=True)),
-    ),
-}
-"""Basis by the dimension and by whether it is that of stresses."""
+    )
+
+
 SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}
 """Indices of the shear components in Voigt's order, by the dimension: 12, or 23, 13, 12."""
 
@@ -232,7 +240,7 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         polynomials that are orthonormal on the cell, constant first.
     """
     n = len(sides)
-    basis = BASES[n, stress]
+    basis = _basis(n, stress=stress)
     derivatives = stress_derivatives(n) if stress else strain_derivatives(n)
     names = unknown_functions(derivatives)
     tables = np.array([_derivative_modes(basis.functions, side) for side in sides])
