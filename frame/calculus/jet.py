@@ -105,7 +105,7 @@ class Jet:
         # One factor for each row: the values, the first and the second derivatives.
         pairs = _pairs(self.directions)
         factors = np.concatenate([[1.0], units, units[pairs.i] * units[pairs.j]])
-        return self.map(lambda x: x * factors.reshape(-1, *[1] * (x.ndim - 1)))
+        return self.map(lambda x: x * np.expand_dims(factors, tuple(range(1, x.ndim))))
 
     def __neg__(self) -> Jet:
         return Jet(-self.terms, self.directions)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations_with_replacement
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,11 @@ def count(d: int, degree: int) -> int:
     if d == 0:
         return int(degree == 0)
     return comb(d + degree - 1, degree)
+
+
+def zero_part(d: int, degree: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Array:
+    """Return the coefficients of a zero polynomial of one degree, shape (monomials, *shape)."""
+    return np.zeros((count(d, degree), *shape), dtype)
 
 
 @cache
@@ -157,7 +163,7 @@ def convolve(
 
     at = product_places(d, degrees[0], degrees[1])
     shape = bilinear(a[0], b[0]).shape
-    out = np.zeros((count(d, sum(degrees)), *shape), np.result_type(a, b))
+    out = zero_part(d, sum(degrees), shape, np.result_type(a, b))
     inner = 1
     if bilinear == matmul:
         inner = a.shape[-1]
@@ -211,7 +217,7 @@ def product_part(
         and b have this degree together.
     """
     shape = bilinear(a[0][0], b[0][0]).shape
-    total = np.zeros((count(d, degree), *shape), np.result_type(a[0], b[0]))
+    total = zero_part(d, degree, shape, np.result_type(a[0], b[0]))
     # k is the degree of the factor from b, and degree − k, that of the factor from a, must be
     # there.
     first = max(lowest[1], degree - len(a) + 1)

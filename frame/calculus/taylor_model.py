@@ -25,7 +25,6 @@ from numpy.typing import ArrayLike
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.monomials import (
     convolve,
-    count,
     derivative,
     exponents,
     matmul,
@@ -33,6 +32,7 @@ from alphacut.frame.calculus.monomials import (
     monomials,
     places,
     product_part,
+    zero_part,
 )
 from alphacut.frame.calculus.rounding import COMPLEX_ROUNDINGS, UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -122,7 +122,7 @@ class TaylorModel:
         """Return the coefficients of one degree, shape (monomials, *V); zeros if none are kept."""
         if degree < len(self.parts):
             return self.parts[degree]
-        return np.zeros((count(self.inputs, degree), *self.shape), self.parts[0].dtype)
+        return zero_part(self.inputs, degree, self.shape, self.parts[0].dtype)
 
     def part_magnitudes(self) -> list[Array]:
         """Return a bound over the box of the magnitude of each homogeneous part.
@@ -258,7 +258,7 @@ class TaylorModel:
             return self
         parts = []
         for degree, part in enumerate(self.parts):
-            wider_part = np.zeros((count(d, degree), *self.shape), part.dtype)
+            wider_part = zero_part(d, degree, self.shape, part.dtype)
             wider_part[places(inputs[monomials(self.inputs, degree)], d)] = part
             parts.append(wider_part)
         return TaylorModel(tuple(parts), self.remainder, d, self.order)
@@ -308,7 +308,8 @@ class TaylorModel:
         parts = []
         for degree, part in enumerate(shifted):
             scale = radius[monomials(self.inputs, degree)].prod(-1)
-            parts.append(scale.reshape(-1, *[1] * self.remainder.ndim) * part)
+            axes_of_functions = tuple(range(1, 1 + self.remainder.ndim))
+            parts.append(np.expand_dims(scale, axes_of_functions) * part)
         # each derivative is a sum of d terms; |midpoint| + radius ≤ 1, so that no term of the
         # shifted polynomial exceeds the bound of the part that it came from
         roundings = (len(self.parts) + 1) * (self.inputs + 4)
@@ -639,7 +640,7 @@ def _real_times(real: Array, coefficients: Array) -> Array:
 def _padded(part: Array, ndim: int) -> Array:
     """Return a part (monomials, *V) whose V has at least `ndim` axes, new ones on the left."""
     missing = max(ndim - (part.ndim - 1), 0)
-    return part.reshape(len(part), *[1] * missing, *part.shape[1:])
+    return np.expand_dims(part, tuple(range(1, 1 + missing)))
 
 
 def _product(
@@ -666,7 +667,7 @@ def _product(
     remainder = remainder + bilinear(np.asarray(sum(a_magnitudes)), b.remainder)
     degrees = range(min(order, len(a_magnitudes) + len(b_magnitudes) - 2) + 1)
     dtype = np.result_type(a.parts[0], b.parts[0])
-    parts = [np.zeros((count(a.inputs, k), *remainder.shape), dtype) for k in degrees]
+    parts = [zero_part(a.inputs, k, remainder.shape, dtype) for k in degrees]
     inner = 1  # products in each entry of `bilinear`
     if bilinear == matmul:
         inner = a.shape[-1]

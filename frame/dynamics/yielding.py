@@ -563,7 +563,7 @@ def _first_event(
 
 @compiled
 def _first_root(polynomial: Array, terms: int, end: float) -> float:
-    """Return the first τ in [0, end) from which on a polynomial is negative, or 1 for none.
+    """Return the first τ in [0, end) from which on a polynomial is negative, or 1 if there is none.
 
     Over an interval of width w a polynomial deviates from its chord by at most w²/8 times its
     largest second derivative, and its slope from that of the chord by w/2 times that. An interval
@@ -577,7 +577,7 @@ def _first_root(polynomial: Array, terms: int, end: float) -> float:
         end: End of the search, at most 1.
 
     Returns:
-        0 if the polynomial is negative at 0; `end` if it is not negative before, but is so there.
+        τ, 0 if the polynomial is negative there already; 1 if it is not negative before `end`.
     """
     # Shortest interval in which a double root is looked for. In it a polynomial differs from its
     # chord by w²/8 = 2⁻⁷¹ of its curvature, far below rounding.

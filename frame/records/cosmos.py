@@ -84,8 +84,8 @@ def read_cosmos(file: TextFile, channel: str = "", unit: str = "") -> Recording:
 
     Raises:
         RefusedError: There is no such channel, or the channel is not named and there are several;
-            the head of the channel is not understood, or it does not agree with the samples; or no
-            unit of acceleration is stated.
+            the head of the channel is not understood, or it does not agree with the samples; no
+            unit of acceleration is stated; or the step is not from 4e-5 s to below 0.5 s.
     """
     channels = list(_cosmos_channels(file))
     read = _read_cosmos

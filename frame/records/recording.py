@@ -62,8 +62,8 @@ class Recording:
         # Instruments sample 50 to 1000 times a second, and simulations at least ten times.
         if not 1e-4 <= self.step <= 0.1:
             yield f"its step is {self.step:g} s: check it"
-        # Vertical channels have one of these words, or a SEED code such as HNZ.
-        # The words must stand alone: "v" is vertical in "090 V", and not in "HNV1".
+        # Vertical channels have one of these words, or a SEED code such as HNZ. The words must
+        # stand alone: "v" is vertical in "090 V", and not in "HNV1".
         words = "up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z"
         if re.fullmatch(rf"(?:.*\W)?(?:{words})(?:\W.*)?", self.channel, re.IGNORECASE):
             yield f"its channel {self.channel} is vertical"
@@ -84,8 +84,8 @@ class Recording:
         if baseline != "none":
             samples = samples - samples.mean()
         if baseline == "linear":
-            # The maximum keeps a single sample from a division by zero.
             # With times of mean 0 the slope is Σ t a / Σ t², and the line passes through the mean.
+            # The maximum keeps a single sample from a division by zero.
             time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps
             samples = samples - time * (time @ samples) / max(float(time @ time), 1.0)
         return Accelerogram(self.step, samples, name=self.name, remarks=tuple(self.doubts()))

@@ -65,8 +65,8 @@ def remarks_on_peak(
     Else, and if there are no samples or no stated peaks, the result is empty.
 
     A peak may be that of the samples or of the samples without their mean: networks state the peak
-    of a record before or after they remove the offset of its sensor. Differences up to 5 % are not
-    remarked, since networks filter and interpolate.
+    of a record before or after they remove the offset of its sensor. Differences up to 5 %, beside
+    the rounding of the stated number, are not remarked, since networks filter and interpolate.
 
     Args:
         location: File and line, for the message.

@@ -176,7 +176,7 @@ class _Table:
         """Whether the first column has times.
 
         It does if the last line above the numbers begins with "time" or "t", or if its cells are
-        numbers that never fall.
+        numbers that never fall, so also if there are no rows.
         """
         if _Column.of(self.head).is_time:
             return True

@@ -185,7 +185,7 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
     Yields:
         The data set: `head`, the 8 (55) or 11 (58) lines of its head; `lines`, the lines of its
         values, and `content`, None; or, of a binary one, no lines, the bytes of its values, and
-        `byte_order`, "<" or ">". If the file is cut off, values are missing.
+        `byte_order`, ">" for the code 2, else "<". If the file is cut off, values are missing.
 
     Raises:
         ValueError: A data set of the number ends inside its head, or the line of a binary one does

@@ -52,7 +52,12 @@ def acceleration_factor(unit: str) -> float | None:
 
 
 def other_quantity(unit: str) -> str:
-    """Return the name of the quantity, not an acceleration, of a unit; empty if it is not known."""
+    """Return the quantity that a unit is of, if it is none of acceleration, as "a velocity".
+
+    Forces are told by "N", "kN" … with their capitals; displacements, velocities, counts, voltages,
+    pressures and angles by their units in any capitals. Brackets around the unit do not matter. The
+    result is empty for other units, such as those of acceleration.
+    """
     text = _without_brackets(unit)
     if text in NEWTONS:
         return "a force"

@@ -138,7 +138,7 @@ def _read_csv(name: str, text: str) -> Array:
 
 
 def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
-    """Return, without raising it, the error about the first row that has no or too few numbers.
+    """Return, without raising it, the error about the first row that is unlike the others.
 
     A row is wrong if a cell is no number, or if it has another count of cells than most rows have;
     if all counts differ, the first row counts as right. Text behind # and empty lines do not count.
