@@ -33,7 +33,12 @@ class Values:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """Name of each column: `E`, or `s11[0]`, `s11[1]`, … of an output that is an array."""
+        """Name of each column of `array`, which has one column for each entry of each output.
+
+        `layout` has the pairs (name, shape) of the outputs in column order. An output E of shape ()
+        is the column "E"; an output s of shape (2, 2) is the columns "s[0][0]", "s[0][1]",
+        "s[1][0]" and "s[1][1]", the last index running first. An output without entries has none.
+        """
         names = []
         for name, shape in self.layout:
             for index in np.ndindex(shape):
@@ -42,7 +47,17 @@ class Values:
         return tuple(names)
 
     def output(self, name: str) -> Array:
-        """Return the values of an output at all points, shape (n, *shape of the output)."""
+        """Return the values of an output at all n points, shape (n, *shape of the output).
+
+        It is a view of `array`, which has a row for each point; the columns of the output lie side
+        by side there, in the order of the pairs (name, shape) of `layout`.
+
+        Args:
+            name: Name of the whole output, such as "s11", not of one of its entries.
+
+        Raises:
+            RefusedError: No output has this name.
+        """
         require_choice("output", name, dict(self.layout))
         first = 0
         for found, shape in self.layout:
@@ -52,7 +67,7 @@ class Values:
         return self.array[:, first : first + prod(shape)].reshape(-1, *shape)
 
     def column(self, name: str) -> int:
-        """Return the index of a column."""
+        """Return the index of a column, by a name of `columns`; RefusedError for another name."""
         require_choice("output", name, self.columns)
         return self.columns.index(name)
 
@@ -99,7 +114,7 @@ class CampaignError(FailedError):
 
 
 class Sample(NamedTuple):
-    """Outputs at one point."""
+    """Outputs at one point: name and shape of each, and all their entries, shape (columns,)."""
 
     layout: Layout
     row: Array
@@ -138,6 +153,12 @@ class Call:
     vectorised: bool = False
 
     def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            RefusedError: `function` cannot be called, `shared` names inputs although the function
+                is `vectorised`, or `shared` has a name that is not among the inputs `names`.
+        """
         is_callable = callable(self.function)
         require(is_callable, "function", value=repr(self.function), allowed="what can be called")
         is_allowed = not (self.shared and self.vectorised)
@@ -147,15 +168,21 @@ class Call:
             require_choice("shared input", name, self.names)
 
     def tasks(self, points: Array) -> Iterator[list[int]]:
-        """Yield the rows of the points (n, inputs) that are evaluated by one call of the function.
+        """Yield, for each call of the function, the rows of the points that it evaluates.
 
-        Points are grouped by equal shared inputs, or in batches for a vectorised function; else
-        each point is a call.
+        Each row occurs once. With `shared` inputs a call gets all points that agree in these;
+        groups come in the order of their first rows, and rows rise within a group. A `vectorised`
+        function gets 1,024 neighbouring rows at a time, any other function one row.
+
+        Args:
+            points: One column for each of the inputs `names`, shape (n, inputs). Without a point
+                there is no call.
         """
         if self.shared:
             columns = [self.names.index(name) for name in self.shared]
             groups: dict[bytes, list[int]] = {}
-            # Equal inputs have equal bits, so the bytes serve as the key.
+            # The bytes serve as the key: campaigns pass no -0.0, whose bits differ from those of
+            # the equal 0.0, and a group that rounding divides costs a call, but no accuracy.
             for row in range(len(points)):
                 groups.setdefault(points[row, columns].tobytes(), []).append(row)
             yield from groups.values()
@@ -166,9 +193,19 @@ class Call:
             yield list(range(start, min(start + size, len(points))))
 
     def __call__(self, points: Array) -> list[Outcome]:
-        """Return the sample or the failure at each of the points (n, inputs) of one call.
+        """Evaluate some points by one call of the function.
 
-        If the call fails, each point is evaluated by a call of its own.
+        If a call for several points raises an exception, or returns another number of outputs, each
+        point is evaluated again by a call of its own, so that one bad point fails alone.
+
+        Args:
+            points: One or more points that belong into one call by `tasks`, one column for each of
+                the inputs `names`, shape (n, inputs).
+
+        Returns:
+            For each point, in order, a `Sample` (names, shapes and values of the outputs), or a
+            `Failure` with the text of the error. Exceptions and SystemExit of the function become
+            failures; KeyboardInterrupt is raised.
         """
         try:
             outputs = self._outputs(points)
@@ -183,8 +220,23 @@ class Call:
         return [_outcome(output) for output in outputs]
 
     def _outputs(self, points: Array) -> Sequence[Any]:
-        """Call the function, and return its unchecked outputs at each of the points (n, inputs)."""
+        """Call the function, and return its unchecked outputs, one item for each point.
+
+        A `vectorised` function is called once, with an array of shape (n,) for each input by name;
+        item k is the mapping of the outputs' names to entry k of their arrays. A function with
+        `shared` inputs is called once, with a list of n mappings of inputs to numbers, and what it
+        returns is returned. Any other function is called n times, with numbers by name; an item is
+        what it returns: a number, an array, or a mapping of names to these.
+
+        Args:
+            points: One column for each of the inputs `names`, shape (n, inputs).
+
+        Raises:
+            ValueError: Arrays of a vectorised function have different lengths, or hold no numbers.
+            Exception: Whatever the function raises.
+        """
         if self.vectorised:
+            # Several outputs are split by points here, since a sample holds the outputs of one.
             outputs = _named(self.function(**dict(zip(self.names, points.T, strict=True))))
             arrays = {x: np.atleast_1d(np.asarray(value, float)) for x, value in outputs.items()}
             rows = zip(*arrays.values(), strict=True)
@@ -200,17 +252,24 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, point, strict=True)}
 
 
-def _named(outputs: Any) -> Mapping[Any, Any]:
+def _named(outputs: object) -> Mapping[Any, Any]:
     """Return outputs by name; a number or an array has the name "y"."""
     return outputs if isinstance(outputs, Mapping) else {"y": outputs}
 
 
-def _outcome(output: Any) -> Outcome:
-    """Return the sample of an output of the function, or a failure if it is not allowed.
+def _outcome(output: object) -> Outcome:
+    """Return what a function returned for one point as a sample, or as a failure if unusable.
 
     Args:
-        output: A number (`y`), an array (`y[0]`, …), a mapping of names to numbers and arrays, or
-            the exception that ended the call.
+        output: A number or an array, which gets the name "y"; a mapping of names to numbers and
+            arrays; or an exception, which a function of several points may return in place of the
+            outputs of a point.
+
+    Returns:
+        `Sample` with the pairs (name, shape) of the outputs in their order, and all entries of all
+        outputs in one array, shape (columns,). `Failure` with the type and the text of the error
+        if `output` is an exception, a value is not a finite real number, there is no number at
+        all, or two columns have one name. Nothing is raised.
     """
     try:
         if isinstance(output, Exception):
@@ -229,7 +288,15 @@ def _outcome(output: Any) -> Outcome:
 
 
 def _finite_array(name: str, value: ArrayLike | None) -> Array:
-    """Return an output as an array; refuse what is no plain array of finite real numbers."""
+    """Return an output as an array of floats, of shape () for a number.
+
+    Truth values become 0 and 1.
+
+    Raises:
+        RefusedError: A value is complex, no number (a text, None, another object), not finite or
+            masked, or `value` has a unit.
+        ValueError: Nested lists have different lengths.
+    """
     # A masked entry has no value, and an array with a unit loses it on conversion: both would pass
     # as plain numbers.
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]

@@ -29,8 +29,6 @@ from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.sets.boxes import Domain
 
-LOG = logging.getLogger(__name__)
-
 
 @dataclass
 class Campaign:
@@ -79,7 +77,11 @@ class Campaign:
 
     @property
     def samples(self) -> Samples:
-        """All samples so far in the order of their first use."""
+        """All samples so far in the order of their first use, one or more: points and outputs.
+
+        Raises:
+            ValueError: Nothing has been evaluated yet, so that the number of inputs is unknown.
+        """
         if self._samples is None:
             # A dictionary keeps the order in which its keys were added.
             points = np.frombuffer(b"".join(self._rows)).reshape(len(self), -1)
@@ -91,18 +93,31 @@ class Campaign:
         """Evaluate the nominal point, and return the names of all outputs, columns of every sample.
 
         Raises:
+            SpentError: The budget is used up, and the point is not among the samples.
             CampaignError: The sample failed.
         """
         return self(domain.nominal[None]).columns
 
     def __call__(self, points: Array) -> Values:
-        """Return the outputs at the points (n, inputs), in their order.
+        """Return the outputs at some points, and keep them as samples of the campaign.
 
-        Only points that were not evaluated before cost evaluations.
+        Only points that this campaign has not evaluated before cost evaluations of the budget; a
+        sample that the store holds from an earlier campaign costs one, too.
+
+        Args:
+            points: One or more points, one column for each input, shape (n, inputs). Equal points
+                are evaluated once; −0 counts as 0.
+
+        Returns:
+            `Values`, whose `array` has a row for each of the points, in their order, and a column
+            for each entry of each output, shape (n, columns).
 
         Raises:
             SpentError: New points exceed the budget; none of them is evaluated.
-            CampaignError: Samples failed; raised after all others have been evaluated.
+            CampaignError: Samples failed. It is raised after all others have been evaluated, which
+                are in the store, if there is one, but not among the samples.
+            RefusedError: The knowledge about the model names an output that it does not have.
+            FailedError: The store cannot be written, or a worker process died.
         """
         keys = [point.tobytes() for point in points + 0.0]  # -0.0 + 0.0 is 0.0
         # A point that is asked for twice in one call is evaluated once.
@@ -117,13 +132,19 @@ class Campaign:
         return Values(self.layout, np.array([self._rows[key] for key in keys]))
 
     def _run(self, points: Array) -> list[Array]:
-        """Evaluate new points (n, inputs), and return the outputs of each, shape (columns,).
+        """Evaluate new points, shape (n, inputs), and return the outputs of each in their order.
+
+        An item has a number for each entry of each output, shape (columns,). The samples of the
+        campaign are not changed here; the store gets the successful ones.
 
         Raises:
-            CampaignError: Samples failed; raised after all others have been evaluated.
+            CampaignError: Samples failed; it names their inputs and errors, and is raised after all
+                others have been evaluated.
+            RefusedError: The knowledge about the model names an output that it does not have.
+            FailedError: The store cannot be written, or a worker process died.
         """
         outcomes = _evaluate(self, points)
-        LOG.debug("%d samples, %d before", len(points), len(self))
+        logging.getLogger(__name__).debug("%d samples, %d before", len(points), len(self))
         failures = []
         outputs = []
         for row in range(len(points)):
@@ -138,13 +159,22 @@ class Campaign:
         return outputs
 
     def checked(self, outcome: Outcome) -> Outcome:
-        """Return an outcome; a failure if its outputs are named or shaped unlike the first ones."""
+        """Return an outcome, or a failure in its place if its outputs differ from the first ones.
+
+        The first successful sample decides: its names and shapes become `layout`, which is empty
+        before. A later sample with another order, name or shape of outputs becomes a failure.
+
+        Raises:
+            RefusedError: The knowledge about the model states a sign for an output that the first
+                sample does not have.
+        """
         if isinstance(outcome, Failure) or outcome.layout == self.layout:
             return outcome
         if self.layout:
             return Failure(f"outputs are {outcome.layout} where others have {self.layout}")
         self.layout = outcome.layout
-        # The names of the outputs are known from the first sample on, and no earlier.
+        # The names of the outputs are known from the first sample on, and no earlier. Facts are
+        # checked then, before a proof rests on a misspelt name that restricts nothing.
         self.knowledge.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
         return outcome
 
@@ -164,14 +194,25 @@ def _tasks(call: Call, points: Array, *, stored: frozenset[int]) -> Iterator[Tas
 
 
 def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
-    """Return the sample or failure of each new point, from the store, or evaluated for it.
+    """Return the sample or the failure of each new point, stored ones from the store of samples.
+
+    Samples are written to the store while the others are evaluated, and at the latest when this
+    function is left, also by an exception. Failures are not stored.
 
     Args:
-        campaign: Its call is evaluated by its executor; its layout is set by the first sample.
+        campaign: Its call (the function of the user) is evaluated by its executor. Its `layout`,
+            the names and shapes of all outputs, is set by the first sample if it is still empty.
+            Progress is reported during its first evaluation of several points. Its samples are not
+            changed.
         points: Points that are not among the samples of the campaign, shape (n, inputs).
 
     Returns:
-        Outcome by row of the points.
+        For each row of the points a `Sample`, or a `Failure` with the text of the error.
+
+    Raises:
+        RefusedError: The campaign's knowledge names an output that the first sample does not have.
+        FailedError: The store cannot be written, a worker process died, or the function cannot be
+            sent to one.
     """
     outcomes: dict[int, Outcome] = {}
     keys: list[str] = []

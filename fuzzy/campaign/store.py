@@ -30,8 +30,6 @@ from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 Identity = Mapping[str, object]
 """What a sample depends on besides its inputs, as JSON has it."""
 _APPLICATION = 0x616C7068  # application id in the head of each store: "alph" in ASCII
-_TABLE = """CREATE TABLE sample
-(model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
 
 
 class Row(NamedTuple):
@@ -50,6 +48,9 @@ class Row(NamedTuple):
     layout: str
     outputs: bytes
     checksum: bytes
+
+    create_table = """CREATE TABLE sample
+(model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
 
     @classmethod
     def from_sample(cls, model: bytes, point: str, sample: Sample) -> Row:
@@ -79,9 +80,6 @@ def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
     columns = [model, point.encode(), layout.encode(), outputs]
     sizes = np.array([len(column) for column in columns], "<i8").tobytes()
     return blake2b(sizes + b"".join(columns), digest_size=16).digest()
-
-
-_COLUMNS = ", ".join(Row._fields)
 
 
 class Store:
@@ -127,18 +125,25 @@ class Store:
         return sqlite3.connect(self.path, timeout=60.0)
 
     def _read(self) -> bool:
-        """Read the intact rows into memory, and return whether file and rows are all intact.
+        """Read the intact rows into memory, and return whether the file and all rows are intact.
+
+        A row is intact if its checksum is that of its columns. Such rows are added to `self._rows`
+        by the keys of their model and point, also where the file is damaged elsewhere. A new, empty
+        file gets its table here and is intact. False means damage: SQLite's check of the file
+        finds some, there are other tables than that of the samples, or a row is not intact.
 
         Raises:
-            sqlite3.Error: The file cannot be accessed, which is no damage.
+            sqlite3.DatabaseError: The file cannot be accessed (it is locked, its disk is full, it
+                may not be read or written), which is no damage.
         """
         schema = "select sql from sqlite_master where sql is not null"
+        samples = f"select {', '.join(Row._fields)} from sample"
         try:
             _prepare(self._connection)
             check = self._connection.execute("pragma quick_check").fetchone()
             tables = self._connection.execute(schema).fetchall()
-            is_intact = check == ("ok",) and tables == [(_TABLE,)]
-            for columns in self._connection.execute(f"select {_COLUMNS} from sample"):
+            is_intact = check == ("ok",) and tables == [(Row.create_table,)]
+            for columns in self._connection.execute(samples):
                 row = Row._make(columns)
                 if row.is_intact:
                     self._rows[row.model, row.point] = row
@@ -154,8 +159,18 @@ class Store:
         return is_intact
 
     def _renew(self) -> None:
-        """Set the damaged file aside and write the rows that were read into a new one."""
+        """Set the damaged file aside, write the intact rows into a new one, and warn.
+
+        The damaged file becomes NAME.damaged, in place of an earlier one of this name. The rows of
+        `self._rows`, which `_read` has filled, go into a new file under the old name, to which the
+        connection is opened again.
+
+        Raises:
+            OSError: The file cannot be renamed.
+            sqlite3.Error: The new file cannot be written.
+        """
         self._connection.close()
+        # SQLite would play the journal of the damaged file back into the new one of the same name.
         with suppress(FileNotFoundError):
             os.remove(f"{self.path}-journal")
         os.replace(self.path, self.path.with_name(f"{self.path.name}.damaged"))
@@ -166,20 +181,27 @@ class Store:
         warnings.warn(f"the store {self.path} was damaged: {outcome}", stacklevel=4)
 
     def get(self, model: bytes, point: str) -> Sample | None:
-        """Return the sample of a model at a point; None where there is none.
+        """Return the sample of a model at a point from memory; None where there is none.
 
         Args:
-            model: Key of the model, as of `model_key`.
-            point: Key of the point, as of `point_key`.
+            model: Key of the model: the hash (16 bytes) that `model_key` returns.
+            point: Key of the point: the inputs by name as JSON, as `point_key` returns it.
         """
         row = self._rows.get((model, point))
         return row and row.sample
 
     def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
-        """Write samples of a model, by the keys of their points, in one transaction: all or none.
+        """Write samples in one transaction, all or none, and keep them in memory.
+
+        A sample of the same model and point is replaced.
+
+        Args:
+            model: Key of the model: the hash (16 bytes) that `model_key` returns.
+            samples: Samples by the keys of their points, which `point_key` returns.
 
         Raises:
-            FailedError: They cannot be written.
+            FailedError: SQLite cannot write them, also where another process has locked the file
+                for a minute; then none is kept.
         """
         rows = [Row.from_sample(model, point, sample) for point, sample in samples.items()]
         with self._reported():
@@ -188,7 +210,8 @@ class Store:
 
     def _write(self, rows: Iterable[Row]) -> None:
         """Write rows in one transaction; rows of the same model and point are replaced."""
-        insert = f"insert or replace into sample ({_COLUMNS}) values (?, ?, ?, ?, ?)"
+        names = ", ".join(Row._fields)
+        insert = f"insert or replace into sample ({names}) values (?, ?, ?, ?, ?)"
         with self._connection as transaction:
             transaction.executemany(insert, rows)
 
@@ -218,15 +241,20 @@ def _prepare(connection: sqlite3.Connection) -> None:
     if connection.execute("pragma application_id").fetchone() != (_APPLICATION,):
         connection.execute(f"pragma application_id = {_APPLICATION}")
     if not connection.execute("select 1 from sqlite_master where name = 'sample'").fetchall():
-        connection.execute(_TABLE)
+        connection.execute(Row.create_table)
 
 
 def _is_store(path: Path) -> bool:
-    """Return whether a path is a store, an empty file, or free.
+    """Return whether a path is a store of samples, an empty file, or names nothing.
 
-    Neither the file nor those that SQLite makes beside it may be a link, a pipe or a device.
+    It is False for any other file, and if the file, or one of those that SQLite makes beside it
+    (-journal, -wal, -shm), is a folder, a link, a pipe or a device.
+
+    Raises:
+        OSError: The file cannot be read.
     """
-    head_size = 72  # bytes of the head of an SQLite file, of which the last four are its id
+    # SQLite's file format: bytes 68 to 71 of the head are the application id, big-endian.
+    head_size = 72
     for end in ("", "-journal", "-wal", "-shm"):
         with suppress(FileNotFoundError):
             if not is_regular(path.with_name(f"{path.name}{end}")):
@@ -242,8 +270,14 @@ def _is_store(path: Path) -> bool:
 def model_key(identity: Identity) -> bytes:
     """Return the key of a model's samples: a hash (16 bytes) of its identity.
 
+    The order of names does not matter.
+
+    Args:
+        identity: What a sample depends on besides its inputs, such as versions and options.
+
     Raises:
-        RefusedError: The identity is empty, or holds something that JSON does not.
+        RefusedError: The identity is no mapping, is empty, or holds something that JSON does not,
+            such as NaN.
     """
     try:
         text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -24,15 +24,26 @@ P = ParamSpec("P")
 T = TypeVar("T")
 Task = tuple[list[int], Array]
 """Rows of a design, and their points, which one call evaluates."""
-_GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
+
+
+def _hang_up_signals() -> list[signal.Signals]:
+    """Return SIGHUP, which all processes of a terminal get when it closes; none on Windows."""
+    return [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []
 
 
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
-    """Context manager of an executor of `workers` processes; None where this process does the work.
+    """Yield an executor of several processes during a context, and end the processes afterwards.
 
-    Under `python -m mpi4py.futures` it is the pool of all MPI processes, whatever `workers` says.
-    Functions are sent by value where the processes cannot import them.
+    None is yielded for one worker: then this process shall do the work. Under
+    `python -m mpi4py.futures` the executor is the pool of all MPI processes, whatever `workers`
+    says. If the context raises an exception, processes that are still busy are killed.
+
+    Args:
+        workers: Number of processes, 1 or more.
+
+    Raises:
+        RefusedError: `workers` is not a positive whole number.
     """
     checked_number("workers", workers, positive=True, whole=True)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
@@ -46,13 +57,20 @@ def pool(workers: int) -> Iterator[Executor | None]:
         with _processes(int(workers)) as executor:
             try:
                 yield executor
-            except BaseException:  # no results are awaited any more
+            # Ctrl-C is a BaseException. No result is awaited any more, and samples may take hours.
+            except BaseException:
                 executor.shutdown(kill_workers=True)  # type: ignore[call-arg]
                 raise
 
 
 def _processes(workers: int) -> Executor:
-    """Return an executor of processes, forked where that is safe, to import nothing anew."""
+    """Return an executor of `workers` processes on this machine, which start at its first task.
+
+    They are forked where that is safe, so that they need not import anything again; else they start
+    anew. They end when this process has ended, and ignore Ctrl-C and hang-ups.
+    """
+    # Unlike the executor of the standard library, loky's sends functions by value where another
+    # process cannot import them, such as lambdas.
     from joblib.externals.loky import ProcessPoolExecutor
 
     threads = Path("/proc/self/task")
@@ -62,7 +80,8 @@ def _processes(workers: int) -> Executor:
 
     # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
     # that a hang-up of the process group does not end it before it has freed the semaphores.
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP_SIGNALS) if _GROUP_SIGNALS else None
+    blocked = _hang_up_signals()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, blocked) if blocked else None
     try:
         executor: Executor = ProcessPoolExecutor(
             workers, context=context, initializer=_end_with_parent, initargs=(os.getpid(),)
@@ -74,15 +93,25 @@ def _processes(workers: int) -> Executor:
 
 
 def _end_with_parent(parent: int) -> None:
-    """Start a thread that ends this process when process `parent` has ended: no orphans remain."""
+    """Let this worker process end with the process that has started it, and no earlier.
+
+    SIGTERM ends it at once, and Ctrl-C and hang-ups are ignored from now on. A thread looks five
+    times a second whether the parent has ended, and then ends this process without cleaning up.
+
+    Args:
+        parent: Process id of the parent.
+    """
     from threading import Thread
 
+    # A forked process inherits handlers of the parent, which may end other processes.
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    # Ctrl-C reaches all processes of the group.
-    for number in (signal.SIGINT, *_GROUP_SIGNALS):  # sent to all; the parent decides
+    # A terminal sends Ctrl-C and hang-ups to all processes of the group. The parent alone decides
+    # what follows, and may still write the samples that are done.
+    for number in (signal.SIGINT, *_hang_up_signals()):
         signal.signal(number, signal.SIG_IGN)
 
     def watch() -> None:
+        # The kernel gives an orphan another parent.
         while os.getppid() == parent:
             sleep(0.2)
         os._exit(1)
@@ -93,7 +122,11 @@ def _end_with_parent(parent: int) -> None:
 def submit(
     executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
 ) -> Future[T]:
-    """Return the future of a call by an executor; without executor the call is made at once."""
+    """Return the future of a function's call with some arguments.
+
+    An executor gets the call; its future holds the result, or the exception of the call. With None
+    the call is made here before this function returns, and an exception of it is raised at once.
+    """
     if executor is not None:
         return executor.submit(function, *args, **kwargs)
     done: Future[T] = Future()
@@ -104,13 +137,25 @@ def submit(
 def completed(
     call: Call, tasks: Iterable[Task], executor: Executor | None
 ) -> Iterator[tuple[list[int], list[Outcome]]]:
-    """Yield rows and outcomes of each task, in the order in which the tasks end.
+    """Evaluate tasks, and yield the result of each when it is there.
 
-    Tasks are read and sent in batches of about a tenth of a second, two for each worker at a time.
-    Without executor this process evaluates one after another.
+    Tasks are sent to the executor in batches of about a tenth of a second. If the caller stops
+    early, or an error is raised, batches that have not begun are cancelled.
+
+    Args:
+        call: The function of the user, which returns an outcome for each point: a sample, or a
+            failure with the text of an exception, so that tasks themselves raise nothing.
+        tasks: Pairs of rows, the numbers of some points in their design, and these points, shape
+            (rows, inputs). They are read no earlier than two batches for each worker ahead.
+        executor: Any executor; with None this process evaluates one task after another.
+
+    Yields:
+        The rows of a task as they were given, and the outcome of each row. The order is that of the
+        tasks without an executor, else about that in which they end.
 
     Raises:
-        FailedError: A worker process died, or the function cannot be sent to one.
+        FailedError: A worker process died, or the function or its outputs cannot be sent between
+            processes.
     """
     if executor is None:
         yield from ((rows, call(points)) for rows, points in tasks)
@@ -143,16 +188,25 @@ def completed(
 
 
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
-    """Return the outcomes of each call of a batch, and the seconds that they took."""
+    """Return the outcomes of each call of a batch, and the seconds that all took together."""
     start = perf_counter()
     return [call(points) for points in batch], perf_counter() - start
 
 
 def _result(future: Future[T], call: Call, batch: list[Task]) -> T:
-    """Wait for the result of a batch, whose calls catch their own exceptions.
+    """Wait for the result of a batch of calls, and return it.
+
+    Exceptions of the user's function are caught in the worker and belong to the result, so that an
+    exception here means that processes do not work together.
+
+    Args:
+        future: Future of the batch.
+        call: The calls' function; the names of its inputs stand in the message.
+        batch: Pairs of rows and points, one or more; the first one is named in the message.
 
     Raises:
-        FailedError: The worker process died, or the batch cannot be sent to one.
+        FailedError: The worker process died, or the batch or its result cannot be sent between
+            processes.
     """
     try:
         return future.result()
