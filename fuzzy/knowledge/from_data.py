@@ -41,7 +41,7 @@ def from_data(
     the quantile q from qⁿ + (1 − q)ⁿ.
 
     Args:
-        values: The measured numbers, one or more.
+        values: The measured numbers, one or more, in any order; equal ones are allowed.
         claim: "next value", "mean", "median" or "quantile 0.95". A mean needs `law` or both
             bounds.
         bounds: Physically possible values (lower, upper), None where there is no bound. They are
@@ -50,8 +50,15 @@ def from_data(
         law: "normal" where the values are known to have a normal distribution, for narrower cuts of
             the mean, which rest on it.
 
+    Returns:
+        The cuts with their claim (quantity and conditions), and `decided`, the smallest α at which
+        the values or the bounds decide both ends of the cut. Asking for a cut below it raises
+        RefusedError. One value without bounds decides the cut at α = 1 alone.
+
     Raises:
-        RefusedError: An argument is wrong, or the values decide nothing.
+        RefusedError: `claim` or `law` is none of those above; a value is not finite or outside the
+            bounds; the lower bound is not below the upper one; there is no value; a mean without
+            `law` lacks a bound; or a mean with `law` has fewer than two different values.
 
     Example:
         >>> number = from_data([2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05], "median", bounds=(0, 9))
@@ -81,7 +88,15 @@ def from_data(
 
 
 def _quantile(claim: str) -> float | None:
-    """Return the probability of the claimed quantile; None for the next value and the mean."""
+    """Return the probability of the quantile that a claim is about; None if it is about none.
+
+    Args:
+        claim: "quantile Q" with a decimal fraction Q such as 0.95; "median", whose probability is
+            0.5; "next value" or "mean", which have none.
+
+    Raises:
+        RefusedError: The text is none of these, or Q is not between 0 and 1.
+    """
     number = re.fullmatch(r"quantile +(\d*\.\d+(?:e-\d+)?)", str(claim))
     if number and 0 < float(number[1]) < 1:
         return float(number[1])
@@ -91,13 +106,20 @@ def _quantile(claim: str) -> float | None:
 
 
 def mean_cuts(data: Observations) -> Stepwise:
-    """Return the α-cuts of the mean of any distribution within physical bounds, at the `LEVELS`.
+    """Return the α-cuts of the mean of any distribution within physical bounds.
 
-    Without bounds no cuts hold for all distributions: a rare, far value moves the mean and is not
-    seen (Bahadur and Savage, Annals of Mathematical Statistics 27, 1956, 1115-1122). With bounds,
-    the distribution function lies within a band around that of the values (Smirnov, exact for n
-    values), and the mean between the means of the band's edges (Anderson, Bulletin of the
-    International Statistical Institute 43, 1969, 249-251).
+    P(mean in its cut at α) ≥ 1 − α. Without bounds no cuts hold for all distributions: a rare, far
+    value moves the mean and is not seen (Bahadur and Savage, Annals of Mathematical Statistics 27,
+    1956, 1115-1122). With bounds, the distribution function lies within a band around that of the
+    values (Smirnov, exact for n values), and the mean between the means of the band's edges
+    (Anderson, Bulletin of the International Statistical Institute 43, 1969, 249-251).
+
+    Args:
+        data: The sorted values, one or more, and their physical bounds, infinite for none.
+
+    Returns:
+        Cuts within the bounds, which are the cut at α = 0. They are exact at the some 980 levels
+        `LEVELS` from 1e-9 to 1; between two levels the cut of the lower one, the wider one, holds.
 
     Raises:
         RefusedError: A bound is missing.
@@ -125,7 +147,14 @@ def mean_cuts(data: Observations) -> Stepwise:
 
 
 def _stepwise_at_levels(low: float, high: float, *, lower: Array, upper: Array) -> Stepwise:
-    """Return the cut [low, high] at α = 0 and the cuts from `lower` to `upper` at the `LEVELS`."""
+    """Return the number with the cut [low, high] at α = 0 and given cuts at the `LEVELS`.
+
+    Args:
+        low: Lower end of the support.
+        high: Upper end of the support.
+        lower: Lower ends at the `LEVELS`, rising, from `low` on, shape (levels,).
+        upper: Upper ends, falling, up to `high`.
+    """
     levels = tuple(np.append(0.0, LEVELS))
     return Stepwise(levels, tuple(np.append(low, lower)), tuple(np.append(high, upper)))
 
@@ -135,16 +164,26 @@ def _band_half_width(n: int) -> Array:
     """Return the half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1]."""
     from scipy.stats import ksone
 
-    # The distribution function leaves the band at either side with half the level's probability.
+    # The distribution function leaves the band at either side with at most α/2 (Smirnov's one-sided
+    # statistic), hence at one of both with at most α, by Bonferroni's inequality.
     band: Array = ksone.isf(LEVELS / 2, n)
     return np.clip(band, 0.0, 1.0)
 
 
 def student_cuts(data: Observations) -> tuple[Stepwise, float]:
-    """Return the α-cuts of the mean of a normal distribution, and the lowest level that they reach.
+    """Return the α-cuts of the mean of a normal distribution by Student's t, within its bounds.
 
-    From this level on the cuts are finite; with two physical bounds it is 0. The cuts, at the
-    `LEVELS`, are clipped to the bounds.
+    P(mean in its cut at α) ≥ 1 − α, where the cut is mean ± t s/√n of the n values, with their
+    standard deviation s and the (1 − α/2)-quantile t of Student's distribution with n − 1 degrees
+    of freedom, clipped to the bounds.
+
+    Args:
+        data: The sorted values and their physical bounds, infinite for none.
+
+    Returns:
+        The cuts, exact at the some 980 levels `LEVELS` from 1e-9 to 1 (in between the next wider
+        one holds), and the level from which they hold: 0 with two bounds, else the lowest of the
+        `LEVELS`, below which the number repeats that cut.
 
     Raises:
         RefusedError: There are fewer than two values, or all are equal.
@@ -163,19 +202,25 @@ def student_cuts(data: Observations) -> tuple[Stepwise, float]:
 
 @lru_cache(maxsize=64)
 def _student_factors(n: int) -> Array:
-    """Return k with which mean ± k · deviation of n values holds the mean, at the `LEVELS`."""
+    """Return t/√n of Student's interval mean ± (t/√n) · deviation for n values, at the `LEVELS`."""
     from scipy.stats import t
 
     return np.asarray(np.maximum(t.isf(LEVELS / 2, n - 1), 0.0) / np.sqrt(n))
 
 
 def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
-    """Clip cuts to physical bounds, and return them with the level from which they are finite.
+    """Clip α-cuts to physical bounds, and make them nested.
 
     Args:
-        lower: Lower ends at the `LEVELS`.
-        upper: Upper ends.
-        bounds: Physical bounds, infinite for none.
+        lower: Lower ends at the some 980 levels `LEVELS`, from 1e-9 to 1, shape (levels,). At low
+            levels they may be −inf; the last one is finite.
+        upper: Upper ends in the same order; they may be inf where the lower ends are −inf.
+        bounds: Lower and upper physical bound; −inf and inf where there is none.
+
+    Returns:
+        The clipped cuts, and the level from which they hold. With two finite bounds the cut at
+        α = 0 is the interval between them, and the level is 0. Otherwise the level is the lowest of
+        the `LEVELS` whose cut is finite; the number repeats this cut at all lower levels.
     """
     low, high = bounds
     upper = np.minimum.accumulate(np.clip(upper, low, high))
@@ -195,10 +240,17 @@ def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple
 def from_scatter(mean: float, deviation: float, count: int) -> ClaimedNumber:
     """Return the fuzzy number of a mean, from values of a normal distribution of known deviation.
 
+    P(true mean in the cut at α) ≥ 1 − α, where the cut is mean ± z deviation/√count with the
+    (1 − α/2)-quantile z of the standard normal distribution. It holds from α = 1e-9 on; asking for
+    a cut at a lower level raises RefusedError.
+
     Args:
         mean: Mean of the values.
-        deviation: Standard deviation of a single value.
-        count: Number of values.
+        deviation: Standard deviation of a single value, greater than 0.
+        count: Number of values, 1 or more.
+
+    Raises:
+        RefusedError: An argument is not a finite number, or not greater than 0 where it must be.
     """
     from scipy.stats import norm
 

@@ -22,13 +22,24 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 def jointly(
     inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
 ) -> dict[str, FuzzyNumber | float]:
-    """Inputs whose α-cuts contain all claimed quantities jointly with P >= 1 − α: wider cuts.
+    """Return inputs whose α-cuts contain all claimed quantities jointly with P >= 1 − α.
+
+    Each of m claimed numbers alone contains its quantity in its cut at β with P ≥ 1 − β. The joint
+    cut at α consists of their cuts at β, with 1 − (1 − β)^m = α for independent samples and m β = α
+    otherwise (Bonferroni): the cuts become wider.
 
     Args:
-        inputs: Fuzzy numbers by name; plain numbers are crisp.
+        inputs: Fuzzy numbers by name; plain numbers are crisp. They are not changed.
         independent: Whether the samples behind different inputs are independent of each other;
             unknown dependence if not stated.
-        means: Quantity of the joint claim; required where the claims are of different kinds.
+        means: Quantity of the joint claim, in words; required where the claims are of different
+            kinds, such as "mean" and "next value".
+
+    Returns:
+        All inputs in their order. Numbers with a claim are replaced by copies with wider cuts,
+        whose field `joint` says how they were joined; numbers joined before are widened again.
+        Inputs without a claim are returned as they are. `decided`, the level from which values
+        decide the cuts, grows with the cuts.
 
     Raises:
         RefusedError: Claims of different kinds are joined without a meaning, or one number stands
@@ -62,7 +73,19 @@ def jointly(
 
 
 def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """Return the inputs as fuzzy numbers whose claims hold jointly; those joined before stay."""
+    """Return the inputs as fuzzy numbers whose claims hold jointly, for unknown dependence.
+
+    If all numbers with a claim have been joined by one call of `jointly`, they stay as they are.
+    Otherwise all are joined here, and their cuts become wider.
+
+    Args:
+        inputs: Fuzzy numbers by name; a plain number becomes a `Crisp`.
+
+    Raises:
+        RefusedError: `inputs` is no mapping or is empty, a value is neither a fuzzy nor a finite
+            number, or claims of different kinds, such as "mean" and "next value", have not been
+            joined by the caller.
+    """
     numbers = fuzzy_inputs(inputs)
     rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
     # Joined inputs share one rule. Joining them again would widen their cuts twice.
@@ -73,10 +96,17 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 
 
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
-    """Return a copy of a number whose cut at level β stands at α ≥ β, the level of the joint cut.
+    """Return a copy of a claimed number whose cuts stand at the higher levels of the joint claim.
 
-    Of several cuts whose joint levels are equal the last one, the narrowest, stays. Cuts above the
-    joint level 1 are left out.
+    The cut at level β moves to the level α ≥ β of the joint cut, in which all of m numbers have
+    their cuts at β: α = 1 − (1 − β)^m for independent samples, else min(m β, 1). The level from
+    which the values decide the cuts, `decided`, moves in the same way. Of cuts that arrive at one
+    level, as at 1, the last one, the narrowest, is kept. The support at α = 0 stays.
+
+    Args:
+        number: Fuzzy number with a claim, whose cuts are given at some levels and hold up to the
+            next one.
+        rule: Number of the joined claims and their dependence; it is stored in the copy.
     """
     cuts = number.number
     levels = rule.joint_level(np.asarray(cuts.alpha))
@@ -113,10 +143,21 @@ class JointClaim:
     ) -> JointClaim:
         """Return what may be claimed of a result that is computed from some inputs.
 
+        A claim says that a quantity lies in its α-cut with P ≥ 1 − α under conditions. The claim of
+        a result needs the conditions of all inputs' claims, those of joining them, and that the
+        inputs without a claim lie in their cuts.
+
         Args:
-            inputs: Fuzzy numbers by name. Inputs with a width but no claim are opinions.
-            nature: Nature of the bounds of the result. Unless it is "guaranteed", that the true
-                range stays inside the bounds is a condition.
+            inputs: Fuzzy numbers by name, whose claims have been joined (`jointly`) if there are
+                several. Inputs that have a width but no claim are opinions; crisp ones do not
+                matter.
+            nature: What the bounds of the result promise: "attained", "estimated" or "guaranteed".
+                Unless it is "guaranteed", that the true range stays inside the bounds is a further
+                condition.
+
+        Returns:
+            The rule by which the claims were joined, None where no input has a claim; all
+            conditions as texts; and the names of the opinions.
         """
         claimed = {name: x for name, x in inputs.items() if isinstance(x, ClaimedNumber)}
         opinions = [name for name in inputs if name not in claimed]
@@ -143,10 +184,17 @@ class JointClaim:
         return None if self.rule is None else CoverageClaim(self.rule.means, self.conditions)
 
     def __str__(self) -> str:
-        """Return the claim as a sentence; without claims the names of the opinions, or nothing."""
+        """Return the claim as a sentence, or what stands in its place.
+
+        With a claim it is "the … lies in its α-cut with P >= 1 - α over repeated samples, given …".
+        If no input has a claim, it names the opinions (fuzzy inputs without a claim), and is empty
+        without any.
+        """
         if self.rule is None:
             names = ", ".join(self.opinions)
             return names and f"{names}: opinions, so that no level has a probability"
+        # A name from the user says what the joint claim is about. Otherwise the rule has only the
+        # kind that all inputs' claims share, such as "mean", and the result has none of its own.
         subject = self.rule.means
         if not self.rule.named:
             subject = f"result of the {subject} of {', '.join(self.rule.names)}"
@@ -160,7 +208,11 @@ def _rule_of(claimed: Mapping[str, ClaimedNumber]) -> JointRule:
 
 
 def _conditions_by_input(claimed: Mapping[str, ClaimedNumber]) -> list[str]:
-    """Return the conditions of the claims, each once with the names of its inputs before it."""
+    """Return the conditions of the claims as texts such as "E, nu: 12 values drawn alike".
+
+    Inputs whose claims have equal conditions share one text, with their names in front. A claim
+    with several conditions has them in one text, apart by commas; one without conditions has none.
+    """
     names_by_condition: dict[str, list[str]] = {}
     for name, number in claimed.items():
         if number.claim.conditions:

@@ -62,8 +62,20 @@ class Knowledge:
                     require_choice("output of knowledge", name, outputs)
 
     def stated_signs(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
-        """Return the stated signs, shape (outputs, inputs), 0 where none is stated."""
-        # A fact that names no output holds for all of them.
+        """Return the stated signs as an array of shape (outputs, inputs).
+
+        An entry is +1 where the output rises with the input, −1 where it falls, and 0 where the
+        field `signs` states nothing. A sign that is stated for an input without naming an output
+        holds for all outputs.
+
+        Args:
+            inputs: Names of all inputs, in the order of the columns.
+            outputs: Names of the outputs, in the order of the rows. Signs of other outputs are left
+                out.
+
+        Raises:
+            ValueError: A sign is stated for an input that is not among `inputs`.
+        """
         table = np.zeros((len(outputs), len(inputs)), np.int8)
         for name, sign in self.signs.items():
             column = inputs.index(name)
@@ -77,11 +89,11 @@ class Knowledge:
 def negligible(values: Array) -> Array:
     """Return the largest difference of each output that rounding explains, shape (outputs,).
 
-    It is 1e-11 of the range of the output and of its largest magnitude: models add up thousands of
-    rounding errors of 1e-16.
+    It is 1e-11 times the sum of the range of the output over the samples and its largest magnitude
+    there: models add up thousands of rounding errors of 1e-16.
 
     Args:
-        values: Values of samples, shape (n, outputs).
+        values: Values of samples, shape (n, outputs), n ≥ 1.
     """
     return np.asarray(1e-11 * (np.ptp(values, axis=0) + np.abs(values).max(axis=0)))
 
@@ -89,13 +101,18 @@ def negligible(values: Array) -> Array:
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
     """Return the pair of samples that contradicts the signs of an output most, None without one.
 
-    By the signs the output cannot be smaller at the second point, but it is.
+    By the signs the output cannot be smaller at the second point than at the first one, but it is,
+    by more than rounding. Only pairs count in which all inputs without a sign are equal.
 
     Args:
-        points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
-        values: Output at the samples, shape (n,).
-        signs: +1, −1, or 0 where nothing is stated, shape (inputs,); inputs without a sign must be
-            equal in both samples.
+        points: Samples, shape (n, inputs), n ≥ 1. Of more than 400 only 400 are compared, which are
+            spread evenly over the values in their rising order.
+        values: Values of the output at the samples, shape (n,).
+        signs: For each input +1 if the output rises with it, −1 if it falls, 0 if nothing is known,
+            shape (inputs,).
+
+    Returns:
+        Inputs of the first and of the second sample, two arrays of shape (inputs,).
     """
     # All pairs of 400 samples are 160,000 rows of inputs; more samples would take much memory.
     max_samples = 400
@@ -103,7 +120,8 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
     evenly = np.linspace(0, len(rows) - 1, min(len(rows), max_samples)).astype(int)
     rows = rows[np.unique(evenly)]
 
-    # Of a pair (i, j) the output may not fall from i to j if no input steps against its sign.
+    # Of a pair (i, j) the output may not fall from i to j if no input steps against its sign: the
+    # way from i to j then changes one input after another, each without letting the output fall.
     point_steps = points[rows][None] - points[rows][:, None]
     signed_steps = point_steps * np.where(signs, signs, 1)
     is_allowed_step = (signed_steps >= 0) & ((signs != 0) | (signed_steps == 0))

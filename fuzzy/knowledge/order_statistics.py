@@ -31,22 +31,30 @@ Limits = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Measured values, rising, shape (n,), and the physically possible ones, infinite for none."""
+    """Measured values of a quantity, and the physical bounds of what it can be.
+
+    Args:
+        values: The n ≥ 1 values in rising order, shape (n,).
+        bounds: Lower and upper physical bound; −inf and inf where there is none.
+    """
 
     values: Array
     bounds: tuple[float, float]
 
     @classmethod
     def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
-        """Return the observations of values as measured, within physical bounds.
+        """Check measured values and physical bounds, and return them with the values sorted.
 
         Args:
-            values: The values in any order.
-            bounds: Lower and upper bound, None for one that does not exist.
+            values: One or more finite values in any order; equal values are allowed.
+            bounds: Lower and upper end of what is physically possible, each None where there is no
+                bound. Values on a bound are allowed.
 
         Raises:
-            RefusedError: There is no value, one is not a number, or one lies outside the bounds.
+            RefusedError: There is no value, one is not a finite number or lies outside the bounds,
+                or the lower bound is not below the upper one.
         """
+        # Without a bound the end is infinite, so that no comparison below needs a special case.
         low = -np.inf
         high = np.inf
         if bounds is not None:
@@ -65,12 +73,12 @@ class Observations:
 
 
 class Windows(NamedTuple):
-    """Nested ranges of gaps, three arrays of shape (k,).
+    """Nested ranges of gaps between sorted values, three arrays of shape (ranges,).
 
     Args:
         level: Probability of the gaps outside each range, rising from 0.
-        low: First gap of each range.
-        high: Last gap of each range.
+        low: Index of the first gap of each range; gap 0 lies below all values.
+        high: Index of the last gap of each range.
     """
 
     level: Array
@@ -88,26 +96,51 @@ class _GapProbabilities:
 
     @classmethod
     def of(cls, n: int, quantile: float | None) -> _GapProbabilities:
-        """Return the probabilities of the next value, or of a quantile, among n values."""
+        """Return the probabilities that a quantity lies in each of the gaps between n values.
+
+        Gap k, for k = 0 … n, lies between the k-th and the next of the n sorted values; gap 0 lies
+        below all of them and gap n above all. The probabilities do not depend on the distribution
+        of the values, if it is continuous.
+
+        Args:
+            n: Number of values, 1 or more.
+            quantile: Probability in (0, 1) of the quantile that is meant; None for the next value
+                of the same distribution.
+
+        Returns:
+            The probabilities that the quantity lies `inside` gap k, in a gap `below` it, and in a
+            gap `above` it, shape (n + 1,) each. The three add up to 1.
+        """
         from scipy.stats import binom
 
         gaps = np.arange(n + 1)
         if quantile is None:
             return cls(np.full(n + 1, 1 / (n + 1)), gaps / (n + 1), (n - gaps) / (n + 1))
-        # The number of values below the quantile has a binomial distribution.
+        # Each value lies below the q-quantile with the probability q, independently. So the number
+        # of values below it has a binomial distribution, and with k of them it lies in gap k.
         count = binom(n, quantile)
         return cls(count.pmf(gaps), count.cdf(gaps - 1), count.sf(gaps))
 
 
 @lru_cache(maxsize=64)
 def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Windows:
-    """Return nested windows of the n + 1 gaps between n sorted values, and the level of each.
+    """Return nested ranges of the gaps between n sorted values, and the level of each.
+
+    Gap k lies between the k-th and the next value; gap 0 lies below all values and gap n above all.
+    The first range has all n + 1 gaps and the level 0. Then one gap after another is removed from
+    an end of the range, first a gap that has no physical bound at its end, else the less probable
+    one. The level α is the probability that the quantity lies in a removed gap; it lies in the
+    range with the probability 1 − α.
 
     Args:
-        n: Number of values.
-        quantile: Probability of the quantile in (0, 1); None for the next value.
-        open_ends: Whether the lower and the upper end have no physical bound: gaps there are
-            removed first.
+        n: Number of values, 1 or more.
+        quantile: Probability in (0, 1) of the quantile that is meant; None for the next value of
+            the same distribution.
+        open_ends: Whether there is no physical bound below, and none above, the values.
+
+    Returns:
+        Ranges with rising levels from 0 on, below 1. Of ranges with equal levels the narrowest is
+        returned. The arrays are cached and must not be changed.
     """
     gaps = _GapProbabilities.of(n, quantile)
     low = 0
@@ -136,14 +169,20 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
 
 
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:
-    """Return the α-cuts from ranks, and the smallest level at which the values decide both ends.
+    """Return the α-cuts of the next value or of a quantile, from the ranks of measured values.
 
-    Below that level the cuts repeat the first that is finite; a finite physical bound is an end.
-    The cut at α = 1 is the sample's quantile, the median for the next value.
+    P(quantity in its cut at α) ≥ 1 − α, whatever the distribution is. The ends of a cut are
+    measured values or finite physical bounds. The cut at α = 1 is one point, the quantile of the
+    sample, or its median for the next value, moved into the cut below if need be.
 
     Args:
-        data: The values.
-        quantile: Probability of the quantile; None for the next value.
+        data: The sorted values and their physical bounds, infinite for none.
+        quantile: Probability in (0, 1) of the quantile that is meant; None for the next value.
+
+    Returns:
+        The cuts, and the smallest level from which the values and bounds decide both ends. Below
+        that level a cut would be infinite; the number repeats the first finite one there instead.
+        The level is 1 if only the point at α = 1 is finite, as it is for one value without bounds.
     """
     low, high = data.bounds
     nested = windows(len(data.values), quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
@@ -152,7 +191,7 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
     lower = np.append(low, data.values)[nested.low]
     upper = np.append(data.values, high)[nested.high]
     centre = float(np.quantile(data.values, 0.5 if quantile is None else quantile))
-    # A window that holds a gap at an end without a bound has an infinite end: the values do not
+    # A range that holds a gap at an end without a bound has an infinite end: the values do not
     # decide it.
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):

@@ -17,6 +17,9 @@ from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, checked_levels
 def levels(steps: int) -> tuple[float, ...]:
     """Return the equally spaced α-levels 0, 1/steps, …, 1; `steps` = 4 gives the paper's five.
 
+    Raises:
+        RefusedError: `steps` is not a positive whole number.
+
     Example:
         >>> levels(4)
         (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -46,26 +49,39 @@ def quasi_random_points(dimension: int, count: int, *, skip: int = 0) -> Array:
 
 
 def chebyshev_points(dimension: int, count: int, *, skip: int = 0) -> Array:
-    """Return `quasi_random_points` of [−1, 1]^d, denser towards its faces (Chebyshev density).
+    """Return points of [−1, 1]^d whose density grows towards its faces, shape (count, dimension).
 
-    They have the shape (count, dimension).
+    Each coordinate is −cos(π x) for a coordinate x of `quasi_random_points`, which fill the unit
+    box evenly. So it has the Chebyshev density; `skip` points of the sequence are left out.
     """
     return np.asarray(-np.cos(np.pi * quasi_random_points(dimension, count, skip=skip)))
 
 
 def corners(lower: Array, upper: Array) -> Array:
-    """Return all corners of a box, shape (2^d, d); axes without width count once.
+    """Return all corners of a box in d dimensions, the last coordinate changing fastest.
 
     Args:
         lower: Lower ends of the box, shape (d,).
-        upper: Upper ends.
+        upper: Upper ends, shape (d,); equal to the lower end on an axis without width.
+
+    Returns:
+        Corners of shape (2^w, d), where w axes have a width, beginning with `lower`.
     """
+    # The keys of a dictionary keep their order, and equal ends become one.
     axes = [dict.fromkeys(pair) for pair in zip(lower, upper, strict=True)]
     return np.array(list(product(*axes)))
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """Return the inputs as fuzzy numbers by name, plain ones as `Crisp`; refuse other values."""
+    """Return the inputs as fuzzy numbers by name, in a new mapping of the same order.
+
+    Args:
+        inputs: One or more fuzzy numbers by name; a plain number becomes a `Crisp`.
+
+    Raises:
+        RefusedError: `inputs` is no mapping with texts as keys, it is empty, or a value is neither
+            a fuzzy number nor a finite number.
+    """
     is_named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
     allowed = "a mapping, as {'E': Triangular(24, 25, 26)}"
     require(bool(is_named), "inputs", value=inputs, allowed=allowed)
@@ -96,6 +112,17 @@ class Domain:
     alpha: Sequence[float]
 
     def __post_init__(self) -> None:
+        """Check the fields, and replace them: levels by a tuple, plain numbers by `Crisp`.
+
+        A claimed number (of measured values) has a level `decided`, below which its values do not
+        decide the cut. If all levels here lie above, it is replaced by a copy with the level 0,
+        whose cuts are the same at these levels and can be asked for at any other.
+
+        Raises:
+            RefusedError: There is no input or level, the levels do not rise within [0, 1], an input
+                is neither a fuzzy nor a finite number, or values do not decide the cut of a claimed
+                number at the lowest level.
+        """
         alpha = checked_levels(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():
@@ -126,12 +153,19 @@ class Domain:
         return np.array([number.nominal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:
-        """Return which points (n, inputs) lie in the box of each level, shape (levels, n).
+        """Return which points lie in the box of each level, shape (levels, n).
 
-        Points that are outside by less than 1e-12 of the support, which is rounding, lie inside.
+        The box of a level consists of the α-cuts of all inputs. Faces belong to it, and a point
+        that is outside by up to 1e-12 of the width of an input's cut at the lowest level, which is
+        rounding, lies inside.
+
+        Args:
+            points: One column for each input, in the order of the field `inputs`, shape
+                (n, inputs).
         """
         lower, upper = self.boxes
         tolerance = 1e-12 * (upper[0] - lower[0])
+        # A corner that is computed as lower + 1 · width misses the upper end by rounding.
         # All boxes and points at once: the arrays have the shape (levels, points, inputs).
         above = (points >= (lower - tolerance)[:, None]).all(axis=2)
         below = (points <= (upper + tolerance)[:, None]).all(axis=2)

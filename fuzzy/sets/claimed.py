@@ -45,20 +45,22 @@ class JointRule:
     named: bool = False
 
     def joint_level(self, beta: Array) -> Array:
-        """Return the level α of the joint cut that consists of m single cuts at level β.
+        """Return the level α of the joint cut that consists of single cuts at level β.
 
-        It is α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
+        With m claimed inputs, the fields `names`, it is α = 1 − (1 − β)^m if their samples are
+        independent of each other, and min(m β, 1) otherwise (Bonferroni). All m quantities lie in
+        their cuts at β with P ≥ 1 − α.
 
         Args:
-            beta: Levels β in [0, 1], any shape.
+            beta: Levels β in [0, 1], any shape, which the result has, too.
         """
         m = len(self.names)
         if m == 1:
             return np.asarray(beta, float)
         if not self.independent:
             return np.asarray(np.minimum(m * beta, 1.0))
-        # Written with logarithms the formula keeps its digits at small β; at β = 1 they are
-        # infinite.
+        # 1 − (1 − β)^m = −expm1(m log1p(−β)). With logarithms the formula keeps its digits at small
+        # β, where 1 − β is rounded to 1. At β = 1 the logarithm is infinite, so β stays just below.
         below_1 = np.minimum(beta, 1 - 1e-16)
         return np.asarray(-np.expm1(m * np.log1p(-below_1)))
 
@@ -99,13 +101,22 @@ class ClaimedNumber(FuzzyNumber):
 
     @property
     def cuts(self) -> Cuts:
-        """The α-cuts at all levels; refused where the values do not decide those at low α."""
+        """The α-cuts at all levels; RefusedError where the values do not decide those at low α."""
         self.cut(0.0)
         return self.number.cuts
 
     def cut(self, alpha: float) -> Cut:
-        """Return the α-cut at `alpha` in [0, 1]; refused below `decided`, where it has no end."""
-        # Below this level an end lies beyond all values, where nothing is known.
+        """Return the α-cut, which contains the claimed quantity with P ≥ 1 − α.
+
+        Args:
+            alpha: Level in [0, 1].
+
+        Raises:
+            RefusedError: The level is outside [0, 1], or below `decided`, the smallest level at
+                which the measured values or physical bounds decide both ends of the cut.
+        """
+        # Below `decided` an end lies beyond all values, where nothing is known; the cut of
+        # `self.number` is there only so that this number can be stored, and holds no claim.
         if checked_level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"
             cure = "give bounds=(lower, upper), what is physically possible, or measure more"

@@ -73,7 +73,13 @@ class FuzzyNumber(ABC):
         return self.cut(0.0)
 
     def cut(self, alpha: float) -> Cut:
-        """Return the α-cut: the values of membership `alpha` or more; at 0 the closed support.
+        """Return the α-cut: the closed interval of the values of membership `alpha` or more.
+
+        At 0 it is the closed support. Between the corners of the membership function, which `cuts`
+        holds, its ends are interpolated linearly.
+
+        Args:
+            alpha: Level in [0, 1].
 
         Raises:
             RefusedError: The level is outside [0, 1].
@@ -84,7 +90,11 @@ class FuzzyNumber(ABC):
         return Cut(lower, _interpolate(alpha, cuts.alpha, cuts.upper))
 
     def membership(self, x: ArrayLike) -> Array:
-        """Return the grade of membership μ in [0, 1] at `x`, any shape; NaN where `x` is NaN."""
+        """Return the grade of membership μ at some values: 0 outside the support, 1 in the core.
+
+        Args:
+            x: Values of any shape, which the result has, too. It is NaN where `x` is NaN.
+        """
         cuts = self.cuts
         x = np.asarray(x, float)
         # Where ends of several levels are equal, `interp` takes the last one: the highest level.
@@ -118,12 +128,16 @@ def new_axes() -> Axes:
 
 
 def checked_level(alpha: float) -> float:
-    """Return the level as a float; refuse one outside [0, 1]."""
+    """Return the level as a float; RefusedError for one outside [0, 1]."""
     return checked_number("alpha", alpha, least=0, most=1)
 
 
 def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
-    """Return levels as a tuple of floats; refuse those that do not rise within [0, 1], or none."""
+    """Return levels as a tuple of floats.
+
+    Raises:
+        RefusedError: There is no level, or they do not rise strictly within [0, 1].
+    """
     levels = tuple(map(checked_level, alpha))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
     require(ordered, "alpha", value=list(levels), allowed="levels that rise within [0, 1]")
@@ -134,8 +148,8 @@ def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -
     """Return the lower or upper end at `alpha` by linear interpolation; exact at `levels`.
 
     Args:
-        alpha: Level, from the first of `levels` on.
-        levels: Rising levels.
+        alpha: Level, from the first of `levels` on. At the last one and above, the last end holds.
+        levels: Strictly rising levels, one or more.
         ends: End of the cut at each level.
     """
     right = bisect_right(levels, alpha)
@@ -222,6 +236,13 @@ class _Nested(FuzzyNumber):
     to_one: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        """Check the fields, and replace them by tuples of floats.
+
+        Raises:
+            RefusedError: Levels do not rise strictly from 0 to at most 1 (to exactly 1 if the class
+                asks for it by `to_one`), lengths differ, an end is not finite, lower ends fall or
+                upper ends rise with the level, or the last lower end exceeds the last upper one.
+        """
         levels = checked_levels(self.alpha)
         lower = tuple(float(end) for end in self.lower)
         upper = tuple(float(end) for end in self.upper)
@@ -278,7 +299,12 @@ class Stepwise(_Nested):
 
     @cached_property
     def cuts(self) -> Cuts:
-        """The cuts, each at its level and at the last float below the next one: with jumps."""
+        """The cuts as corners of a membership function: levels, lower and upper ends.
+
+        The cut at `alpha[k]` holds up to the next level. Here it stands twice, at `alpha[k]` and at
+        the largest float below `alpha[k + 1]`, the last cut at 1. Interpolated linearly, the ends
+        then jump from cut to cut within one unit of rounding.
+        """
         starts = np.array(self.alpha)
         ends = np.append(np.nextafter(starts[1:], 0.0), 1.0)
         # Each cut stands twice, at the first and the last level where it holds, unless these are
@@ -290,7 +316,7 @@ class Stepwise(_Nested):
         return Cuts(tuple(levels[is_kept].tolist()), tuple(lower.tolist()), tuple(upper.tolist()))
 
     def cut(self, alpha: float) -> Cut:
-        """The cut that holds at `alpha` in [0, 1]."""
+        """The cut that holds at `alpha` in [0, 1]; RefusedError for a level outside."""
         # The last level that is not above α
         at = bisect_right(self.alpha, checked_level(alpha)) - 1
         return Cut(self.lower[at], self.upper[at])
@@ -311,14 +337,18 @@ def outer_steps(
 ) -> Stepwise:
     """Return the fuzzy number that has the given nested cuts, and between two levels the wider one.
 
-    The first cut holds from α = 0 on. A level that rounding has lifted above a decimal, as 0.1 +
-    0.2, counts as that decimal.
+    The first cut holds from α = 0 on, and the last one up to 1. A level that rounding has lifted
+    above a decimal, as 0.1 + 0.2, counts as that decimal.
 
     Args:
-        alpha: Levels, rising, shape (A,).
-        lower: Lower ends of the cuts, shape (A,).
-        upper: Upper ends of the cuts, shape (A,).
-        encloses: Name of a set as of `FuzzyNumber.encloses`.
+        alpha: Levels in [0, 1], strictly rising, one or more, shape (A,).
+        lower: Lower ends of the cuts, not falling, shape (A,).
+        upper: Upper ends of the cuts, not rising, shape (A,).
+        encloses: Name of a set of joint values of several inputs that the box of their cuts
+            encloses, such as "the learned set"; empty where all of the box counts.
+
+    Raises:
+        RefusedError: The cuts are not nested, not finite, or not as many as the levels.
     """
     # A level such as 0.1 + 0.2 lies above 0.3 by rounding. The cut at 0.3 would then be the wider
     # one of the level below.
