@@ -17,7 +17,8 @@ from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.campaign.call import Call, SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.design import bounds_of_samples
-from alphacut.fuzzy.plans.single_linkage import MIN_SAMPLES, SEED, SingleLinkage
+from alphacut.fuzzy.plans.settings import SEARCH
+from alphacut.fuzzy.plans.single_linkage import SingleLinkage
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 
@@ -155,7 +156,8 @@ class PeakSearch:
             # Without a width there is nothing to search.
             if linkage.cuts:
                 n_uncertain = len(linkage.cuts[0].uncertain_inputs)
-                linkage.run(np.random.default_rng([SEED, 0]).random((MIN_SAMPLES, n_uncertain)))
+                rng = np.random.default_rng([SEARCH.seed, 0])
+                linkage.run(rng.random((SEARCH.min_samples, n_uncertain)))
                 notes = (linkage.summary(),)
         except SpentError as spent:
             notes = (str(spent),)

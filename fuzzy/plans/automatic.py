@@ -28,7 +28,7 @@ from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible
 from alphacut.fuzzy.plans.cut import CutSearch, cuts_with_width
 from alphacut.fuzzy.plans.design import bounds_of_samples
 from alphacut.fuzzy.plans.settings import SEARCH, value_tolerance
-from alphacut.fuzzy.plans.single_linkage import SEED, SingleLinkage
+from alphacut.fuzzy.plans.single_linkage import SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
@@ -57,7 +57,27 @@ class Automatic:
     name = "automatic"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Return bounds of every output: by corners if the knowledge allows, else by a search."""
+        """Return bounds of every output on every level, by corners or by a search.
+
+        If `campaign.knowledge` states signs of all effects, corners of the α-cuts give guaranteed
+        bounds. Otherwise the widest cut is sampled and outputs are searched, as far as the budget
+        goes: a search that the budget ends gives the bounds that its samples attain, with a note.
+        If no input has a width, the nominal point is the only sample.
+
+        Args:
+            campaign: Evaluates the model within its budget, and keeps the samples.
+            domain: Inputs and levels; the cut of a level is the box of the α-cuts of all inputs.
+
+        Returns:
+            Bounds, shape (levels, outputs), each guaranteed, estimated to within a stated error, or
+            attained; the inputs that attain them; and notes, one sentence each.
+
+        Raises:
+            SpentError: The budget does not carry the first sample.
+            RefusedError: Signs are stated, and the budget does not carry all corners or a sample
+                contradicts a sign.
+            CampaignError: The model failed at some samples.
+        """
         outputs = campaign.output_names(domain)
         stated = campaign.knowledge.stated_signs(domain.names, outputs)
         if corners_suffice(domain, stated).all():
@@ -98,8 +118,23 @@ class _AutomaticSearch:
     def run(self, widest: CutSearch) -> None:
         """Walk through the widest cut, and search the outputs that corners do not bound.
 
+        Samples are added to `self.campaign`, from which the bounds are taken afterwards. What is
+        found is written to the attributes as soon as it is known:
+
+        - `is_monotone`: outputs whose effects keep their signs along the walk, so that two corners
+          of each cut bound them, shape (outputs,);
+        - `is_rough`: outputs with jumps or waves that are small beside a trend, shape (outputs,);
+        - `linkage`: the search by descents of the outputs that are neither monotone nor constant
+          along the walk; None if there are none. If they are more than 12, their cuts are sampled
+          without descents;
+        - `notes`: a sentence for each finding of the walk, appended.
+
+        Args:
+            widest: Cut of the lowest level, in which some input has a width.
+
         Raises:
-            SpentError: The budget ended the search. The attributes say what is known.
+            SpentError: The budget ended the search. The attributes say what is known so far.
+            CampaignError: The model failed at some samples.
         """
         walk = walk_signs(self.campaign, widest)
         self.is_monotone = walk.is_monotone
@@ -116,6 +151,7 @@ class _AutomaticSearch:
         if not is_searched.any():
             return
         searched = tuple(self.outputs[is_searched])
+        # The cost of a search is proportional to its outputs, so many are sampled alone.
         if len(searched) > SEARCH.max_searched_outputs:
             searched = ()
         linkage = SingleLinkage(self.campaign, self.domain, searched)
@@ -126,7 +162,12 @@ class _AutomaticSearch:
         linkage.search()  # further, where the look beside the optima found others
 
     def is_estimated(self) -> Mask:
-        """Return the outputs whose bounds are estimated, and not only attained, (outputs,)."""
+        """Return the outputs whose bounds are estimated, and not only attained, shape (outputs,).
+
+        They are the monotone ones (`is_monotone`), which two corners of each cut bound, and those
+        whose search by descents (`linkage`) has met its stopping rule for both bounds in all cuts
+        and has shown no jumps or waves beside a trend (`is_rough`).
+        """
         linkage = self.linkage
         if linkage is None:
             return self.is_monotone
@@ -135,7 +176,13 @@ class _AutomaticSearch:
         return np.asarray(self.is_monotone | (is_found & ~self.is_rough))
 
     def all_notes(self) -> list[str]:
-        """Return the notes of the walk, of the search, and of its end."""
+        """Return a sentence for each finding of the walk and of the search, for the user.
+
+        They are the notes of the walk; then, if outputs were searched by descents, a summary of the
+        search and the outputs with jumps or waves beside a trend; then that the budget ended the
+        search, or the outputs of which a bound lies at a kink or a jump. The list is new and may be
+        empty.
+        """
         notes = list(self.notes)
         if self.linkage is not None and self.linkage.outputs:
             notes.append(self.linkage.summary())
@@ -154,10 +201,15 @@ class _AutomaticSearch:
 def _with_errors(bounds: Bounds, is_estimated: Mask, domain: Domain) -> Bounds:
     """Return a copy of attained bounds in which the bounds of some outputs are estimated.
 
+    The error of an estimated output is 1e-5 of its range on the lowest level plus 1e-9 of its
+    magnitude, the difference below which a search takes two values for one. It is zero on levels
+    where no input has a width. The nature of all outputs together is the weakest of theirs.
+
     Args:
-        bounds: Bounds that samples attain, without errors.
-        is_estimated: The outputs whose bounds are estimated, shape (outputs,).
-        domain: Inputs and levels. The error is zero on levels where all inputs are crisp.
+        bounds: Bounds that samples attain, without errors, shape (levels, outputs).
+        is_estimated: The outputs whose bounds are estimated, shape (outputs,); the others stay
+            attained.
+        domain: Inputs and levels of the bounds.
     """
     magnitudes = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
     ranges = (bounds.upper - bounds.lower)[0]
@@ -204,18 +256,32 @@ class SignWalk:
 
 
 def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
-    """Change every input alone along a walk through the widest cut, and along staircases.
+    """Find the signs of the effects of every input by changing one input at a time.
 
-    The corners that bound an output by these signs are samples of the campaign afterwards.
+    This happens along a walk through 21 random points of the widest cut, a Latin hypercube sample,
+    and along staircases from the two corners at which the signs place the extremes of an output to
+    the opposite corners. A sign is known if all differences have it, by more than rounding.
+
+    Args:
+        campaign: Evaluates the model. Afterwards its samples hold the corners of each α-cut at
+            which known signs place the extremes of an output.
+        widest: Cut of the lowest level, in unit coordinates of its inputs with a width.
+
+    Returns:
+        Which outputs keep the signs of all effects along walk and staircases and in all pairs of
+        samples (`is_monotone`), do not change along the walk (`is_constant`), or keep their signs
+        along the walk and change one there and back beside it (`is_rough`), shape (outputs,) each;
+        and the 21 points in unit coordinates, shape (21, inputs with a width).
 
     Raises:
         SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
     """
     from scipy.stats import qmc
 
     # Walk through a Latin hypercube sample, and collect the differences by each input.
     inputs = len(widest.uncertain_inputs)
-    hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEED, 0]))
+    hypercube = qmc.LatinHypercube(inputs, rng=np.random.default_rng([SEARCH.seed, 0]))
     turns: Array = hypercube.random(SEARCH.walk_points + 1)
     walk = _changed_in_turn(turns)
     values = campaign(widest.points(walk)).array
@@ -266,13 +332,13 @@ def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
 
 
 def _changed_in_turn(turns: Array) -> Array:
-    """Return a path through points in which each step changes one input, the first one first.
+    """Return a path from point to point in which each step changes one input, the first one first.
 
     Args:
-        turns: The points in their order, shape (n, inputs).
+        turns: The points in their order, shape (n, inputs), n ≥ 1.
 
     Returns:
-        Points of the path, shape ((n − 1) inputs + 1, inputs).
+        Points of the path, shape ((n − 1) inputs + 1, inputs). Point k is row k · inputs.
     """
     count, inputs = turns.shape
     path = np.empty(((count - 1) * inputs + 1, inputs))
@@ -305,21 +371,34 @@ class _Staircases:
 def _climb_staircases(
     campaign: Campaign, widest: CutSearch, *, pattern: Signs, first_signs: Signs, columns: Ints
 ) -> _Staircases:
-    """Evaluate the extreme corners of each cut, and staircases from those of the widest one.
+    """Test the signs of effects on some outputs along two staircases through the widest cut.
+
+    A staircase begins at one of the two corners where the signs place the extremes, and changes one
+    input at a time towards the opposite corner. Each input takes 20 points (40 if it is the only
+    one), whose distances from the corner grow from 1e-4 of the width to all of it. The extreme
+    corners of all cuts are evaluated, too.
 
     Args:
-        campaign: Evaluates the points.
-        widest: The widest cut.
-        pattern: Signs of the inputs' effects relative to the first input's, shape (inputs,).
-        first_signs: Sign of the first input's effect on each of the outputs, shape (outputs,).
-        columns: Columns of the outputs in the samples, shape (outputs,).
+        campaign: Evaluates the points, and keeps them as samples.
+        widest: Cut of the lowest level; only its inputs with a width are changed.
+        pattern: Signs (1 or −1) of the effects of these inputs over the sign of the first one,
+            shape (inputs,). All outputs here have this pattern.
+        first_signs: Sign (1 or −1) of the effect of the first input on each of the outputs, shape
+            (outputs,).
+        columns: Columns of these outputs in the samples, shape (outputs,).
+
+    Returns:
+        For each output, shape (outputs,): whether all steps of both staircases change it by the
+        signs, to rounding (`keeps_signs`); and whether, for each input, the steps against its sign
+        are the first ones or the last ones of a staircase (`turns_once`).
 
     Raises:
         SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
     """
     inputs = len(pattern)
     count = _staircase_points(inputs)
-    rng = np.random.default_rng([SEED, 1])
+    rng = np.random.default_rng([SEARCH.seed, 1])
     upper_corner = (pattern > 0).astype(float)  # where the output is largest if first_signs is 1
     corners = np.stack([upper_corner, 1 - upper_corner])
     keeps_signs: Mask = np.ones(len(columns), bool)
@@ -343,6 +422,7 @@ def _climb_staircases(
         # back.
         turns_once &= (n_turns <= 1).all(axis=0)
     for cut in cuts_with_width(campaign, widest.domain):
+        # In a narrower cut fewer inputs may have a width, so that its corners have fewer columns.
         extremes = corners[:, np.isin(widest.uncertain_inputs, cut.uncertain_inputs)]
         campaign(cut.points(np.concatenate([extremes, cut.corners])))
     return _Staircases(keeps_signs, turns_once)

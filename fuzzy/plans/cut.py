@@ -52,24 +52,27 @@ class CutSearch:
 
     @cached_property
     def corners(self) -> Array:
-        """Corners of the unit cube, shape (n, uncertain inputs); none for more than six inputs.
+        """Corners of the unit cube [0, 1]^d of the d inputs whose cuts have a width.
 
-        Six inputs have 64 corners, which is no more than other samples of a search.
+        They have the shape (2^d, d), or (0, d) for more than six inputs.
         """
         inputs = len(self.uncertain_inputs)
+        # Six inputs have 64 corners, no more than other samples of a search; 20 have a million.
         if inputs > 6:
             return np.empty((0, inputs))
         return corners(np.zeros(inputs), np.ones(inputs))
 
     def points(self, unit: Array) -> Array:
-        """Return the inputs, shape (n, inputs), at points of the unit cube.
+        """Return the values of all inputs at points of the unit cube, shape (n, inputs).
 
         Args:
-            unit: Unit coordinates, shape (n, uncertain inputs).
+            unit: Coordinates of the inputs whose cuts have a width, from 0 at the lower to 1 at the
+                upper end of the cut, shape (n, uncertain inputs). The other inputs have one value.
         """
         points = np.repeat(self.lower[None], len(unit), axis=0)
         width = (self.upper - self.lower)[self.uncertain_inputs]
         points[:, self.uncertain_inputs] = self.lower[self.uncertain_inputs] + unit * width
+        # lower + 1 · (upper − lower) can exceed upper by rounding, where the model need not exist.
         return np.clip(points, self.lower, self.upper)
 
     def unit(self, points: Array) -> Array:
@@ -82,17 +85,20 @@ class CutSearch:
         return np.asarray(self.domain.inside(points)[self.level])
 
     def values(self, unit: Array, bound: Bound) -> Array:
-        """Evaluate sign · output at points of the unit cube.
+        """Return sign · output at points of the unit cube, shape (n,).
+
+        Points that have not been evaluated before cost evaluations, and become samples of
+        `self.campaign`.
 
         Args:
-            unit: Unit coordinates, shape (n, uncertain inputs).
-            bound: Output, and sign by which it is multiplied.
-
-        Returns:
-            Values of shape (n,).
+            unit: Coordinates of the inputs whose cuts have a width, from 0 at the lower to 1 at the
+                upper end of the cut, shape (n, uncertain inputs); n may be 0.
+            bound: Name of the output, and the sign by which it is multiplied: 1 where its minimum
+                is searched, −1 where its maximum is.
 
         Raises:
             SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at a point.
         """
         if not len(unit):
             return np.empty(0)
@@ -109,17 +115,22 @@ class CutSearch:
     def largest_slope(self, point: Array, output: str) -> float:
         """Return the largest slope of an output at a point of the cut, to either side.
 
-        Differences are taken along the inputs that are not at an end of their cuts.
+        Differences are taken along each input that is farther than their step, 1e-4 of the width of
+        its cut, from both ends of the cut.
 
         Args:
-            point: Inputs, shape (inputs,).
+            point: Values of all inputs, shape (inputs,).
             output: Name of the output.
 
         Returns:
-            The slope, in ranges of the output over the width of the cut; 0 if all inputs are at an
-            end.
+            The largest magnitude of the slopes, for inputs in widths of their cuts and the output
+            in units of its range over all samples so far; 0 if all inputs are at an end.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations, two for each such input and one.
+            CampaignError: The model failed at a point.
         """
-        step = SEARCH.large_difference
+        step = SEARCH.large_difference  # 1e-4; with it the noise of an iterative solver is no slope
         unit = self.unit(point[None])[0]
         inner_inputs = np.flatnonzero((unit > step) & (unit < 1 - step))
         steps = step * np.eye(len(unit))[inner_inputs]
@@ -130,16 +141,26 @@ class CutSearch:
         return float(slopes.max(initial=0.0))
 
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
-        """Return the local optimum that a descent by L-BFGS-B reaches inside the cut.
+        """Descend by L-BFGS-B from a point inside the cut, and return where the descent ends.
+
+        Unit coordinates are 0 at the lower and 1 at the upper end of the cut of an input.
 
         Args:
             start: Unit coordinates where the descent begins, shape (uncertain inputs,).
-            bound: Output and sign that are minimised.
-            first_step: Limit of the first step in unit coordinates. A short one does not leave the
-                basin of the start.
+            bound: Name of the output, and the sign (1 or −1) by which it is multiplied before it is
+                minimised.
+            first_step: Limit of the length of the first step in unit coordinates. A short one does
+                not leave the basin of the start.
+
+        Returns:
+            The end, after at most 50 steps: `point` with the values of all inputs, shape (inputs,);
+            `value`, sign · output there; and `slope`, the largest magnitude of the derivative by an
+            input that can still lower the value inside the cut, in ranges of the output per width
+            of the cut. At a kink or jump the slope may be large.
 
         Raises:
             SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at a point.
         """
         from scipy.optimize import minimize
 
@@ -147,7 +168,14 @@ class CutSearch:
         start_value = float(self.values(start[None], bound)[0])
 
         def change_and_gradient(unit: Array) -> tuple[float, Array]:
-            """Return the change of sign · output from the start, in ranges, and its gradient."""
+            """Return (sign · output − its value at `start`) / `output_range`, and its gradient.
+
+            The gradient consists of one-sided differences with the step 1e-6, all taken by one
+            evaluation of several points of this cut.
+
+            Args:
+                unit: Unit coordinates, shape (uncertain inputs,), the shape of the gradient, too.
+            """
             difference = SEARCH.difference
             # Differences go to the inside: the model need not exist beyond the cut.
             steps = np.where(unit + difference > 1, -difference, difference)
@@ -215,7 +243,13 @@ class Optimum:
     def is_smooth(self) -> bool:
         """Whether the output has nearly no slope at the optimum: False at kinks and jumps.
 
-        Also False if the budget does not allow the samples that decide it.
+        Nearly no slope means up to 0.01 ranges of the output over the width of the cut, along each
+        input that is not at an end of its cut. The slope at the end of the descent decides if it is
+        that small; else longer differences to both sides are evaluated, once. False also if the
+        budget does not allow these.
+
+        Raises:
+            CampaignError: The model failed at one of the points.
         """
         if self.slope <= SEARCH.max_slope:
             return True
@@ -226,10 +260,15 @@ class Optimum:
         return slope <= SEARCH.max_slope
 
     def is_optimum_of(self, cut: CutSearch) -> bool:
-        """Return whether the point is a local optimum of another cut as well.
+        """Return whether the point is a local optimum of another α-cut as well.
 
-        It stays an optimum of a narrower cut (higher α) that contains it. In a wider cut (lower α)
-        it stays one unless it lies on a face of its own cut that the wider cut moves outwards.
+        It is the optimum of the box `self.cut`. It stays one in this and in a narrower cut (of a
+        higher level) that contains it. In a wider cut (of a lower level) it stays one unless it
+        lies on a face of its own cut that the wider cut moves outwards.
+
+        Args:
+            cut: α-cut of the same inputs, with the index `level` of its α-level, and the ends
+                `lower` and `upper` of all inputs, shape (inputs,).
         """
         # Levels rise, and so the cut with the lower level is the wider one.
         if self.cut.level <= cut.level:

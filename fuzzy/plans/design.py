@@ -38,9 +38,16 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
     For the points of the transformation method this is the retransformation of Hanss (2005).
 
     Args:
-        domain: Inputs and levels.
-        samples: Points and values, one or more in each cut.
-        method: Name of the method.
+        domain: Inputs and levels; the cut of a level is the box of the α-cuts of all inputs.
+        samples: Points, shape (n, inputs), and the values of all outputs there, shape (n, outputs).
+        method: Name of the method that took the samples; it is stated in the result.
+
+    Returns:
+        Bounds of the nature "attained" without an error, shape (levels, outputs), and the samples
+        that attain them. Of equal extremes the first sample is stated.
+
+    Raises:
+        ValueError: No sample lies in the cut of a level.
     """
     values = samples.values.array
     rows_by_level = [np.flatnonzero(is_inside) for is_inside in domain.inside(samples.points)]
@@ -63,18 +70,26 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Return a copy of bounds at corners, guaranteed for some outputs by the knowledge.
+    """Return a copy of bounds at corners, guaranteed for some outputs by stated signs.
 
-    The knowledge is tested by further samples inside the cuts, as far as the budget goes. They
-    evaluate the model by `campaign`.
+    If an output rises or falls with each input all over the box, its extremes lie at two corners.
+    The caller of the analysis states such signs (`campaign.knowledge`). They are tested by further
+    samples inside the cuts, as far as the budget goes.
 
     Args:
         bounds: Bounds that corners of the cuts attain.
-        campaign: Evaluates the model; its knowledge states the signs of effects.
-        proved: Outputs that corners bound by these signs, shape (outputs,).
+        campaign: Evaluates the model, which adds to its samples.
+        proved: Outputs for which a sign of every input with a width is stated, shape (outputs,).
+
+    Returns:
+        The bounds with the nature "guaranteed" for the proved outputs and "attained" for the
+        others, with the stated knowledge and the number of samples in `basis`, and the bounds
+        themselves as attained ends. If nothing is proved, `bounds` itself is returned.
 
     Raises:
-        RefusedError: A sample contradicts the knowledge.
+        RefusedError: A sample contradicts a stated sign of a proved output, or lies beyond its
+            bounds.
+        CampaignError: The model failed at a test point.
     """
     if not proved.any():
         return bounds
@@ -121,9 +136,14 @@ def _point_text(point: Array, bounds: Bounds) -> str:
 def _test_points(domain: Domain, campaign: Campaign) -> Array:
     """Return points inside the cuts at which stated knowledge is tested, shape (n, inputs).
 
-    There are no more than the budget allows. The narrowest cut with a width gets as many as the
-    knowledge asks for, and each wider one a quarter of that: points of a narrower cut lie in the
-    wider ones, too.
+    The narrowest cut with a width gets `campaign.knowledge.tests` points, 16 by default, and each
+    wider one a quarter of that: points of a narrower cut lie in the wider ones, too. Levels with
+    equal cuts count once. The points of a cut fill it evenly, and are the same in each call. There
+    are no more of them than evaluations are left in the budget, which may be none.
+
+    Args:
+        domain: Inputs and levels; the cut of a level is the box of the α-cuts of all inputs.
+        campaign: Knows the budget and the knowledge; nothing is evaluated here.
     """
     lower, upper = domain.boxes
     widths = upper - lower
@@ -134,7 +154,7 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
     for level in np.flatnonzero(differs_from_wider & widths.any(axis=1))[::-1]:
         count = tests
         if points:  # in a wider cut than the first one
-            count = -(-tests // 4)
+            count = -(-tests // 4)  # rounded up
         unit_points = quasi_random_points(len(domain.names), count, skip=len(points))
         points += list(lower[level] + widths[level] * unit_points)
     return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))

@@ -13,6 +13,11 @@ class SearchSettings:
     width of the cut, where the range of an output is that of all samples.
     """
 
+    seed: int = 0
+    """Seed of all samples, so that a search finds the same bounds each time."""
+    min_samples: int = 100
+    """Samples N of a cut from which the rule of Boender and Rinnooy Kan decides: with fewer samples
+    the uniform prior does. Twice as many double the cost of smooth outputs."""
     max_uncovered: float = 0.002
     """Expected fraction of a cut in basins that were not seen, up to which a search goes on. A
     larger one takes fewer samples, N ~ √(W (W + 1) / fraction), and misses more optima."""
@@ -55,10 +60,13 @@ SEARCH = SearchSettings()
 
 
 def value_tolerance(output_range: float, magnitude: float) -> float:
-    """Return the difference of two values of an output below which they count as one.
+    """Return the difference of two values of an output up to which they count as one.
+
+    It is 1e-5 of the range, and 1e-9 of the magnitude for outputs that hardly vary, added up. It is
+    also the error that is stated of an estimated bound.
 
     Args:
-        output_range: Range of the output in the widest cut.
+        output_range: Range of the output in the widest α-cut, 0 or more.
         magnitude: Largest magnitude of the output.
     """
     return SEARCH.value_tolerance * output_range + SEARCH.rounding * magnitude

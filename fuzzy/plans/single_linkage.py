@@ -46,38 +46,35 @@ from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.plans.settings import SEARCH, value_tolerance
 from alphacut.fuzzy.sets.boxes import Domain
 
-SEED = 0
-"""Seed of all samples."""
-MIN_SAMPLES = 100
-"""Samples N of a cut from which the rule of Boender and Rinnooy Kan decides: with fewer samples the
-uniform prior does. Twice as many double the cost of smooth outputs."""
-
 
 def critical_distance(samples: int, inputs: int, sigma: float) -> float:
-    """Return the critical distance r = (σ Γ(1 + d/2) ln N / N)^(1/d) / √π in the unit cube.
+    """Return the distance r = (σ Γ(1 + d/2) ln N / N)^(1/d) / √π in the unit cube.
 
-    A ball of radius r contains σ ln N of the samples on average (Rinnooy Kan and Timmer, 1987).
+    Of N uniform samples a ball of radius r inside the cube contains σ ln N on average. In
+    multi-level single linkage it is the critical distance: a descent starts from a sample only if
+    no better one lies within it (Rinnooy Kan and Timmer, 1987).
 
     Args:
-        samples: N.
-        inputs: Dimension d of the cube.
-        sigma: σ.
+        samples: Number of samples N, 1 or more; for one sample r is 0.
+        inputs: Dimension d of the cube, 1 or more.
+        sigma: The factor σ.
     """
+    # The volume of the ball, π^(d/2) r^d / Γ(1 + d/2), is to be σ ln N / N of that of the cube, 1.
     ball = sigma * gamma(1 + inputs / 2) * log(samples) / samples
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
 def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -> Ints:
-    """Return the rows of the samples that have no better sample within a distance.
+    """Return the rows, rising, of the samples that have no better sample within a distance.
 
     Args:
-        unit: Samples in unit coordinates, shape (n, inputs).
-        values: Their values, shape (n,); the smaller of two is the better.
-        distance: The distance in unit coordinates.
+        unit: Samples in unit coordinates, shape (n, inputs), n ≥ 1.
+        values: Their values, shape (n,); the smaller of two is the better. Equal ones both stay.
+        distance: The Euclidean distance in unit coordinates, up to which samples are neighbours.
     """
     from scipy.spatial import cKDTree
 
-    # Of two neighbours the worse one is left out. Of equal ones both stay.
+    # Of two neighbours the worse one is left out.
     pairs = cKDTree(unit).query_pairs(distance, output_type="ndarray")
     first_rows = pairs[:, 0]
     second_rows = pairs[:, 1]
@@ -93,17 +90,19 @@ def rows_without_better_neighbour(unit: Array, values: Array, distance: float) -
 def with_farthest_points(unit: Array, known: Array, rng: np.random.Generator) -> Array:
     """Draw up to 1,000 of some points of the unit cube anew, so that they lie far apart.
 
-    Each new point is, of random candidates, the one farthest from the known points and the points
-    before it (Mitchell 1991). Of holes that take 0.3 % of a cube these points leave 75 times fewer
-    than uniform points in three dimensions, and half as many in six.
+    Each new point is, of random candidates, the one farthest from all other points: the known ones,
+    those that stay, and the new ones before it (Mitchell 1991). Of holes that take 0.3 % of a cube
+    these points leave 75 times fewer than uniform points in three dimensions, and half as many in
+    six.
 
     Args:
-        unit: Uniform points, shape (n, inputs).
-        known: Points that exist already, shape (m, inputs).
-        rng: Source of the candidates.
+        unit: Uniform points of [0, 1)^d, shape (n, d), n ≥ 1; not changed. The first 1,000, or all
+            of fewer, are drawn anew.
+        known: Points that exist already, shape (m, d).
+        rng: Source of the candidates, ten for each new point.
 
     Returns:
-        Points of shape (n, inputs), the drawn ones last.
+        Points of shape (n, d): those that stay, in their order, and then the drawn ones.
     """
     from scipy.spatial import cKDTree
 
@@ -171,9 +170,13 @@ class BoundSearch:
 
     @property
     def uncovered(self) -> float:
-        """Expected fraction of the cut that is not yet covered by basins and known plateaus.
+        """Expected fraction of the cut that lies in basins of optima that were not seen yet.
 
-        It is infinite without an optimum, or with fewer than two samples.
+        With W different local optima, found by descents from N uniform samples, it is
+        W (W + 1) / (N (N − 1)) (Boender and Rinnooy Kan, 1987). N are the `explored` samples. The
+        fraction of all samples that lie on plateaus (many samples of one value, from which descents
+        find no way) is added, unless these count as explored. The sum is infinite without an
+        optimum, or with fewer than two explored samples.
         """
         explored = self.explored
         n_optima = len(self.optima)
@@ -181,7 +184,8 @@ class BoundSearch:
             return inf
         total = self.samples + self.plateau_samples
         unknown_plateaus = (total - explored) / total
-        # Boender and Rinnooy Kan (1987)
+        # The expectation of the a-posteriori distribution, from a uniform prior of the number of
+        # basins and of their sizes.
         unseen_basins = n_optima * (n_optima + 1) / (explored * (explored - 1))
         return unknown_plateaus + unseen_basins
 
@@ -201,33 +205,36 @@ class BoundSearch:
     def is_estimate(self) -> bool:
         """Whether the stopping rule is met and the output is smooth at the best optimum."""
         is_covered = self.uncovered < SEARCH.max_uncovered
-        return self.explored >= MIN_SAMPLES and is_covered and self.is_smooth
+        return self.explored >= SEARCH.min_samples and is_covered and self.is_smooth
 
     @property
     def is_open(self) -> bool:
         """Whether the search goes on; kinks and jumps at the best optimum end it, too."""
         if self.plateau_samples >= SEARCH.max_on_plateaus:
             return False
-        if self.samples < MIN_SAMPLES or not self.optima:
+        if self.samples < SEARCH.min_samples or not self.optima:
             return True
         return self.uncovered >= SEARCH.max_uncovered and self.is_smooth
 
     def next_samples(self) -> int:
-        """Return the number of samples, in all, with which the search may end if W stays.
+        """Return the number of samples of the cut, in all, with which its search may end.
 
-        These are the samples with which W (W + 1) / (N (N − 1)) falls to `max_uncovered`, or with
-        plateaus so many that `max_on_plateaus` of them lie there. The number is at most twice the
-        present one, and at least 15 more, so that rounds do not become small.
+        It may end when the expected fraction of the cut in unseen basins, W (W + 1) / (N (N − 1))
+        for W different local optima and N samples, has fallen to 0.002. So N is computed for the
+        present W. If some samples lie on plateaus (have the value of another sample), it may end
+        when 1,000 do, and N follows from the present fraction of such samples. The result is at
+        least 15 more than the present number and at most twice that number, but never below 100.
         """
         n_optima = len(self.optima)
         present = self.samples + self.plateau_samples
         if self.plateau_samples:
             # With the present fraction of samples on plateaus, and 1 % more so that they suffice
+            # although a further sample meets plateaus by chance.
             needed = ceil(1.01 * SEARCH.max_on_plateaus * present / self.plateau_samples)
         else:  # the positive root N of N (N − 1) = W (W + 1) / fraction
             product_needed = n_optima * (n_optima + 1) / SEARCH.max_uncovered
             needed = ceil(0.5 + sqrt(0.25 + product_needed)) + 1
-        return max(MIN_SAMPLES, min(max(needed, present + 15), 2 * present))
+        return max(SEARCH.min_samples, min(max(needed, present + 15), 2 * present))
 
 
 class SingleLinkage:
@@ -263,29 +270,41 @@ class SingleLinkage:
         self._levels: Ints = np.empty(0, int)
 
     def run(self, first: Array) -> None:
-        """Sample and descend, cut by cut in rounds, until every bound meets the stopping rule.
+        """Search the minimum and the maximum of all outputs in all cuts, from some first samples.
 
-        Without outputs to search each cut gets `MIN_SAMPLES` samples and no descents.
+        Each cut is sampled, and descents start from the best samples, in rounds, until the stopping
+        rule of Boender and Rinnooy Kan holds for both bounds of every output or their search is
+        given up. If `outputs` is empty, each cut gets 100 samples and no descents. Results are in
+        `states`, and all samples in the campaign.
 
         Args:
-            first: Uniform samples of the widest cut in unit coordinates, shape (n, uncertain
-                inputs).
+            first: Uniform samples of the widest cut in unit coordinates (0 at the lower, 1 at the
+                upper end of an input's cut), shape (n, inputs with a width).
 
         Raises:
-            SpentError: The budget ended the search.
+            SpentError: The budget ended the search; what was found so far is kept.
+            CampaignError: The model failed at some samples.
         """
         if not self.outputs:
             for cut in self.cuts:
-                self._sample_up_to(cut, MIN_SAMPLES, seed=0, bounds=())
+                self._sample_up_to(cut, SEARCH.min_samples, seed=0, bounds=())
             return
         self._add_samples(self.cuts[0], first)
         self.search()
 
     def search(self) -> None:
-        """Go on until every bound meets the stopping rule, as after optima found elsewhere.
+        """Sample and descend until no bound of an output is open in any cut.
+
+        A bound is open in a cut until there are 100 samples and the expected fraction of the cut in
+        basins that were not seen is below 0.002, or the best optimum lies at a kink or jump, or
+        1,000 samples lie on plateaus. Each round visits the cuts with open bounds from the widest
+        on, adds samples, and descends. It may be called again after optima have been recorded by
+        other means; it returns at once if all bounds are closed. Progress is reported to the
+        campaign.
 
         Raises:
-            SpentError: The budget ended the search.
+            SpentError: The budget ended the search; what was found so far is kept in `states`.
+            CampaignError: The model failed at some samples.
         """
         rounds = 0
         while True:
@@ -317,18 +336,26 @@ class SingleLinkage:
         return any(state.optima and not state.is_smooth for state in self._states_of(output))
 
     def passes_over_waves(self, output: str) -> bool:
-        """Return whether descents to the best optima of some cut pass over jumps or waves.
+        """Return whether descents to the best optima of an output pass over jumps or waves.
 
-        An estimated output is evaluated along each input, to both sides of the best optimum of each
-        bound. Where it improves again, away from the optimum, a descent should find a smooth
-        optimum of its own. The search has started none there, as the best optimum is nearby. And
-        waves exceed the optimum only nearby: farther away the trend has changed the output by more
-        than they do.
+        An output whose search is complete is evaluated along each input, to both sides of the best
+        optimum of its minimum and its maximum, in each cut. Where it improves again, away from the
+        optimum, a descent should find a smooth optimum of its own; if it does not, the result is
+        True. Optima that are found are recorded, so that the search may have to go on. For an
+        output whose search is not complete, nothing is evaluated and the result is False.
+
+        Args:
+            output: Name of an output.
 
         Raises:
             SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
+        # The search itself has started no descent there, as the best optimum is nearby. And waves
+        # exceed the optimum only nearby: farther away the trend has changed the output by more than
+        # they do.
         for cut, bound, side in product(self.cuts, self.bounds, (-1.0, 1.0)):
+            # A recorded optimum may open the search again, hence the question in the loop.
             if bound.output != output or not self.is_estimate(output):
                 continue
             best = cut.unit(self.states[cut.level, bound].best.point[None])[0]
@@ -340,16 +367,23 @@ class SingleLinkage:
     def _has_wave_beside(
         self, cut: CutSearch, bound: Bound, best: Array, *, column: int, side: float
     ) -> bool:
-        """Return whether the output improves beside an optimum where no smooth optimum is found.
+        """Return whether an output improves beside an optimum where no smooth optimum is found.
 
-        Optima that are found are recorded.
+        Sign · output is evaluated at growing distances from the optimum along one input, up to 0.2
+        of its cut. Where it falls from one distance to the next, a descent starts; its optimum is
+        recorded. There is a wave if the descent falls back to the old optimum, or ends at a kink or
+        jump.
 
         Args:
-            cut: The cut.
-            bound: Output and sign.
-            best: Best optimum of the bound, in unit coordinates, shape (uncertain inputs,).
+            cut: The α-cut.
+            bound: Name of the output, and the sign (1 for its minimum, −1 for its maximum).
+            best: Best optimum of the bound, in unit coordinates, shape (inputs with a width,).
             column: Column of the unit coordinate that is changed.
             side: Whether it grows (1) or falls (−1).
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         # Distances at which waves are looked for. The largest is a critical distance, of which 100
         # samples of one to three inputs have 0.1 to 0.35. Tuned: 15 of 400 trends with waves beside
@@ -378,10 +412,16 @@ class SingleLinkage:
         return f"{note}: of each cut {min(worst.uncovered, 1):.3%} or less is not yet covered"
 
     def _open_bounds(self, cut: CutSearch) -> list[Bound]:
-        """Return the bounds of a cut whose search goes on.
+        """Return the bounds (output, and sign of minimum or maximum) whose search in a cut goes on.
 
-        Before, a descent starts from the best sample of the cut, of whatever origin, wherever it is
-        better than the best optimum.
+        Before they are asked, a descent starts, for each bound with an optimum, from the best
+        sample of the campaign in the cut, if it is better than the best optimum by more than the
+        tolerance of values; the optimum that it finds is recorded. A search goes on until its
+        stopping rule holds or it is given up at a kink, a jump or on plateaus.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         for bound in self.bounds:
             state = self.states[cut.level, bound]
@@ -399,9 +439,20 @@ class SingleLinkage:
     def _descend(self, cut: CutSearch, bound: Bound) -> None:
         """Descend from the samples and corners of a cut that have no better one nearby.
 
-        Nearby is the critical distance with σ = 4; from two optima that are no corners on, also the
-        smaller one with σ = 2, which starts more descents and hides fewer basins. Descents that
-        have been made before are not repeated. The counts of the bound's state are updated.
+        Nearby is the critical distance of single linkage, within which a ball has σ ln N of N
+        samples, with σ = 4. If two or more optima are no corners of the cut, σ = 2 follows, which
+        starts more descents and hides fewer basins. Changed is the state of the bound in the cut:
+        the optima found, the starts and plateaus from which a descent was made (none is repeated),
+        and the numbers of samples on plateaus and off them. A plateau consists of samples of one
+        value, of which one alone starts a descent.
+
+        Args:
+            cut: The α-cut, of which samples have been evaluated.
+            bound: Name of the output, and the sign (1 for its minimum, −1 for its maximum).
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         state = self.states[cut.level, bound]
         rows = self._rows(cut)
@@ -432,15 +483,22 @@ class SingleLinkage:
         state.samples = len(rows) - state.plateau_samples  # corners do not count
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
-        """Descend from a point and record the optimum.
+        """Descend from a point and record the optimum in all cuts of which it is one.
 
-        A descent that may have left the basin of its start is followed by one with a short first
-        step. Where kinks are expected, none starts in the basin of an optimum that is known.
+        If the output does not fall all along the straight line from the start to the optimum, the
+        descent may have left the basin of its start; then a second one follows with a first step of
+        at most 0.1. Where kinks are expected (`has_kinks`), no descent starts from a point from
+        which the output falls all along the line to a known optimum.
 
         Args:
-            cut: The cut.
-            bound: Output and sign.
-            start: Unit coordinates, shape (uncertain inputs,).
+            cut: The α-cut.
+            bound: Name of the output, and the sign by which it is multiplied before it is minimised
+                (1 for its minimum, −1 for its maximum).
+            start: Unit coordinates, shape (inputs with a width,).
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         if self.has_kinks and self._falls(cut, start, self.states[cut.level, bound].optima):
             return
@@ -456,7 +514,21 @@ class SingleLinkage:
             self._record(cut.descend(start, bound, SEARCH.careful_first_step))
 
     def _record(self, optimum: Optimum) -> None:
-        """Add an optimum to every cut of which it is one; the better of two equal ones stays."""
+        """Add an optimum to the list of its bound in every cut in which it is a local optimum.
+
+        Of two optima of a list that count as one (nearly equal values, and near to each other or
+        with no hump between them), the better one stays. Where kinks are expected (`has_kinks`),
+        optima from which the output falls all along the straight line to a better one leave the
+        list: descents have stalled there.
+
+        Args:
+            optimum: End of a descent; it knows its cut, and the output and sign that were
+                minimised.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations between two optima.
+            CampaignError: The model failed at some points.
+        """
         for cut in self.cuts:
             if not optimum.is_optimum_of(cut):
                 continue
@@ -476,12 +548,18 @@ class SingleLinkage:
         return self._falls(cut, cut.unit(optimum.point[None])[0], better)
 
     def _falls(self, cut: CutSearch, start: Array, optima: Sequence[Optimum]) -> bool:
-        """Return whether the output falls all along a line to one of some optima of one bound.
+        """Return whether sign · output falls, or stays, all along a line to one of some optima.
+
+        It is evaluated at six points of each straight line, from the start to 0.75 of its length.
 
         Args:
-            cut: The cut.
-            start: Unit coordinates where the lines begin, shape (uncertain inputs,).
-            optima: The optima; without any the answer is False.
+            cut: The α-cut.
+            start: Unit coordinates where the lines begin, shape (inputs with a width,).
+            optima: Optima of one output and sign; without any the answer is False.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         if not optima:
             return False
@@ -497,9 +575,18 @@ class SingleLinkage:
     def _index_of_equal(self, cut: CutSearch, optimum: Optimum) -> int | None:
         """Return the index of an equal optimum in the list of a cut; None if there is none.
 
-        Optima of nearly one value are equal if they are within 1 % of the width of the cut, or if
-        no value between them is larger: a valley is where many descents end, and symmetric hills
-        are several optima.
+        Optima are equal if their values differ by no more than the tolerance (1e-5 of the range of
+        the output and 1e-9 of its magnitude), and if their inputs differ by up to 1 % of the width
+        of the cut or no larger value is found at three points between them. So all ends of descents
+        in a flat valley count as one optimum, and two equal hills as two.
+
+        Args:
+            cut: The α-cut whose list is searched.
+            optimum: An optimum of the output and sign of that list, perhaps found in another cut.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
         """
         optima = self.states[cut.level, optimum.bound].optima
         tolerance = self._tolerance(optimum.bound)
@@ -528,18 +615,32 @@ class SingleLinkage:
     def _sample_up_to(
         self, cut: CutSearch, count: int, *, seed: int, bounds: Sequence[Bound]
     ) -> None:
-        """Evaluate samples of a cut until there are `count`; the seed differs from call to call.
+        """Evaluate uniform random samples of a cut until there are `count` of them.
 
-        Where all bounds have plateaus, further samples lie far apart. The stopping rule is for
-        uniform samples, but it is never met where plateaus are large.
+        Samples of wider cuts that lie in the cut count, since they are uniform there, too. If all
+        of the bounds have samples on plateaus (several of one value), up to 1,000 of the new ones
+        are placed far apart instead, to find narrow hills between them.
+
+        Args:
+            cut: The α-cut.
+            count: Number of samples; nothing is done if there are as many.
+            seed: Number of the round, which must differ from call to call for a cut; otherwise the
+                same points are drawn.
+            bounds: Bounds (output, and sign of minimum or maximum) that are searched further.
+
+        Raises:
+            SpentError: The budget does not carry the evaluations; then none is made.
+            CampaignError: The model failed at some points.
         """
+        # The stopping rule of the search is for uniform samples. That further ones lie far apart
+        # does no harm, since the rule is never met where plateaus are large.
         rows = self._rows(cut)
         missing = count - len(rows)
         if missing <= 0:
             return
         # The seed of each cut and round is its own, so that samples do not depend on the other
         # cuts.
-        rng = np.random.default_rng([SEED, 1 + cut.level, seed])
+        rng = np.random.default_rng([SEARCH.seed, 1 + cut.level, seed])
         unit = rng.random((missing, len(cut.uncertain_inputs)))
         states = [self.states[cut.level, bound] for bound in bounds]
         if states and all(state.plateau_samples for state in states):
@@ -547,7 +648,20 @@ class SingleLinkage:
         self._add_samples(cut, unit)
 
     def _add_samples(self, cut: CutSearch, unit: Array) -> None:
-        """Evaluate uniform samples of a cut, shape (n, uncertain inputs), and append them."""
+        """Evaluate new samples of a cut, and append them to those of the search.
+
+        Appended are the inputs to `_points`, shape (samples, inputs), the index of the cut's level
+        to `_levels`, shape (samples,), and sign · output to `_values` for each bound (output, and
+        sign of minimum or maximum), shape (samples,).
+
+        Args:
+            cut: The α-cut in which the samples were drawn uniformly.
+            unit: Their unit coordinates, shape (n, inputs with a width).
+
+        Raises:
+            SpentError: The budget does not carry the evaluations; then nothing is appended.
+            CampaignError: The model failed at some samples; nothing is appended either.
+        """
         points = cut.points(unit)
         outputs = self.campaign(points)
         for bound, values in self._values.items():

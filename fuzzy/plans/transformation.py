@@ -40,14 +40,18 @@ Grid = list[list[float]]
 def hanss_points(number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = True) -> Grid:
     """Return the points of every level by the recursion of the transformation method (Hanss 2005).
 
+    The points of a level are the two ends of its α-cut, or its value if it has no width, and the
+    midpoints of neighbouring points of the next level up. So n points at the top become n + 1 at
+    the next level down, and so on. Points of different levels that are equal but for rounding are
+    made equal, so that a model is evaluated there once.
+
     Args:
         number: A fuzzy number or interval.
-        alpha: Rising levels.
-        inner: Whether to add points between the ends of a cut.
+        alpha: Rising levels in [0, 1], one or more.
+        inner: Whether to take the midpoints; otherwise a level has the ends of its cut alone.
 
     Returns:
-        For each level, from the lowest, its points in rising order: n at the top (one where the cut
-        is a single value, otherwise its two ends), n + 1 at the next level down, and so on.
+        For each level, from the lowest, its points in rising order.
     """
     points: list[float] = []  # of all levels so far, in rising order
     by_level: list[list[float]] = []  # from the top down
@@ -68,8 +72,8 @@ def _listed_point(x: float, points: list[float], width: float) -> float:
 
     Args:
         x: The point.
-        points: Other points in rising order; x may be inserted in place.
-        width: Width of the support, of which 1e-13 is rounding.
+        points: Other points in rising order; x is inserted in place if none equals it.
+        width: Width of the support, of which a difference of up to 1e-13 is rounding.
     """
     rounding = 1e-13 * width
     index = bisect_left(points, x - rounding)
@@ -80,31 +84,52 @@ def _listed_point(x: float, points: list[float], width: float) -> float:
 
 
 def level_grids(domain: Domain, *, inner: bool) -> list[Grid]:
-    """Return `hanss_points` of all inputs, as a list by level of lists by input."""
+    """Return the points of the transformation method: for each level a list of points by input.
+
+    Args:
+        domain: Inputs and levels.
+        inner: Whether to take points between the ends of the α-cuts, as `hanss_points` does.
+    """
     columns = [hanss_points(x, domain.alpha, inner=inner) for x in domain.inputs.values()]
     return [list(level) for level in zip(*columns, strict=True)]
 
 
 def bounds_at(campaign: Campaign, domain: Domain, points: Array, method: str) -> Bounds:
-    """Evaluate points (n, inputs), equal ones once, and return the bounds that they attain."""
+    """Evaluate points (n, inputs), equal ones once, and return the bounds that they attain.
+
+    Samples that the campaign has taken for other reasons do not count.
+    """
     # Levels may share points, and each is evaluated once.
     distinct = np.unique(points, axis=0)
     return bounds_of_samples(domain, Samples(distinct, campaign(distinct)), method)
 
 
 def corners_suffice(domain: Domain, signs: Signs) -> Mask:
-    """Return the outputs with a sign of every input that has a width, shape (outputs,).
+    """Return the outputs with a known sign of the effect of every input that has a width.
+
+    Such an output is monotone in each input over the box of the widest cut, so that two of its
+    corners bound the output.
 
     Args:
-        domain: Inputs and levels.
-        signs: Signs of the effects, 0 for none, shape (outputs, inputs).
+        domain: Inputs and levels. An input has a width if its cut at the lowest level has one.
+        signs: For each output and input +1 if the output rises with the input, −1 if it falls, 0 if
+            neither is known, shape (outputs, inputs).
+
+    Returns:
+        True for such outputs, shape (outputs,).
     """
     lower, upper = domain.boxes
     return np.asarray(((signs != 0) | (lower[0] == upper[0])).all(axis=1))
 
 
 def require_budget(samples: float, campaign: Campaign, method: str) -> None:
-    """Refuse a design that needs more evaluations than the budget, before any is made."""
+    """Raise RefusedError if a design needs more evaluations than the budget has left.
+
+    Args:
+        samples: Number of points of the design; it may be too large for an integer array.
+        campaign: Knows how many evaluations remain; nothing is evaluated here.
+        method: Name of the method for the message.
+    """
     if samples > campaign.remaining:
         raise RefusedError(
             "budget",
@@ -123,11 +148,22 @@ class General:
     takes_inner_points: ClassVar[bool] = True
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Return bounds by all combinations of points, guaranteed where corners suffice.
+        """Return bounds of every output on every level, by all combinations of the inputs' points.
+
+        An input has the ends of its α-cut on each level as points. The general method adds points
+        between them (Hanss 2005); the reduced method, a subclass, does not.
+
+        Args:
+            campaign: Evaluates the model, and knows the signs of effects that the caller states.
+            domain: Inputs and levels.
+
+        Returns:
+            Bounds, shape (levels, outputs). An output is guaranteed if signs of the effects of all
+            inputs with a width are stated, since corners bound it then; the others are attained.
 
         Raises:
-            RefusedError: The budget does not carry the points, or a sample contradicts the
-                knowledge.
+            RefusedError: The budget does not carry the points, or a sample contradicts a sign.
+            CampaignError: The model failed at some points.
         """
         grids = level_grids(domain, inner=self.takes_inner_points)
         count = sum(prod(map(len, grid)) for grid in grids)
@@ -171,11 +207,27 @@ class Signed:
     name = "signed"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Return bounds by the corners that the signs name, guaranteed where all are stated.
+        """Return bounds of every output on every level by the corners that signs of effects name.
+
+        If an output rises or falls with each input all over a box, two opposite corners of the box
+        bound it. Signs are stated by the caller (`campaign.knowledge`), else observed at probes of
+        the box. An input whose sign is unknown takes all points of the general transformation
+        method. Only the outputs named in the field `outputs` choose points, or all if it is empty.
+
+        Args:
+            campaign: Evaluates the model within its budget.
+            domain: Inputs and levels.
+
+        Returns:
+            Bounds, shape (levels, outputs). A chosen output is guaranteed if the signs of all
+            inputs with a width are stated; the others are attained by the best sample. `notes` name
+            the effects of unknown sign.
 
         Raises:
-            RefusedError: There is no such output, the budget does not carry the points, or a sample
-                contradicts the knowledge.
+            RefusedError: There is no output of a given name, the budget does not carry the corners,
+                or a sample contradicts a stated sign.
+            SpentError: The budget does not carry the probes, or the points of several outputs.
+            CampaignError: The model failed at some points.
         """
         all_outputs = campaign.output_names(domain)
         for name in self.outputs:
@@ -203,27 +255,39 @@ class Signed:
 
 
 def _sample_count(signs: Signs, grids: list[Grid]) -> float:
-    """Return the number of samples of the monotonicity-based plan, for `signs` of `find_effects`.
+    """Return about how many samples the monotonicity-based plan takes, before they are listed.
 
-    It is a float, since there may be too many to list.
+    Points that several levels share are counted on each level. The number is a float, since there
+    may be too many to list.
+
+    Args:
+        signs: For each level, output and input +1 if the output rises with the input, −1 if it
+            falls, 0 if neither is known, shape (levels, outputs, inputs).
+        grids: For each level the points of each input.
     """
     total = 0.0
     for level_signs, grid in zip(signs, grids, strict=True):
         counts = np.array([len(points) for points in grid], float)
         has_no_sign = np.unique(level_signs == 0, axis=0)
-        # Two opposite corners of the inputs with a sign, times all points of the inputs without
-        total += 2 * np.where(has_no_sign, counts, 1.0).prod(axis=1).sum()
+        # Two opposite corners of the inputs with a sign, times all points of the inputs without.
+        # Without any sign the two are the same points. Outputs whose signs differ, but are unknown
+        # for the same inputs, are counted once, so that there may be more samples.
+        opposite_corners = np.where(has_no_sign.all(axis=1), 1, 2)
+        total += (opposite_corners * np.where(has_no_sign, counts, 1.0).prod(axis=1)).sum()
     return total
 
 
 def _level_points(signs: Signs, grid: Grid) -> Array:
     """Return the points of the monotonicity-based plan on one level, shape (n, inputs).
 
-    The signs of an output name two opposite corners. Inputs without a sign take all their points.
+    The signs of an output name two opposite corners, where it has its minimum and its maximum.
+    Inputs without a sign take all their points, in all combinations. Outputs with equal signs share
+    points; others may repeat some.
 
     Args:
-        signs: Signs of the effects on each output, shape (outputs, inputs).
-        grid: Points of each input, from the lower to the upper end of its cut.
+        signs: For each output and input +1 if the output rises with the input, −1 if it falls, 0 if
+            neither is known, shape (outputs, inputs).
+        grid: Points of each input, one or more, from the lower to the upper end of its cut.
     """
     distinct = np.unique(signs, axis=0)
     rows: list[tuple[float, ...]] = []
@@ -242,7 +306,11 @@ def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[
     Args:
         domain: Inputs and levels.
         outputs: Names of the outputs.
-        signs: Signs as of `find_effects`, shape (levels, outputs, inputs).
+        signs: +1 or −1 where the output rises or falls with the input on a level, 0 where neither
+            is known, shape (levels, outputs, inputs).
+
+    Returns:
+        Sentences by output, then by input; none where all signs are known.
     """
     notes = []
     for row, output in enumerate(outputs):
@@ -258,25 +326,31 @@ def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[
 
 
 def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> Signs:
-    """Return the sign of each input's effect on each output, and test the stated ones.
+    """Return the sign of each input's effect on each output, on each level.
 
-    Stated signs are tested at pairs of points; the others are observed at probes, from the widest
-    box to the narrowest. A sign holds on all narrower boxes.
+    Signs that the caller states (`campaign.knowledge`) are taken; pairs of points that differ in a
+    stated input alone are evaluated, by which they can be tested later. Other signs are observed at
+    probes, from the widest box to the narrowest. A sign holds on all narrower boxes.
 
     Args:
-        campaign: Evaluates the model; its knowledge states signs.
-        domain: Inputs and levels.
-        outputs: Names of the outputs.
+        campaign: Evaluates the model and keeps the samples.
+        domain: Inputs and rising levels; the box of a level consists of the α-cuts of the inputs.
+        outputs: Names of some outputs.
 
     Returns:
         Signs of shape (levels, outputs, inputs): +1 where the output rises, −1 where it falls, 0
-        where neither is known; +1 for an input without width.
+        where neither is known. An input without a width on a level has +1 there.
+
+    Raises:
+        SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
     """
     signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
 
     # Evaluate pairs of points at which a stated input is at either end, and the others at their
-    # nominal values or at an extreme corner. `contradiction` compares them later.
+    # nominal values or at an extreme corner. All pairs of samples are compared later, in the test
+    # of a guarantee.
     corners = _extreme_corners(signs, lowers[0], uppers[0])
     points = np.concatenate([domain.nominal[None], corners])
     for column in np.flatnonzero(signs.any(axis=0)):
@@ -308,12 +382,13 @@ def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
     """Return the corners of a box at which outputs have their minima, and then their maxima.
 
     Args:
-        signs: Signs of the effects, shape (outputs, inputs); 0 counts as 1.
+        signs: +1 or −1 where an output rises or falls with an input, shape (outputs, inputs); 0
+            counts as 1.
         lower: Lower ends of the box, shape (inputs,).
-        upper: Upper ends.
+        upper: Upper ends, shape (inputs,).
 
     Returns:
-        Corners of shape (2 n, inputs) for n distinct rows of signs.
+        Corners of shape (2 n, inputs) for n distinct rows of signs: n minima, then n maxima.
     """
     rises = np.unique(signs >= 0, axis=0)
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
@@ -325,18 +400,24 @@ def _observed_signs(
     """Return the sign that the slopes at all probes of a box have.
 
     The probes are the nominal point, the extreme corners by the slopes there, and four points
-    inside. A sign is unsure where slopes differ in sign, or the smallest is below 5 % of their
-    range over the probes.
+    inside. A sign is unsure where slopes differ in sign, or the magnitude of the smallest one is
+    below 5 % of the range of the slopes over the probes. It is evidence, not proof.
 
     Args:
-        model: Outputs at points.
+        model: Function from points, shape (n, inputs), to the outputs there, shape (n, outputs).
         lower: Lower ends of the box, shape (inputs,).
-        upper: Upper ends.
-        nominal: Nominal point, shape (inputs,).
-        stated: Signs that are known, shape (outputs, inputs). Only inputs with a 0 are probed.
+        upper: Upper ends, shape (inputs,).
+        nominal: Nominal point, which lies in the box, shape (inputs,).
+        stated: Signs that are known, 0 for none, shape (outputs, inputs). Only inputs with a 0 for
+            some output are probed; they must have a width.
 
     Returns:
-        Signs of shape (outputs, inputs): 0 where unsure, and 1 for an input without any effect.
+        Signs of shape (outputs, inputs): +1 or −1 where the output rises or falls at all probes, 0
+        where unsure, and 1 for an input without any effect, or that was not probed.
+
+    Raises:
+        SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
     """
     free = np.flatnonzero((stated == 0).any(axis=0))
     nominal_slopes = _slopes(model, lower, upper, points=nominal[None], inputs=free)[0]
@@ -363,14 +444,18 @@ def _slopes(model: Model, lower: Array, upper: Array, *, points: Array, inputs: 
     Steps are 1e-3 of the width of the box, and go to its inside.
 
     Args:
-        model: Outputs at points.
+        model: Function from points, shape (n, inputs), to the outputs there, shape (n, outputs).
         lower: Lower ends of the box, shape (inputs,).
-        upper: Upper ends.
+        upper: Upper ends, shape (inputs,).
         points: Points of the box, shape (n, inputs).
-        inputs: Columns of the inputs that are changed.
+        inputs: Columns of the inputs that are changed; they must have a width.
 
     Returns:
         Slopes of shape (n, outputs, inputs), 0 for the other inputs.
+
+    Raises:
+        SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
     """
     values = model(points)
     slopes = np.zeros((*values.shape, points.shape[1]))

@@ -14,7 +14,7 @@ from alphacut.fuzzy import (
     levels,
     propagate,
 )
-from alphacut.fuzzy.plans.transformation import hanss_points
+from alphacut.fuzzy.plans.transformation import _sample_count, hanss_points
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),
@@ -64,3 +64,10 @@ def test_bounds_are_attained_where_the_result_says():
             for column, output in enumerate(result.outputs):
                 point = dict(zip(result.inputs, places[level, column], strict=True))
                 assert monotone(**point)[output] == ends[level, column]
+
+
+def test_points_of_inputs_without_any_sign_are_counted_once():
+    """A sign gives two opposite corners; without one they are the same 2 · 3 points."""
+    grids = [[[0.0, 1.0], [0.0, 0.5, 1.0]]]
+    for signs, count in (([0, 0], 6), ([1, 0], 6), ([0, -1], 4), ([1, -1], 2)):
+        assert _sample_count(np.array([[signs]], np.int8), grids) == count
