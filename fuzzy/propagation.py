@@ -39,10 +39,6 @@ class CampaignOptions(TypedDict, total=False):
     progress: Progress | bool | None
 
 
-BUDGET = 10_000
-"""Evaluations of the model that a call may take unless it says more."""
-
-
 def propagate(
     function: Function,
     inputs: Mapping[str, FuzzyNumber | float],
@@ -50,7 +46,7 @@ def propagate(
     *,
     alpha: Sequence[float] | None = None,
     knowledge: Knowledge | None = None,
-    budget: int = BUDGET,
+    budget: int = 10_000,
     shared: Sequence[str] = (),
     vectorised: bool = False,
     workers: int = 1,
@@ -109,10 +105,13 @@ def propagate(
     is_allowed = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(is_allowed, "executor", value=executor, allowed=allowed)
+    # Samples of another model in the same store have another key. Without a store nothing can be
+    # mixed up, so that an identity need not be given.
     model = b""
     if store is not None:
         model = model_key(identity or {})
-    # A store or an executor that the caller made is not closed here.
+    # A store or an executor that the caller made is not closed here: another call may follow that
+    # takes its samples or its processes.
     with (
         progress_reporter(progress) as report,
         nullcontext(executor) if executor else pool(workers) as sample_executor,
@@ -142,8 +141,13 @@ def propagate(
 
 
 def _require_method(method: Plan) -> None:
-    """Refuse an object that is no plan, such as the class itself or a plan of other samples."""
-    # A class in place of an object, and a plan of another kind, are the usual mistakes.
+    """Raise RefusedError unless an object is a plan, with a `run` of two arguments.
+
+    A plan is an object such as ``General()`` whose `run` takes a campaign, which evaluates the
+    model, and the domain of the inputs, and returns bounds.
+    """
+    # The usual mistakes are a class in place of an object, and a plan of random inputs, whose `run`
+    # has other arguments.
     is_plan = hasattr(method, "run") and not isinstance(method, type)
     is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
     allowed = "an object such as General() or Signed()"
@@ -173,15 +177,25 @@ def width_fractions(
 ) -> WidthFractions:
     """Return how much of the width of a fuzzy result each input causes, by fixing one at a time.
 
+    The width is computed with all inputs fuzzy, and then once for each group with the inputs of the
+    group fixed at their nominal values, of membership 1. The fraction of a group is the reduction
+    of the width over the width with all inputs fuzzy.
+
     Args:
         propagation: From fuzzy inputs to bounds, as `lambda inputs: propagate(function, inputs)`,
             or to lower and upper ends, two arrays of one shape (…, outputs).
-        inputs: The fuzzy inputs.
+        inputs: The fuzzy inputs by name; plain numbers are crisp.
         groups: Names of inputs that are fixed together, by the name of their group; each input by
-            itself if not given.
+            itself if not given or empty.
+
+    Returns:
+        Names of the groups, and the fraction of each, shape (groups, …, outputs), where (…,
+        outputs) is the shape of the bounds, such as (levels, outputs). A fraction is 0 where the
+        width is 0, and never negative. Fractions need not add up to 1, since effects overlap.
 
     Raises:
-        RefusedError: A group names what is no input.
+        RefusedError: A group names what is no input, or an input is no number.
+        Exception: Whatever `propagation` raises.
 
     Example:
         >>> from alphacut.fuzzy import Interval, Reduced
@@ -197,7 +211,7 @@ def width_fractions(
             require_choice("input of a group", name, numbers)
 
     def ends_with(fixed: Sequence[str]) -> Ends:
-        """Return the ends of the result with some inputs at their nominal values."""
+        """Return the ends of the result with the inputs `fixed` at their nominal values."""
         crisp = {name: Crisp(numbers[name].nominal) for name in fixed}
         result = propagation({**numbers, **crisp})
         if isinstance(result, Bounds):

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
-"""Fraction of an output's magnitude by which bounds may miss each other for reasons of rounding."""
+"""Fraction of an output's magnitude by which bounds may miss each other for reasons of rounding: it
+is far above that of thousands of additions, 1e-13, and far below the six digits that are shown."""
 
 
 class Ends(NamedTuple):
@@ -122,6 +123,16 @@ class Bounds:
     samples: Samples | None = None
 
     def __post_init__(self) -> None:
+        """Check shapes and values of the fields, and replace the levels `alpha` by an array.
+
+        With A levels, m outputs and n inputs, `lower`, `upper` and `error` must have the shape
+        (A, m), or (A, T, m) if there are T times; `lower_at` and `upper_at` have a further axis n.
+
+        Raises:
+            RefusedError: Levels do not rise within [0, 1], a shape is another one, an end is not
+                finite, or an error is negative, or NaN where the output is not guaranteed.
+            FailedError: Cuts are not nested, or attained ends lie outside guaranteed ones.
+        """
         object.__setattr__(self, "alpha", np.array(checked_levels(self.alpha)))
         shape: tuple[int, ...] = (len(self.alpha), len(self.outputs))
         if self.time is not None:
@@ -150,9 +161,12 @@ class Bounds:
         self._check_proof()
 
     def _check_proof(self) -> None:
-        """Raise `FailedError` if cuts are not nested or attained ends lie outside guaranteed ones.
+        """Raise `FailedError` if the bounds contradict one another: a method is wrong then.
 
-        Differences within the stated errors, and within the rounding of the output, are allowed.
+        A lower bound must not lie above the upper one, the cut of a level must lie in that of the
+        level before, and ends that inputs reach (`attained`) must lie inside ends that are proved
+        (`proved`); unknown ones are NaN or infinite. Differences up to the stated errors, and up to
+        1e-9 of the output's largest magnitude, which is rounding, are allowed.
         """
         magnitudes = np.maximum(np.abs(self.lower), np.abs(self.upper))
         over_levels_and_time = tuple(range(magnitudes.ndim - 1))
@@ -170,21 +184,26 @@ class Bounds:
         _require_none("lower ends of the α-cuts are not nested", lower_falls, self.outputs)
         upper_rises = np.diff(self.upper, axis=0) - between_levels
         _require_none("upper ends of the α-cuts are not nested", upper_rises, self.outputs)
+        # A comparison with NaN is false, so that unknown attained ends pass.
         for excess in (proved.lower - attained.lower, attained.upper - proved.upper):
             what = "attained bounds lie outside the proved ones"
             _require_none(what, excess - rounding, self.outputs)
 
     @cached_property
     def _guaranteed(self) -> Mask:
+        """Which outputs have guaranteed bounds, shape (outputs,)."""
         natures = self.natures or (self.nature,) * len(self.outputs)
         return np.array([nature is Nature.GUARANTEED for nature in natures])
 
     @cached_property
     def attained(self) -> Ends:
-        """Ends that some inputs are known to reach, less their stated error; NaN where unknown.
+        """Ends that some inputs are known to reach; NaN where unknown. Shapes are that of `lower`.
 
-        The ends of attained and estimated outputs are reached to their error. Of guaranteed outputs
-        `inner` is reached, if it is known.
+        The bounds of an output are attained, estimated or guaranteed. Attained and estimated ends
+        are reached to within their `error`, so that they are moved inwards by it here. For
+        guaranteed outputs the ends `inner` are reached, if they are known. Where the box of the
+        inputs only encloses the set that is meant (`encloses`) and `inner` is not known, it is not
+        known whether any end is reached in the set.
         """
         unknown = np.full(self.lower.shape, np.nan)
         inner = self.inner or Ends(unknown, unknown)
@@ -201,6 +220,7 @@ class Bounds:
         """Ends that no value of the output exceeds, by proof; infinite where nothing is proved."""
         infinite = np.full(self.lower.shape, np.inf)
         outer = self.outer or Ends(-infinite, infinite)
+        # Of attained and estimated outputs a proof by other means may be known: the ends `outer`.
         lower = np.where(self._guaranteed, self.lower, outer.lower)
         upper = np.where(self._guaranteed, self.upper, outer.upper)
         return Ends(lower, upper)
@@ -211,10 +231,12 @@ class Bounds:
         return enclosed_set(self.inputs.values())
 
     def without_attained(self) -> Self:
-        """Return the bounds without what is reached in the box of the inputs.
+        """Return a copy of the bounds in which no end is known to be reached.
 
-        Of inputs that enclose a set, as the learned set of an identification, the bounds hold for
-        the set, but it is not known whether a point that reaches them belongs to it.
+        The box of the inputs' cuts may enclose a smaller set, such as the set of inputs that an
+        identification has learned from measurements. The bounds over the box hold for the set, too,
+        but it is not known whether a point that reaches them belongs to it. So `lower_at` and
+        `upper_at` become NaN, and `inner` None.
         """
         unknown = np.full_like(self.lower_at, np.nan)
         return replace(self, inner=None, lower_at=unknown, upper_at=unknown)
@@ -227,9 +249,17 @@ class Bounds:
     def number(self, output: str = "y") -> Stepwise | ClaimedNumber:
         """Return one output as a fuzzy number; between two levels the wider α-cut holds.
 
+        Args:
+            output: Name of the output; its bounds must not be over time.
+
+        Returns:
+            A fuzzy number with the α-cuts of the output. If inputs come from measured values, and
+            so claim that a quantity lies in their α-cut with P ≥ 1 − α, the number carries the
+            claim of the result, which holds from the lowest level on.
+
         Raises:
-            RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim of
-                coverage, which the number would have.
+            RefusedError: There is no such output, or the inputs carry no claim and the levels do
+                not run from 0 to 1.
         """
         ends = self.bounds(output)
         # The cut of a lower level contains every cut up to the next one, so it is safe in between.
@@ -258,7 +288,14 @@ class Bounds:
         return self.natures[column] if self.natures else self.nature
 
     def __str__(self) -> str:
-        """Return nature, basis and cost, a line for each level of the first outputs, the notes."""
+        """Return the bounds as lines of text.
+
+        The first line says what the bounds promise (attained, estimated or guaranteed), on what
+        basis, by which method and at which cost. A line for each level of an output follows, over
+        time with the extremes over all times, for as many outputs as 25 lines hold, but one at
+        least. The last lines are the notes of the method, and the claim of probability that the
+        inputs' measured values allow.
+        """
         max_lines = 25  # of levels of outputs; the text shall fit on a screen
         n_shown = max(1, max_lines // len(self.alpha))
         head = f"bounds {self.nature}"
@@ -293,12 +330,22 @@ class Bounds:
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
     def _lines(self, output: str) -> Iterator[str]:
-        """Yield a line of text for each level of an output, with its extremes over time."""
+        """Yield a line of text for each level of an output, with its extremes over time.
+
+        A line has the name with its unit, the level, both ends, and what the ends are worth: that
+        the true range may be wider, for attained bounds; their error, for estimated ones; the gap
+        to what is attained, for guaranteed ones. Ends are rounded to six digits, attained ones
+        inwards and others outwards. The nature is added where it is not that of all outputs.
+
+        Args:
+            output: Name of one of the outputs.
+        """
         column = self.column(output)
         nature = self.nature_of(output)
         extremes = self.extremes_over_time(column)
         for alpha, lower, upper, error in zip(self.alpha, *extremes, strict=True):
-            # Six digits are rounded to the side on which the statement stays true.
+            # Six digits are rounded to the side on which the statement stays true: a range that
+            # inputs reach may be shown narrower, and one that holds everything wider.
             low = rounded(lower, "lower", nature, 6)
             high = rounded(upper, "upper", nature, 6)
             if low > high:  # attained ends of nearly one value were rounded inwards
@@ -316,7 +363,15 @@ class Bounds:
             yield line if nature == self.nature else f"{line}, {nature}"
 
     def extremes_over_time(self, column: int) -> Extremes:
-        """Return bounds of the output with an index over all times, and their largest error."""
+        """Return the smallest lower end, the largest upper end and the largest error over time.
+
+        They have the shape (levels,) each. Without times they are the ends and errors themselves. A
+        maximum over errors of which one is NaN, which means unknown, is NaN.
+
+        Args:
+            column: Index of the output on the last axis of `lower`.
+        """
+        # The arrays have the axes (levels, times, outputs) or (levels, outputs).
         over_time = tuple(range(1, self.lower.ndim - 1))
         return Extremes(
             lower=self.lower[..., column].min(axis=over_time),
@@ -325,19 +380,27 @@ class Bounds:
         )
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: object) -> Axes:
-        """Draw an output, the first by default: its membership function, or α-cuts over time.
+        """Draw an output: its membership function, or over time the band of each α-cut.
 
         Args:
-            axes: Axes of Matplotlib, which are returned; new ones by default.
-            output: Name of the output.
-            line: Keywords of `Axes.plot`, or of `Axes.fill_between` over time.
+            axes: Axes of Matplotlib on which is drawn; new ones if not given.
+            output: Name of the output; the first one if it is empty.
+            line: Keywords of `Axes.plot`, or over time of `Axes.fill_between`.
+
+        Returns:
+            The axes. Neither labels nor a legend are drawn.
+
+        Raises:
+            RefusedError: There is no such output; or it has no times, the levels do not run from 0
+                to 1, and the inputs carry no claim of probability.
         """
         output = output or self.outputs[0]
         if self.time is None:
             return self.number(output).plot(axes, **line)
         if axes is None:
             axes = new_axes()
-        opacity = 0.8 / len(self.alpha)  # bands of all levels lie on one another
+        # Bands of all levels lie on one another, so that the core becomes the darkest.
+        opacity = 0.8 / len(self.alpha)
         style: dict[str, Any] = {"color": "tab:blue", "alpha": opacity, "lw": 0} | line
         ends = self.bounds(output)
         for level in range(len(self.alpha)):
@@ -347,15 +410,19 @@ class Bounds:
     def to_dataset(self) -> xarray.Dataset:
         """Return the bounds as an xarray dataset.
 
-        It has lower, upper and error over (alpha, time, output), the inputs `lower_at` and
-        `upper_at` that reach them over a further axis parameter, nature and label of each output.
-        The attribute `encloses` is there where it is not empty.
+        Its variables are `lower`, `upper` and `error` over (alpha, time, output), or (alpha,
+        output) without times; the inputs `lower_at` and `upper_at` that reach the ends, over a
+        further axis parameter; and of each output its `nature` (attained, estimated or guaranteed)
+        and its `label` (the name with its unit, as "q1 [m]"). The attributes are method,
+        evaluations, seconds, basis, and encloses where it is not empty: the name of the set that
+        the box of the inputs encloses.
         """
         import xarray
 
         time = {} if self.time is None else {"time": self.time}
         axes = {"alpha": self.alpha, **time, "output": list(self.outputs)}
         # The order of the axes is that of the arrays: levels, times, outputs, and inputs last.
+        # xarray names the axes of a variable by a tuple of these keys.
         coordinates = {**axes, "parameter": list(self.inputs)}
         natures = [str(self.nature_of(output)) for output in self.outputs]
         variables = {
@@ -384,17 +451,19 @@ def of_enclosing_box(encloses: str) -> str:
 
 
 def _digits(value: float) -> str:
-    """Return a number with six digits; empty where it is NaN."""
+    """Return a number with six significant digits; empty where it is NaN."""
+    # Adding 0 turns −0, which a rounded bound may be, into 0.
     return "" if np.isnan(value) else f"{value + 0.0:.6g}"
 
 
 def _require_none(what: str, excess: Array, outputs: tuple[str, ...]) -> None:
     """Raise a `FailedError` that says `what` is wrong if an excess (…, outputs) is positive."""
     if (excess > 0).any():
+        # Outputs are the last axis, which runs fastest in the flat index that argmax returns.
         output = outputs[int(np.nanargmax(excess) % len(outputs))]
         raise FailedError(f"{what}: of {output}, by up to {np.nanmax(excess):.3g}")
 
 
 def _require_shape(name: str, found: tuple[int, ...], shape: tuple[int, ...]) -> None:
-    """Refuse an array of another shape."""
+    """Raise RefusedError if the shape `found` of the array `name` is not the expected `shape`."""
     require(found == shape, f"shape of {name}", value=found, allowed=str(shape))
