@@ -21,9 +21,6 @@ from alphacut.base.memory import require_free_memory
 
 Numbers = NDArray[np.generic]
 formats: Any = np.lib.format  # whose functions have no types
-ALLOWED = "an array of real numbers as numpy.save writes it"
-LONGEST_HEAD = 1 << 16
-"""Largest number of bytes of a head; heads of arrays of numbers have 128 or 192."""
 DEFLATE_RATIO = 1032
 """Largest number of bytes for which one byte of deflated data can stand (RFC 1951)."""
 
@@ -48,30 +45,36 @@ class ArrayHead:
             has another size than the head states.
     """
 
+    max_bytes = 1 << 16
+    """Largest number of bytes of a head; heads of arrays of numbers have 128 or 192."""
+
     def __init__(self, name: str, start: bytes, *, size: int, kinds: str) -> None:
-        stream = BytesIO(start[:LONGEST_HEAD])
+        allowed = "an array of real numbers as numpy.save writes it"
+        stream = BytesIO(start[: self.max_bytes])
         try:
             version = formats.read_magic(stream)
             read = {(1, 0): formats.read_array_header_1_0, (2, 0): formats.read_array_header_2_0}
             shape, is_fortran, dtype = read[version](stream)
         except Exception as error:  # of a damaged head, errors of many types
             reason = str(error).partition("\n")[0] or type(error).__name__
-            raise RefusedError(name, f"unreadable ({reason})", ALLOWED) from None
+            raise RefusedError(name, f"unreadable ({reason})", allowed) from None
         self.shape: tuple[int, ...] = shape
         self.dtype: np.dtype[Any] = dtype
         self.order: Literal["C", "F"] = "C"
         if is_fortran:
             self.order = "F"
         self.offset = stream.tell()
-        is_known = self.dtype.kind in kinds and self.dtype.itemsize <= LONGEST_HEAD
+        # A damaged head may state entries of any length, such as texts of a thousand million
+        # characters. No number has more than 32 bytes.
+        is_known = self.dtype.kind in kinds and self.dtype.itemsize <= self.max_bytes
         cure = "save numbers, as array.astype(float)"
         if self.dtype.kind == "c":
             cure = "save its real part, array.real"
         elif self.dtype.kind == "O":
             cure = "save numbers, as array.astype(float), a sparse matrix by scipy.sparse.save_npz"
-        require(is_known, name, f"{self.dtype} of shape {self.shape}", ALLOWED, cure)
+        require(is_known, name, f"{self.dtype} of shape {self.shape}", allowed, cure)
         is_shape = len(self.shape) <= 8 and all(n >= 0 for n in self.shape)
-        require(is_shape, name, f"of shape {self.shape}", ALLOWED)
+        require(is_shape, name, f"of shape {self.shape}", allowed)
         expected = self.offset + math.prod(self.shape) * self.dtype.itemsize
         value = f"of {size} bytes, where its head states shape {self.shape} of {self.dtype}"
         require(size == expected, name, value, f"{expected} bytes", "copy or save the file anew")
@@ -82,16 +85,21 @@ def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
 
     Args:
         path: The file.
-        kinds: Letters of the kinds of NumPy's types that are allowed.
+        kinds: Allowed letters of `numpy.dtype.kind`: b for truth values, u and i for integers, f
+            for floats, c for complex numbers, S and U for texts.
+
+    Returns:
+        An array that cannot be written to. It reads the file as long as it exists, so the file must
+        not change meanwhile. An array without entries is no map.
 
     Raises:
-        RefusedError: The file is cut off, damaged, or holds other things than numbers.
+        RefusedError: The file is cut off, damaged, or holds numbers of other kinds or other things.
         OSError: The file cannot be opened.
     """
     with path.open("rb") as file:
-        start = file.read(LONGEST_HEAD)
+        start = file.read(ArrayHead.max_bytes)
     head = ArrayHead(path.name, start, size=path.stat().st_size, kinds=kinds)
-    if math.prod(head.shape) == 0:
+    if math.prod(head.shape) == 0:  # the system maps no empty file
         return np.empty(head.shape, head.dtype)
     return np.memmap(path, head.dtype, "r", head.offset, head.shape, head.order)
 
@@ -122,16 +130,22 @@ class ArrayArchive:
         return list(self.members)
 
     def read(self, name: str, *, kinds: str = "buif") -> Numbers:
-        """Return one of the arrays.
+        """Return one of the arrays, which cannot be written to.
 
         Args:
             name: Its name, one of `names`.
-            kinds: Letters of the kinds of NumPy's types that are allowed.
+            kinds: Allowed letters of `numpy.dtype.kind`: b for truth values, u and i for integers,
+                f for floats, c for complex numbers, S and U for texts.
 
         Raises:
-            RefusedError: The member is damaged, of other kinds, larger than the free memory, or
-                larger than its compressed bytes can stand for.
+            KeyError: There is no such name.
+            RefusedError: The member is damaged, of other kinds, too large for half of the free
+                memory, larger than its compressed bytes can stand for, or compressed by another
+                method than deflate.
+            OSError: The file does not exist any more.
         """
+        # The archive states the sizes, and may lie. What cannot be true is refused before memory is
+        # allocated, and the head of the array is compared with the bytes that were read.
         member = self.members[name]
         place = f"{self.path.name}:{name}"
         is_known = member.compress_type in (ZIP_STORED, ZIP_DEFLATED)
@@ -143,6 +157,7 @@ class ArrayArchive:
         require(member.file_size <= most, place, value, f"up to {most}")
         is_inside = member.compress_size <= self.path.stat().st_size
         require(is_inside, place, value, "what lies in the file")
+        # The caller mostly makes a copy, such as a conversion to floats.
         require_free_memory(place, 2.0 * member.file_size, f"{member.file_size} bytes")
         try:
             with ZipFile(self.path) as archive, archive.open(member) as file:

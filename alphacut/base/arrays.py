@@ -36,10 +36,13 @@ def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
 
 @lru_cache(maxsize=1)
 def _thread_pools(_modules: int) -> "ThreadpoolController":
-    """Return the loaded libraries that have threads.
+    """Return a controller of the libraries in this process that have threads, such as OpenBLAS.
 
-    Looking for them takes 20 ms. It is done again only where the number of loaded modules has
-    changed, since a new module may have brought a library.
+    Looking for them takes 20 ms, so that the last controller is cached. They are looked for again
+    where the number of loaded modules has changed, since a new module may have brought a library.
+
+    Args:
+        _modules: Number of loaded modules; it only decides whether the cached one is returned.
     """
     from threadpoolctl import ThreadpoolController
 

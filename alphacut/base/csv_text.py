@@ -28,9 +28,12 @@ def csv_cell(text: str) -> str:
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as the text of a CSV file: cells apart by commas, quoted where they must be.
 
+    A cell that a spreadsheet would take for a formula gets an apostrophe in front. Each line ends
+    with a line feed.
+
     Args:
-        head: Titles of the columns.
-        rows: Cells of each row.
+        head: Titles of the columns, the first line.
+        rows: Cells of each row; their number is not checked.
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

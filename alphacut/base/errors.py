@@ -20,12 +20,15 @@ MAX_LENGTH = 300
 def printable(value: object, most: int = MAX_LENGTH) -> str:
     """Return a value as one line of at most `most` printable characters.
 
-    Longer texts end with "…". Characters that a terminal would execute or hide become blanks.
+    Longer texts end with "…". Characters that a terminal would execute or hide become blanks, and
+    several blanks become one. An integer of thousands of digits is described in words.
     """
     try:
+        # What follows goes through the characters one by one, which would take long of a large
+        # text. Four times the length are enough unless most of them are blanks.
         text = str(value)[: 4 * most]
     except ValueError:
-        # Python refuses to write integers of more than some thousands of digits
+        # Python refuses to write integers of more than some thousands of digits.
         text = "a number of thousands of digits"
     characters = [" "] * len(text)
     for k, character in enumerate(text):
@@ -40,17 +43,20 @@ def printable(value: object, most: int = MAX_LENGTH) -> str:
 def fit_message(
     value: str, allowed: str, compose: Callable[[str, str], str], cure: str = ""
 ) -> str:
-    """Return a message of at most `MAX_LENGTH` characters that ends with the hint.
+    """Return a message of at most 300 characters (`MAX_LENGTH`) that ends with a hint.
 
     If the message is too long, the value is shortened first and the allowed values next, to 20
-    characters each. The hint is never shortened.
+    characters each, and then the end of the sentence. The hint is never shortened: with one of more
+    than 280 characters the message is longer.
 
     Args:
-        value: The value that was refused.
-        allowed: The allowed values.
-        compose: Makes a sentence from both.
-        cure: The hint; it may be empty.
+        value: The value that was refused, as text.
+        allowed: The allowed values, as text.
+        compose: Function that makes a sentence from both texts, whole or shortened.
+        cure: The hint, which follows after "; "; empty for none.
     """
+    # A user can do most with the hint and with the allowed values; of the value, which they have
+    # written themselves, the beginning is enough to find it.
     min_shown = 20
     end = ""
     if cure:
@@ -102,6 +108,11 @@ class RefusedError(ValueError):
         self.place = place
 
         def sentence(value_text: str, allowed_text: str) -> str:
+            """Return "PLACE: KEY is VALUE; allowed: ALLOWED", with key and place of this error.
+
+            "KEY is missing" stands there if the value of this error is None. An empty place, and
+            empty allowed values, are left out.
+            """
             text = f"{key} is {value_text or 'empty'}"
             if value is None:
                 text = f"{key} is missing"
@@ -148,14 +159,15 @@ def checked_number(
 
     Args:
         key: Name of the argument, for the message.
-        value: The value as the caller gave it. True and False are not numbers.
+        value: The value as the caller gave it, of any type. Numbers of Python and of NumPy are
+            allowed; texts, arrays, True and False are not numbers.
         positive: Whether it must be greater than 0.
-        whole: Whether it must be an integer that is not negative.
+        whole: Whether it must be of an integer type and not negative; 2.0 is refused.
         least: Smallest allowed number.
         most: Largest allowed number.
 
     Raises:
-        RefusedError: The value is not such a number.
+        RefusedError: The value is not such a number. An integer too large for a float is none.
     """
     kind = "finite numbers"
     if whole:
@@ -218,7 +230,8 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
         Array of the shape of the points.
 
     Raises:
-        RefusedError: It is not a function, it raises an error, or it returns another shape.
+        RefusedError: It is not a function, it raises an error, or it returns another shape or what
+            are no numbers. Its values need not be finite.
     """
     if not callable(function):
         raise RefusedError(key, repr(function), allowed)
@@ -227,7 +240,7 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
     except Exception as error:  # a function of the user may raise anything
         value = f"a function that raises {type(error).__name__}: {error}"
         cure = ""
-        # what NumPy says where a function for one number, as math.hypot, gets an array
+        # NumPy says so where a function for one number, as math.hypot, gets an array.
         if re.search("length-1 arrays|truth value|0-dimensional", str(error)):
             cure = "write it by NumPy's functions, as np.hypot and np.where"
         raise RefusedError(key, value, allowed, cure) from None
@@ -238,11 +251,16 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
 
 
 def require_numbers(name: str, values: object) -> None:
-    """Raise RefusedError unless `values` is a list, tuple or array of finite real numbers."""
+    """Raise RefusedError unless `values` is a list, tuple or array of finite real numbers.
+
+    It may be empty, and an array of any shape; a list in a list is refused, and so are texts, truth
+    values and complex numbers. `name` stands in the message.
+    """
     is_list = isinstance(values, Collection) and not isinstance(values, str)
     require(is_list, name, value=repr(values), allowed="a list of numbers")
     if isinstance(values, np.ndarray):
-        # without a loop over all entries, of which matrices have many
+        # An array is checked without a loop over its entries, of which matrices have many. The loop
+        # follows only where it finds the entry that is wrong.
         if values.dtype.kind in "iuf" and np.isfinite(values).all():
             return
         values = np.ravel(values).tolist()

@@ -17,9 +17,6 @@ from pathlib import Path
 
 from alphacut.base.errors import FailedError, RefusedError
 
-MIN_FREE_BYTES = 1 << 20
-"""Bytes that a disk has at least where it is not full."""
-
 
 def digest_of(content: bytes) -> str:
     """Return the SHA-256 of a content in hexadecimal digits."""
@@ -66,13 +63,21 @@ def read_regular(path: Path, size: int = -1) -> bytes:
 
 @contextmanager
 def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; the file written there replaces `path` in the end.
+    """Yield a temporary path; what the block writes there becomes the file `path` in one step.
 
-    If the block fails, `path` stays as it was. A device or a pipe is written to instead. A link
-    stays and its target is replaced, or the link itself without `follow_links`.
+    The temporary file stands beside `path`, with the same suffix, and is empty at first. Folders on
+    the way are made. If the block raises an exception, the temporary file is removed and `path`
+    stays as it was. If `path` leads to a device or a pipe, the content is written into it instead.
+
+    Args:
+        path: The file, which need not exist.
+        follow_links: Whether a link stays and its target is replaced; otherwise the link itself is
+            replaced, also one to a device.
 
     Raises:
-        FailedError: The disk is full.
+        FailedError: An OSError or RuntimeError occurred in the block or here, and less than 1 MiB
+            of the disk is free.
+        OSError: The place cannot be written for another reason.
     """
     path = Path(path)
     if is_special(path) and follow_links:
@@ -88,8 +93,10 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
         os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
         yield partial
         os.replace(partial, path)
+    # Libraries report a full disk in their own words, HDF5 by a RuntimeError without a reason. So
+    # the disk is asked, of which a full one may have some small blocks left.
     except (OSError, RuntimeError):
-        if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES:
+        if shutil.disk_usage(path.parent).free < 1 << 20:
             cure = "free some space"
             if path.is_relative_to(tempfile.gettempdir()):
                 cure += ", or set TMPDIR to another folder"
@@ -100,21 +107,25 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
 
 
 def write_text(path: Path | str, text: str, *, follow_links: bool = True) -> None:
-    """Write a text file, whole or not at all; see `whole_file`."""
+    """Write a text file in UTF-8, whole or not at all; arguments and errors are `whole_file`'s."""
     with whole_file(path, follow_links=follow_links) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
 @contextmanager
 def locked(option: str, folder: Path) -> Iterator[None]:
-    """Make a folder, and lock it during the block against other runs, if the file system can.
+    """Make a folder, and lock it during the block against other runs of this program.
+
+    On Windows, and on file systems without locks, the block runs without one. The lock ends with
+    the block or the process, and leaves no file behind.
 
     Args:
         option: Option that names the folder, for the message.
-        folder: The folder.
+        folder: The folder, which need not exist.
 
     Raises:
-        RefusedError: Another run is writing into it.
+        RefusedError: Another run holds the lock; the block does not begin.
+        OSError: The folder cannot be made or opened.
     """
     folder.mkdir(parents=True, exist_ok=True)
     try:

@@ -62,7 +62,14 @@ class _Kernel:
         return self._created
 
     def _create(self) -> Any:
-        """Return a new dispatcher; without a folder for its code it compiles in each process."""
+        """Return a new dispatcher of Numba for the function; nothing is compiled yet.
+
+        Its compiled code is kept in the folder of `shared_folder`, or where Numba keeps it, under
+        names with a digest of all texts that it was made from. If no folder can be written, or
+        Numba does not compile here (NUMBA_DISABLE_JIT), the dispatcher has no cache, so that each
+        process compiles anew. For a kernel with the option `parallel` the name `prange` in the
+        module of the function becomes Numba's.
+        """
         import numba  # takes .3 s
 
         function = self._function
@@ -75,7 +82,8 @@ class _Kernel:
             folder = shared_folder(function.__module__) or code.cache_path
             stamp = digest(function.__module__)
             code._cache_file = _shared_index(str(folder), code._impl.filename_base, stamp)
-        # no folder can be written, NUMBA_DISABLE_JIT, or a Numba whose cache is another
+        # Numba raises a RuntimeError if no folder can be written. Its cache is no public interface:
+        # with NUMBA_DISABLE_JIT, or in a later version, the attributes above may be missing.
         except (RuntimeError, AttributeError):
             return numba.njit(**options)(function)
         return dispatcher
@@ -92,14 +100,15 @@ class _Kernel:
 
 
 def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles a function at its first call.
+    """Return a decorator that compiles a function by Numba, for each new type of its arguments.
 
-    The compiled code is kept in `shared_folder`, or where Numba keeps it, or for the process alone
+    The compiled code is kept in the user's cache, or where Numba keeps it, or for the process alone
     if no folder can be written. Division by zero gives infinity or NaN, and the lock of the
-    interpreter is released during calls.
+    interpreter is released during calls. Numba itself is imported at the first call.
 
     Args:
-        options: Further options of `numba.njit`.
+        options: Further options of `numba.njit`, such as `parallel` or `fastmath`; they override
+            those said above.
     """
     return partial(_Kernel, options={"nogil": True, "error_model": "numpy", **options})
 
@@ -107,18 +116,23 @@ def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:
 def _shared_index(folder: str, name: str, stamp: str) -> Any:
     """Return Numba's index of a kernel's compiled code, made safe for several processes.
 
-    Each process writes files of its own names. Each file ends with a digest of its content. A file
-    with another digest, such as a copy that was interrupted, is removed and taken as missing:
-    unpickling it would raise an error or end the process.
+    Numba keeps the code of each signature in a file of its own, and an index of these files beside
+    them. Several processes may read and write them at once. So each process writes code to files of
+    its own names, and each file ends with a digest of its content. A file with another digest, such
+    as a copy that was interrupted, is removed and taken as missing: unpickling it would raise an
+    error or end the process. Where files cannot be read or written, code is compiled for the
+    process alone, and no error is raised.
 
     Args:
         folder: Folder of the files.
-        name: Beginning of their names.
-        stamp: What code must have been compiled from; other code is ignored.
+        name: Beginning of their names, one for each kernel.
+        stamp: Digest of what code must have been compiled from; other code is ignored.
     """
     from numba.core.caching import IndexDataCacheFile
 
     class Index(IndexDataCacheFile):  # type: ignore[misc]
+        """Numba's index with other file names, digests, and without errors of the file system."""
+
         def load(self, key: object) -> object:
             with suppress(OSError):  # compiled for this process
                 return super().load(key)
@@ -129,6 +143,8 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
                 super().save(key, data)
 
         def _data_name(self, number: int) -> str:
+            # Numba counts the signatures, so that two processes would write different code to one
+            # name.
             return f"{self._index_name}.{uuid4().hex}.nbc"
 
         def _load_index(self) -> object:
@@ -141,6 +157,8 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
 
         @contextmanager
         def _open_for_write(self, path: str) -> Iterator[BytesIO]:
+            # Numba's file takes its place by renaming when it is closed. Numba unpickles only the
+            # beginning, so that the digest behind it does no harm.
             with super()._open_for_write(path) as file:
                 content = BytesIO()
                 yield content
@@ -150,7 +168,9 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
 
 
 def _remove_damaged(path: Path) -> None:
-    """Remove a file whose last bytes are not the digest of all others; it may be missing.
+    """Remove a file whose last 32 bytes are not the SHA-256 of all others; it may be missing.
+
+    An empty file, and one with fewer bytes, is removed, too.
 
     Raises:
         OSError: The file cannot be read or removed.
@@ -166,9 +186,13 @@ def _remove_damaged(path: Path) -> None:
 def shared_folder(module: str) -> Path | None:
     """Return the folder of a module's compiled code, which all checkouts of this user share.
 
-    It is made if need be; then the folders of other versions that were not used for a while are
-    removed. None is returned if the variable NUMBA_CACHE_DIR names a folder, or if the user's cache
-    cannot be written.
+    Its name has the module and a digest of the texts and versions that the code is made from. It is
+    made if need be; then folders of compiled code that were not used for two weeks are removed.
+    None is returned if the environment variable NUMBA_CACHE_DIR names a folder, which Numba takes
+    by itself, or if the user's cache cannot be written. The result is kept for the process.
+
+    Args:
+        module: Full name of a module of this project, such as alphacut.frame.response.duhamel.
     """
     if os.environ.get("NUMBA_CACHE_DIR"):
         return None
@@ -191,9 +215,19 @@ compiled = kernel()
 
 @cache
 def digest(module: str) -> str:
-    """Return a digest of a module's text and of the versions of Numba, NumPy and Python.
+    """Return the SHA-256, in hexadecimal, of all that a module's compiled code depends on.
 
-    Of a module with kernels it covers, in turn, the digests of all modules that it imports.
+    It covers the text of the module and the versions of Numba, NumPy and Python. Compiled code
+    contains the kernels that it calls and the constants that it reads, which may stand in other
+    modules. So the digest of a module that has kernels covers those of all modules of this project
+    that it imports, too. A module has kernels if it has been imported and has decorated a function
+    (`with_kernels`). The result is kept for the process.
+
+    Args:
+        module: Full name of a module of this project, such as alphacut.frame.response.duhamel.
+
+    Raises:
+        OSError: The module's file cannot be read.
     """
     text = _file(module).read_text("utf-8")
     total = sha256(f"{version('numba')} {np.__version__} {sys.version}{text}".encode())
@@ -204,7 +238,12 @@ def digest(module: str) -> str:
 
 
 def _imports(text: str) -> Iterator[str]:
-    """Yield the names of this project's modules that the text of a module imports."""
+    """Yield the names of this project's modules that the text of a module imports.
+
+    Only statements "from alphacut… import names" count; for a name that is itself a module, as in
+    "from alphacut.frame import response", the module is yielded after its package. Names without a
+    file are left out, and a module may be yielded several times.
+    """
     statement = r"^\s*from (alphacut[\w.]*) import (?:\(([\w\s,]*)\)|([\w, ]*))"
     for package, names_in_brackets, names in re.findall(statement, text, re.MULTILINE):
         modules = [package]

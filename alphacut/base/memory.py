@@ -26,7 +26,9 @@ def free_memory() -> float:
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 free.append(1024.0 * int(line.split()[1]))
-    with suppress(OSError, ValueError):  # "max" is no number: there is no limit
+    # A container has the machine's /proc/meminfo, but its own control group, whose limit ends the
+    # process without a message. The word "max" is no number: there is no limit.
+    with suppress(OSError, ValueError):
         group = Path("/sys/fs/cgroup")
         most = int((group / "memory.max").read_text())
         free.append(float(most - int((group / "memory.current").read_text())))
@@ -42,6 +44,8 @@ def free_memory() -> float:
 
 def require_free_memory(name: str, needed: float, what: str) -> None:
     """Raise RefusedError if reading a file would take more memory than is free.
+
+    Nothing is checked where the free memory is unknown.
 
     Args:
         name: Name of the file.

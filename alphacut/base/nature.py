@@ -30,15 +30,24 @@ class Nature(StrEnum):
 
 
 def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
-    """Return the lower or upper end of a range, rounded to some significant digits.
+    """Return the lower or upper end of a range, rounded so that what it promises stays true.
 
-    Attained ends are rounded towards the inside of the range, others towards the outside, so that
-    they stay true. A difference in the tenth digit is taken for round-off.
+    Attained ends, which some inputs reach, are rounded towards the inside of the range; estimated
+    and guaranteed ones, which hold the true range, towards the outside. A value that differs from a
+    rounded one by less than 1e-10 of itself counts as that one. Zero, NaN and infinities are
+    returned as they are.
+
+    Args:
+        value: The end.
+        side: "lower" or "upper".
+        nature: What the end promises.
+        digits: Number of significant digits, 1 or more.
     """
     if value == 0 or not math.isfinite(value):
         return value
     is_upward = (side == "upper") != (nature is Nature.ATTAINED)
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
+    # Without this 0.1 · 3, which is 0.30000000000000004 in floats, would be rounded up to 0.3001.
     round_off = 1e-10 * abs(value) * scale
     if is_upward:
         return math.ceil(value * scale - round_off) / scale

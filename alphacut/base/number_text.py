@@ -11,8 +11,9 @@ from alphacut.base.nature import Nature, rounded
 STANDARD_GRAVITY = 9.80665
 """In m/s², by the third General Conference on Weights and Measures, 1901."""
 PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+"""Prefix of a unit by its power of ten, for people who read a power of a thousand as a word."""
 MINUS = "\u2212"
-PREFIXED = ("m", "m/s", "m/s^2", "N", "N*m", "N/m", "Pa", "s", "rad", "W", "J")
+"""The minus of typography, as wide as a digit; files for programs have a hyphen instead."""
 
 
 class Table(NamedTuple):
@@ -34,9 +35,15 @@ class ShownUnit(NamedTuple):
     factor: float
 
     def text(self, value: float, *, digits: int = 4) -> str:
-        """Return a value in SI as a text in this unit, such as ``40.00 mm``.
+        """Return a value in SI as a text in this unit, such as ``40.00 mm`` of 0.04.
 
-        All digits before the point are shown, also where there are more than `digits`.
+        The value is multiplied by the field `factor`, 1000 for mm, and followed by `label`. NaN is
+        the text "nan".
+
+        Args:
+            value: The value in the SI unit.
+            digits: Number of significant digits, zeros at the end among them. All digits before the
+                point are shown also where there are more, so that no exponent is needed.
         """
         scaled = value * self.factor + 0.0  # adding 0 removes the sign of −0
         places = max(digits, len(f"{abs(scaled):.0f}"))
@@ -47,14 +54,20 @@ class ShownUnit(NamedTuple):
 def engineering(value: float, si: str, *, digits: int = 4) -> str:
     """Return a value in SI as a text with a suitable prefix, such as ``−3.590 MN``.
 
+    A prefix from n to G is taken for m, m/s, m/s^2, N, N*m, N/m, Pa, s, rad, W and J, if the
+    magnitude is from 1e-12 to 1e12. Otherwise the unit is kept, and the number has no zeros at its
+    end and an exponent where it is large or small, such as ``1.5e+13 Pa`` or ``0 N``. NaN and
+    infinities are written as nan and inf.
+
     Args:
         value: The value, in the unit `si`.
-        si: Unit, such as "N". Those that take no prefix here are kept.
-        digits: Significant digits.
+        si: Unit, such as "N"; empty for a pure number.
+        digits: Number of significant digits, 1 or more.
     """
     rounded_text = f"{value + 0.0:.{digits}g}"  # adding 0 removes the sign of −0
+    # The prefix is chosen for the rounded value: 999.96 N are 1.000 kN with four digits.
     rounded_value = float(rounded_text)
-    if si not in PREFIXED or not 1e-12 <= abs(rounded_value) < 1e12:
+    if not _takes_prefix(si) or not 1e-12 <= abs(rounded_value) < 1e12:
         if 1e4 <= abs(value) < 1e7:
             rounded_text = f"{rounded_value:.0f}"  # short enough without an exponent
         return f"{rounded_text} {si}".strip().replace("-", MINUS)
@@ -65,6 +78,14 @@ def engineering(value: float, si: str, *, digits: int = 4) -> str:
     return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
 
 
+def _takes_prefix(si: str) -> bool:
+    """Return whether an SI unit is shown with a prefix such as k.
+
+    Others are not, such as kg, which has a prefix, and m^4, where km^4 would not be 1000 m^4.
+    """
+    return si in ("m", "m/s", "m/s^2", "N", "N*m", "N/m", "Pa", "s", "rad", "W", "J")
+
+
 def _prefix_exponent(magnitude: float) -> int:
     """Return the power of ten of the prefix for a positive number, from −9 to 9."""
     return min(9, max(-9, 3 * math.floor(math.log10(magnitude) / 3)))
@@ -73,13 +94,15 @@ def _prefix_exponent(magnitude: float) -> int:
 def rounded_ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[float, float]:
     """Return both ends of a range, rounded in the direction that keeps its guarantee true.
 
-    Ends that agree, or that would pass each other, are rounded to the nearest number.
+    Ends that agree to nine digits, or that would pass each other when rounded inwards, are rounded
+    to the nearest number. Infinite ends stay.
 
     Args:
         low: Lower end.
-        high: Upper end.
-        nature: The guarantee: guaranteed bounds are rounded outwards, attained values inwards.
-        digits: Significant digits.
+        high: Upper end, not below the lower one.
+        nature: What the ends promise: guaranteed and estimated ones are rounded outwards, attained
+            ones, which some inputs reach, inwards.
+        digits: Number of significant digits, 1 or more.
     """
     lower = rounded(low, "lower", nature, digits)
     upper = rounded(high, "upper", nature, digits)
@@ -105,20 +128,39 @@ def percent_text(fraction: float, places: int = 1) -> str:
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:
-    """Return the factor and the unit for an axis whose values reach `largest` in the unit `si`.
+    """Return by which factor an axis multiplies its values, and the unit that it then shows.
 
-    Values from .1 to 1000 keep the unit.
+    A prefix from n to G is taken for m, m/s, m/s^2, N, N*m, N/m, Pa, s, rad, W and J. The factor is
+    1 and the unit stays for other units, for magnitudes from 0.1 to 1000, and if there is no
+    positive finite magnitude.
+
+    Args:
+        largest: Largest magnitude of the values in the unit `si`.
+        si: SI unit of the values.
+
+    Example:
+        >>> axis_prefix(4.2e4, "N")
+        (0.001, 'kN')
     """
-    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
+    is_suitable = math.isfinite(largest) and (0 < largest < 0.1 or largest >= 1000)
+    if not _takes_prefix(si) or not is_suitable:
         return 1.0, si
     exponent = _prefix_exponent(largest)
     return 10.0**-exponent, f"{PREFIXES[exponent]}{si}"
 
 
 def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as lines of text, each with its line end.
+    """Return a table as lines of text, each with a line feed at its end.
 
-    The first column is aligned to the left, all others to the right.
+    Columns are as wide as their longest cell, two blanks apart. The first one is aligned to the
+    left, all others to the right.
+
+    Args:
+        head: Titles of the columns, one or more; they are the first line.
+        rows: Cells of each row.
+
+    Raises:
+        ValueError: A row has another number of cells than the head.
     """
     lines = [list(head)]
     lines.extend(list(row) for row in rows)

@@ -19,8 +19,6 @@ from alphacut.base.memory import require_free_memory
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FORMATS = ("BMP", "GIF", "JPEG", "JPEG2000", "PNG", "PPM", "TIFF", "WEBP")
-"""Formats of pixels that are opened, by Pillow's names."""
 LZW_RATIO = 2731
 """Largest number of bytes for which one byte of LZW can stand: 4096 bytes take twelve bits."""
 MAX_BYTES_PER_BYTE = {
@@ -34,21 +32,29 @@ MAX_PIXELS = 6e7
 
 @contextmanager
 def opened_picture(path: Path) -> Iterator[Image]:
-    """Yield a picture whose pixels are not read yet, and close it afterwards.
+    """Yield a picture of Pillow whose pixels are not read yet, and close it afterwards.
+
+    Args:
+        path: A file in the format BMP, GIF, JPEG, JPEG 2000, PNG, PPM, TIFF or WebP.
 
     Raises:
-        RefusedError: The head promises more pixels than the file can hold, or than fit into the
-            free memory.
-        OSError: The file cannot be opened, or its format is not among `FORMATS`.
+        RefusedError: The head promises more pixels than the file can hold (60 million where its
+            compression sets no limit), or than fit into the free memory.
+        OSError: The file cannot be opened, or has another format.
     """
+    # Other formats that Pillow knows may be programs, such as PostScript.
+    formats = ("BMP", "GIF", "JPEG", "JPEG2000", "PNG", "PPM", "TIFF", "WEBP")
     # memory of a pixel while it is read: Pillow's four bytes, a copy of them, and a float
     bytes_per_pixel = 16
 
     from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # the size is checked here
-    with Image.open(path, formats=FORMATS) as picture:
-        pixels, size = picture.width * picture.height, path.stat().st_size
+    # Pillow's own limit, 179 million pixels of any file, is too low for some good pictures and too
+    # high for small files; the size is checked here.
+    Image.MAX_IMAGE_PIXELS = None
+    with Image.open(path, formats=formats) as picture:
+        pixels = picture.width * picture.height
+        size = path.stat().st_size
         what = f"{picture.width} × {picture.height} pixels"
         coding = str(picture.format)
         if picture.format == "TIFF":

@@ -12,10 +12,11 @@ Progress = Callable[[float], None]
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Return a function that reports the progress of a part of a computation.
+    """Return a function that takes the completed fraction of a part, and reports that of the whole.
 
     Args:
-        progress: Function for the whole computation; None reports nothing.
+        progress: Function that takes the completed fraction of the whole computation, 0 to 1; with
+            None nothing is reported.
         first: Completed fraction of the whole at the beginning of the part.
         last: Completed fraction at its end.
     """
@@ -31,15 +32,15 @@ def nth_subprogress(progress: Progress | None, number: int, count: int) -> Progr
 
 @contextmanager
 def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Give a context a function to report the completed fraction with.
+    """Yield a function with which the block reports the completed fraction, 0 to 1.
 
-    Several computations in a row may each report from 0 on; a fraction below the largest one so far
-    is not passed on.
+    Several computations in a row may each report from 0 on; a fraction that is not above the
+    largest one so far is not passed on. A bar is removed when the block ends, also by an exception.
 
     Args:
-        progress: Function of the caller. None or True shows a bar on the terminal, or writes a line
-            every ten seconds if standard error is not a terminal. False reports nothing; then the
-            context has None in place of a function.
+        progress: Function of the caller that takes the completed fraction. None or True shows a bar
+            on the terminal, or writes a line every ten seconds if standard error is not a terminal.
+            False reports nothing; then None is yielded in place of a function.
     """
     if progress is False:
         yield None
@@ -55,7 +56,7 @@ def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | N
 
 
 def _rising(progress: Progress) -> Progress:
-    """Return a function that passes on the fractions that are larger than all before."""
+    """Return a function that passes a fraction on to `progress` if it is larger than all before."""
     largest = -1.0
 
     def report(fraction: float) -> None:
@@ -68,7 +69,14 @@ def _rising(progress: Progress) -> Progress:
 
 
 class _Display:
-    """A bar on a terminal, which `close` removes; elsewhere lines with the time that is left."""
+    """A bar on a terminal, which `close` removes; elsewhere lines with the time that is left.
+
+    Attributes:
+        is_terminal: Whether standard error is a terminal.
+        has_bar: Whether a bar stands there.
+        begun: Time at which this was made, in s of a clock that never goes back.
+        written: Time of the last display.
+    """
 
     def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
@@ -77,7 +85,16 @@ class _Display:
         self.written = self.begun
 
     def __call__(self, fraction: float) -> None:
-        """Show a completed fraction, if the last display was long enough ago."""
+        """Show a completed fraction on standard error, unless one was shown just before.
+
+        On a terminal (`is_terminal`) a bar is drawn over the last one, at most five times a second.
+        Elsewhere a line is written, at most every ten seconds, with an estimate of the time that is
+        left once a twentieth is done. Nothing is shown during the first second. The time of the
+        display is kept in `written`, and that there is a bar in `has_bar`.
+
+        Args:
+            fraction: Completed fraction, 0 to 1.
+        """
         pause = 10.0  # seconds between lines
         if self.is_terminal:
             pause = 0.2  # seconds between changes of a bar

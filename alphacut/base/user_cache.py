@@ -18,36 +18,44 @@ from alphacut.base.errors import FailedError
 from alphacut.base.kept_files import whole_file
 
 Arrays = Sequence[NDArray[np.generic]]
-UNUSED_DAYS = 14
-"""Days without use after which files of the cache are removed."""
 
 
 def user_folder(name: str) -> Path | None:
-    """Return a folder of this user's cache, which is made if need be.
+    """Return a folder of this user's cache, which is made if need be; None if there can be none.
 
-    None is returned if the folder cannot be written, and also if other users can write it: this
-    user would trust files that others made.
+    The cache is the folder in the environment variable ALPHACUT_CACHE, else "alphacut" in the one
+    in XDG_CACHE_HOME, else ~/.cache/alphacut. None is returned if the folder cannot be made, and
+    also if it belongs to another user or others can write it: this user would trust files that
+    others made.
 
     Args:
-        name: Name of the folder.
+        name: Name of the folder in the cache.
     """
     try:
         home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(os.environ.get("ALPHACUT_CACHE") or Path(home, "alphacut"), name)
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
-    except (OSError, RuntimeError):
+    except (OSError, RuntimeError):  # the latter where the user has no home
         return None
-    is_writable_by_others = bool(status.st_mode & 0o022)
+    is_writable_by_others = bool(status.st_mode & 0o022)  # by the group or by all
     if is_writable_by_others or status.st_uid != os.getuid():
         return None
     return folder
 
 
 def remove_unused(folder: Path) -> None:
-    """Remove files and folders in `folder` that were not used for `UNUSED_DAYS`."""
+    """Remove files and folders in `folder` that were not used for 14 days.
+
+    The time of the last use is that of the last change: who uses a file sets it.
+
+    Raises:
+        OSError: The folder cannot be read, or an old file cannot be removed, such as one that
+            another process has just removed.
+    """
+    unused_days = 14  # work on a case seldom rests longer, and what is missing is made again
     for path in folder.iterdir():
-        if path.stat().st_mtime >= time.time() - UNUSED_DAYS * 86400:
+        if path.stat().st_mtime >= time.time() - unused_days * 86400:
             continue
         if path.is_dir():
             shutil.rmtree(path)
@@ -56,14 +64,19 @@ def remove_unused(folder: Path) -> None:
 
 
 def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arrays:
-    """Return arrays from the cache, or make them and keep them there.
+    """Return arrays from the user's cache, or make them and keep them there.
 
-    A file that is damaged, or that was made from something else, is made anew.
+    A file that is damaged, or that was made from something else, is made anew. If the cache cannot
+    be read or written, the arrays are made, and no error is raised. Files in the folder that were
+    not used for two weeks are removed when one is added.
 
     Args:
         name: Name of the folder in the cache.
         content: All that the arrays depend on; a digest of it is the name of the file.
-        make: Makes the arrays.
+        make: Function that makes the arrays, of numbers; its exceptions are raised.
+
+    Returns:
+        The arrays in the order in which `make` returns them.
     """
     folder = user_folder(name)
     if folder is None:
@@ -78,7 +91,7 @@ def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arra
             os.utime(file)  # so that `remove_unused` keeps it
             return arrays
     new_arrays = make()
-    # on a full disk, or where the folder was cleared meanwhile, the arrays are not kept
+    # On a full disk, or where the folder was cleared meanwhile, the arrays are not kept.
     with suppress(OSError, FailedError):
         with whole_file(file) as partial:
             np.savez(partial, key, *new_arrays)
