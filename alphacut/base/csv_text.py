@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Sequence
+from itertools import chain
 
 
 def csv_cell(text: str) -> str:
@@ -37,5 +38,6 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerows([csv_cell(cell) for cell in row] for row in (head, *rows))
+    for row in chain([head], rows):
+        writer.writerow([csv_cell(cell) for cell in row])
     return stream.getvalue()

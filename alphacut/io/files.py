@@ -18,8 +18,6 @@ from pydantic_core import to_json
 from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.kept_files import is_special
 
-OPTIONS_OF_OUTPUT = ("out", "json", "export", "csv", "tables")
-"""Options of commands that name what is written."""
 INSIDE = "ALPHACUT_INSIDE"
 """Variable that ./enter sets."""
 Document = dict[str, Any]
@@ -28,6 +26,8 @@ Document = dict[str, Any]
 
 def rank() -> int:
     """Return this process's MPI rank as mpirun tells it, without starting MPI; else 0."""
+    # Open MPI, PMIx, MPICH and Intel MPI each set a variable of their own. To ask MPI itself would
+    # start it, which takes time and fails on some machines without a network.
     names = "OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID"
     return _first_variable(names, default=0)
 
@@ -48,12 +48,13 @@ def _first_variable(names: Iterable[str], *, default: int) -> int:
 
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
     """Return a document as JSON, ending in a line feed; numbers that are not finite become null."""
+    # Python's own `json` writes NaN, which no other program reads.
     content = to_json(document, indent=indent, inf_nan_mode="null", fallback=_plain)
     return content.decode() + "\n"
 
 
 def _plain(value: object) -> object:
-    """Return what stands in JSON for a value that `to_json` does not know."""
+    """Return what stands in JSON for a value that `to_json` does not know, such as an array."""
     if isinstance(value, Mapping):
         return dict(value)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
@@ -61,18 +62,22 @@ def _plain(value: object) -> object:
 
 @contextmanager
 def standard_output(*, alone: bool) -> Iterator[TextIO]:
-    """Yield the stream for answers: standard output of the first MPI rank, nothing of others.
+    """Yield the stream for answers: standard output of the first MPI rank, else the null device.
 
     Args:
-        alone: Whether all else that is printed, by C libraries too, goes to standard error.
+        alone: Whether the answer stands alone on standard output, such as a JSON document for
+            another program: then all else that is printed during the block, by C libraries too,
+            goes to standard error. On other ranks this holds in any case.
     """
     if not alone and rank() == 0:
         yield sys.stdout
         sys.stdout.flush()
         return
+    # C libraries write to the file descriptor 1, of which Python knows nothing. It is led to
+    # standard error, 2, and the answer goes to a copy of what it was before.
     sys.stdout.flush()
     original = os.dup(1)
-    os.dup2(2, 1)  # what C libraries print goes to standard error
+    os.dup2(2, 1)
     try:
         target = os.dup(original) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
         with redirect_stdout(sys.stderr), os.fdopen(target, "w", encoding="utf-8") as stream:
@@ -86,33 +91,41 @@ def say(message: str) -> None:
     """Print one line for people on standard error; only the first MPI rank does."""
     if rank() == 0:
         bar_end = "\r\x1b[K" if sys.stderr.isatty() else ""  # over a progress bar
-        with suppress(OSError):
+        with suppress(OSError):  # standard error may be a closed pipe; the computation goes on
             print(f"{bar_end}alphacut: {printable(message)}", file=sys.stderr, flush=True)
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuse options of a command that name files or folders where nothing can be written."""
+    """Raise RefusedError for an option that names a file or folder where nothing can be written.
+
+    Options of output are --out, --json, --export, --csv and --tables; "-" is standard output.
+    """
+    options_of_output = ("out", "json", "export", "csv", "tables")
+    # It is found here before a computation of hours, whose result could not be written.
     for action in parser._actions:
         value = getattr(options, action.dest, None)
-        if action.dest in OPTIONS_OF_OUTPUT and isinstance(value, str) and value != "-":
+        if action.dest in options_of_output and isinstance(value, str) and value != "-":
             folder = action.metavar == "FOLDER"
             require_writable(action.option_strings[-1], value, folder=folder)
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:
-    """Refuse the path of a file or folder where nothing can be written.
+    """Raise RefusedError for the path of a file or folder where nothing can be written.
+
+    A device or a pipe is allowed. Nothing remains written.
 
     Args:
         option: Option that gives the path, for the message.
-        value: The path.
-        folder: Whether it is of a folder, which need not be there.
+        value: The path. Neither it nor the folders that lead to it need exist.
+        folder: Whether it is the path of a folder, else of a file.
 
     Raises:
-        RefusedError: The path is empty, something of the other kind is there, or the nearest folder
-            that exists takes no files.
+        RefusedError: The path is empty, a folder stands where a file is meant or the reverse, or
+            the nearest folder that exists takes no files.
     """
     path = Path(value)
     is_free = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
+    # Rights alone do not tell: a disk may be full or read-only. So a file is made, which vanishes.
     existing = path if folder else path.parent
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -136,6 +149,7 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
 
 def nearest(name: str, names: Iterable[str]) -> str:
     """Return the known name that is most like `name`, whatever its capitals; empty if none is."""
+    # Keys of case files have underscores where options of commands have hyphens.
     by_small_letters = {option.lower(): option for option in names}
     small = name.lower().replace("-", "_")
     close = get_close_matches(small, by_small_letters, n=1, cutoff=0.6)
@@ -149,13 +163,21 @@ def suggestion(name: str, names: Iterable[str]) -> str:
 
 
 def missing(error: ImportError) -> str:
-    """Return the message about an import that failed, with the extra that brings the library."""
+    """Return the message about an import that failed: what is missing, and how to install it.
+
+    Libraries of the optional dependencies of this project, such as dolfinx, are installed by their
+    extra, as pip install '.[cell]'. Others are named alone.
+
+    Args:
+        error: The exception of the import; its name may be that of a module of the library.
+    """
     of_cell = "dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py"
     extras = {"skimage": "particles", **dict.fromkeys(of_cell, "cell")}
     library = (error.name or "").partition(".")[0]
     cure = f"install {library}"
     if library in extras:
         cure = f"pip install '.[{extras[library]}]'"
+    # ./enter, which sets this variable, brings an environment with all libraries.
     if not os.environ.get(INSIDE):
         cure += ", or run inside ./enter"
     return f"{error}; {cure}"

@@ -45,13 +45,19 @@ def own_version() -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions of alphacut, of Python and of the libraries that are installed."""
+    """Return the versions of alphacut, of Python and of the libraries that results depend on.
+
+    They are given by the names of the distributions, such as "fenics-dolfinx"; libraries that are
+    not installed are left out.
+    """
+    # A result is computed anew if one of these changes; others, as of figures, change no number.
     of_cell = "fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh"
     names = {"alphacut": own_version(), "python": platform.python_version()}
     for library in (*of_cell, "numpy", "scipy", "xarray"):
         if found := version_of(library):
             names[library] = found
-    if wheel := version_of("dolfinx-solver-real"):  # which holds both without their own metadata
+    # This distribution holds DOLFINx and petsc4py without their own metadata.
+    if wheel := version_of("dolfinx-solver-real"):
         import petsc4py
 
         names |= {"fenics-dolfinx": wheel, "petsc4py": petsc4py.__version__}
@@ -62,32 +68,53 @@ def versions() -> dict[str, str]:
 def source_digest(packages: tuple[str, ...]) -> str:
     """Return the SHA-256 of all Python files of some of this project's packages, in hexadecimal.
 
-    The packages that are linked into alphacut are no part of it.
+    It covers the files' names and contents. The result is kept for the process.
+
+    Args:
+        packages: Names of packages in their order, such as "fuzzy". "alphacut" is the thin layer
+            alone: stochastic, rve, fuzzy and frame, which are linked into it, are packages of
+            their own here. A name without a folder adds nothing.
     """
+    # Results must be computed anew when the code changes, also between two versions of it. All
+    # files count, since which function a result has met is not known.
     root = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
     for package in packages:
         folder = root if package == "alphacut" else (root / package).resolve()
         files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
         for name in sorted(files):
+            # In an installation the four packages are folders of alphacut and no links.
             if package != "alphacut" or name.partition("/")[0] not in NESTED:
                 digest.update(name.encode() + files[name].read_bytes())
     return digest.hexdigest()
 
 
 def fingerprint(inputs: object, packages: Sequence[str]) -> str:
-    """Return the digest of everything that a result depends on.
+    """Return the SHA-256, in hexadecimal, of everything that a result depends on.
+
+    Equal inputs have equal fingerprints in all processes. The versions of Python and the libraries
+    and the format of result files count always.
 
     Args:
-        inputs: Models, dataclasses, arrays, numbers and texts, or nestings of these.
-        packages: Packages of this project whose source counts; versions of libraries count always.
+        inputs: Pydantic models, dataclasses, arrays, numbers and texts, or lists, tuples and
+            dictionaries of these. Of a path only the file's name counts, and of a function its
+            full name.
+        packages: Packages of this project whose source counts, such as "fuzzy".
     """
+    # JSON with sorted keys is one text for equal inputs; pickles and hashes differ by process.
     content = [inputs, source_digest(tuple(packages)), versions(), FORMAT]
     return digest_of(json.dumps(content, sort_keys=True, default=_canonical).encode())
 
 
 def _canonical(value: object) -> object:
-    """Return what stands for an object in the text of a fingerprint, the same in all processes."""
+    """Return what stands for an object in the JSON text of a fingerprint.
+
+    It must be the same in all processes and different for objects that give different results. Of a
+    Pydantic model or a dataclass it is the name of the class and the fields by name; of an array
+    its shape, type and a digest of its bytes; of a function its full name; of a path the name of
+    the file, without the folder; of any other object its text. Fields are not converted here: the
+    caller, `json.dumps`, asks again for each.
+    """
     if isinstance(value, BaseModel):
         return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]
     if is_dataclass(value) and not isinstance(value, type):
@@ -100,7 +127,7 @@ def _canonical(value: object) -> object:
 
 
 def command_to_paste(*words: object) -> str:
-    """Return a command of this program with some words, as it is typed here."""
+    """Return a command of this program with some words, quoted for a shell, as it is typed here."""
     program = "./enter python -m alphacut" if os.environ.get(INSIDE) else "alphacut"
     return f"{program} {shlex.join(str(word) for word in words)}"
 
@@ -117,9 +144,12 @@ def command_line() -> str:
 def build_provenance(case_text: str, key: str) -> dict[str, object]:
     """Return the origin of a result, which its JSON file states.
 
+    It has the format of the file, the version of this program, the command line of this process,
+    the versions of libraries, the case and the fingerprint, all as numbers and texts by name.
+
     Args:
         case_text: Content of the case file.
-        key: Fingerprint of the result.
+        key: Fingerprint of the result: a digest of everything that it depends on.
     """
     return {
         "format_version": FORMAT,

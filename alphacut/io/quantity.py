@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
-from alphacut.base.errors import cure_of
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity_cures import CONFUSED_PREFIXES, FORM_CURES, NUMBER_CURES, unit_cure
+from alphacut.io.quantity_cures import confused_prefix, form_cure, number_cure, unit_cure
 
 if TYPE_CHECKING:
     import pint
@@ -34,16 +33,21 @@ class Dimension:
             whose import takes 0.35 s.
         usual: Smallest and largest magnitude, in the SI unit, that structures and their materials
             usually have. Other values are allowed, but suggest that a unit is wrong.
+        factors: Further units and their values in the SI unit, which Pint takes for something else.
     """
 
     name: str
     example: str
     powers: Mapping[str, int]
     usual: tuple[float, float] = (0.0, float("inf"))
+    factors: Mapping[str, Decimal] = field(default_factory=dict)
 
 
+GRAVITY = Decimal(str(STANDARD_GRAVITY))
 QUANTITIES = {
-    "": Dimension("number without a unit", "0.3", {}),
+    "": Dimension(
+        "number without a unit", "0.3", {}, factors={"": Decimal(1), "%": Decimal("0.01")}
+    ),
     "Pa": Dimension(
         "stress or modulus",
         "80 GPa",
@@ -60,7 +64,20 @@ QUANTITIES = {
     "kg": Dimension("mass", "20 t", {"kg": 0, "t": 3}, usual=(1e-3, 1e9)),
     "s": Dimension("time", "30 s", {"s": 0, "ms": -3}, usual=(1e-7, 1e5)),
     "m/s": Dimension("velocity", "-0.5 m/s", {"m/s": 0, "mm/s": -3}, usual=(1e-7, 1e3)),
-    "m/s^2": Dimension("acceleration", "9.81 m/s^2", {"m/s^2": 0}, usual=(1e-7, 1e4)),
+    "m/s^2": Dimension(
+        "acceleration",
+        "9.81 m/s^2",
+        {"m/s^2": 0},
+        usual=(1e-7, 1e4),
+        # For Pint g is a gram, and Gal a gallon.
+        factors={
+            "g": GRAVITY,
+            "mg": GRAVITY / 1000,
+            "%g": GRAVITY / 100,
+            "gal": Decimal("0.01"),
+            "Gal": Decimal("0.01"),
+        },
+    ),
     "N*s/m": Dimension(
         "damping coefficient", "50 N s/m", {"N s/m": 0, "kN s/m": 3}, usual=(1e-5, 1e12)
     ),
@@ -78,26 +95,11 @@ QUANTITIES = {
     "rad/s": Dimension("angular velocity", "0.1 rad/s", {"rad/s": 0}),
 }
 """Dimensions of quantities by their SI units."""
-GRAVITY = Decimal(str(STANDARD_GRAVITY))
-UNITS_HERE = {
-    "": {"": Decimal(1), "%": Decimal("0.01")},
-    "m/s^2": {
-        "g": GRAVITY,
-        "mg": GRAVITY / 1000,
-        "%g": GRAVITY / 100,
-        "gal": Decimal("0.01"),
-        "Gal": Decimal("0.01"),
-    },
-}
-"""Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
-REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
-"""Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds."""
 MIN_MAGNITUDE = 1e-36
 MAX_MAGNITUDE = 1e18
 """Magnitudes in SI beyond which a quantity other than 0 is a mistake."""
 NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
-"""Kinds of fuzzy numbers by the count of their values, less one."""
+"""A decimal number with an exponent or without; \\u2212 is the minus of typography."""
 
 
 @cache
@@ -112,21 +114,27 @@ def registry() -> pint.UnitRegistry:
 def factor(unit: str, si: str) -> Decimal:
     """Return the value of one `unit` in the SI unit `si`, such as 1000 for "kN" in "N".
 
+    The units in `QUANTITIES` are tried first, since they need no import; then Pint is asked.
+
+    Args:
+        unit: The unit as it was written, without blanks at its ends. Only a pure number may have
+            none, and the unit %.
+        si: SI unit of the dimension, a key of `QUANTITIES`, such as "N"; empty for a pure number.
+
     Raises:
-        ValueError: The unit is missing, unknown, easily confused with another one, or of another
-            dimension. The message tells which unit to write.
+        ValueError: The unit is missing, unknown, easily confused with another one (as mN with MN),
+            or of another dimension. The message tells which unit to write.
     """
-    common = UNITS_HERE.get(si, {})
-    if unit in common:
-        return common[unit]
     dimension = QUANTITIES[si]
+    if unit in dimension.factors:
+        return dimension.factors[unit]
     if unit in dimension.powers:
         return Decimal(10) ** dimension.powers[unit]
     if not unit:
         raise ValueError(f"the unit is missing, such as {dimension.example}")
     for word in re.findall(r"[A-Za-z]+", unit):
-        if word in CONFUSED_PREFIXES:
-            raise ValueError(f'the unit "{unit}" contains {word}: {CONFUSED_PREFIXES[word]}')
+        if meaning := confused_prefix(word):
+            raise ValueError(f'the unit "{unit}" contains {word}: {meaning}')
     try:
         return _factor_by_pint(unit, si)
     except Exception:  # Pint's parser raises whatever Python's parser raises
@@ -135,47 +143,71 @@ def factor(unit: str, si: str) -> Decimal:
 
 def _factor_by_pint(unit: str, si: str) -> Decimal:
     """Return the value of one unit in the SI unit `si` by Pint, or raise any exception."""
-    if not si or re.search(REFUSED, unit):
+    # Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds
+    refused = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
+    if not si or re.search(refused, unit):
         raise ValueError("Pint has another meaning of this unit")
+    # People write cm4 and m3; Pint's powers need ^.
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
     one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
     return Decimal(one_unit.to(_pint_target(one_unit, si)).magnitude)
 
 
 def _wrong_unit(unit: str, si: str) -> str:
-    """Return what is wrong with a unit that is none of the SI unit `si`, and what to write."""
+    """Return a clause that says what is wrong with a unit, and what to write in its place.
+
+    It says of which dimension the unit is, if it is a common unit of another one, and then the unit
+    that was probably meant, or the common units of the dimension.
+
+    Args:
+        unit: The unit as it was written, which is none of the dimension.
+        si: SI unit of the dimension, a key of `QUANTITIES`; empty for a pure number.
+    """
     dimension = QUANTITIES[si]
-
-    def fits(spelling: str) -> bool:
-        """Return whether this module or Pint knows a unit of the dimension by this spelling."""
-        if spelling in UNITS_HERE.get(si, {}) or spelling in dimension.powers:
-            return bool(spelling)
-        try:
-            return _factor_by_pint(spelling, si) > 0
-        except Exception:  # whatever Pint's parser raises
-            return False
-
-    what = f'the unit "{unit}" is {f"no unit of {dimension.name}" if si else "wrong"}'
+    what = f'the unit "{unit}" is wrong'
+    if si:
+        what = f'the unit "{unit}" is no unit of {dimension.name}'
     own = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
     if own:
         what = f'the unit "{unit}" is a unit of {own}, and no unit of {dimension.name}'
+    fits = partial(_is_unit_of, si=si)
     if cure := unit_cure(unit, si, fits=fits, known=dimension.powers):
         return f"{what}; {cure}"
-    units = ", ".join([*dimension.powers, *UNITS_HERE.get(si, {})]) or f"as in {dimension.example}"
     if not si:
         return f"{what}; write a number alone, or one with %"
+    units = ", ".join([*dimension.powers, *dimension.factors]) or f"as in {dimension.example}"
     return f"{what}; units are {units}"
+
+
+def _is_unit_of(spelling: str, si: str) -> bool:
+    """Return whether a unit of the dimension of the SI unit `si` is spelt so, here or by Pint.
+
+    An empty spelling is no unit, also of a pure number.
+    """
+    dimension = QUANTITIES[si]
+    if spelling in dimension.factors or spelling in dimension.powers:
+        return bool(spelling)
+    try:
+        return _factor_by_pint(spelling, si) > 0
+    except Exception:  # whatever Pint's parser raises
+        return False
 
 
 def _pint_target(one_unit: pint.Quantity, si: str) -> str:
     """Return the unit to which Pint must convert a unit so that the result is in the SI unit `si`.
 
-    Pint's radian is the number 1, so that it takes 1 rad/s for 1 Hz, and 1 Hz for 1 rad/s. A
-    frequency counts turns: where its unit contains an angle, it is converted to turns per second.
+    It is `si` but for frequencies. Pint's radian is the number 1, so that it takes 1 rad/s for
+    1 Hz, and 1 Hz for 1 rad/s. A frequency counts turns: where its unit contains an angle, as rad/s
+    and rpm, it is converted to turns per second.
+
+    Args:
+        one_unit: One of the unit that was written, as Pint has read it. Whether it is of the
+            dimension of `si` at all is only looked at for frequencies.
+        si: SI unit of the quantity.
 
     Raises:
-        ValueError: A frequency has another power of an angle or a unit of data, or an angular
-            velocity is in hertz.
+        ValueError: A frequency is neither 1/s nor an angle over time, or an angular velocity is in
+            hertz.
     """
     if si == "rad/s" and any("hertz" in name for name, _ in one_unit.unit_items()):
         raise ValueError("hertz count turns, not radians")
@@ -192,17 +224,27 @@ def _pint_target(one_unit: pint.Quantity, si: str) -> str:
 def _parse_decimal(text: str, si: str) -> Decimal:
     """Return the value of one number with its unit, such as "80 GPa", in the SI unit `si`.
 
+    It is exact but for units with irrational factors, such as degrees.
+
+    Args:
+        text: A decimal number and a unit; a pure number needs none. Blanks around them do not
+            matter, and the minus of typography is a minus.
+        si: SI unit of the quantity, a key of `QUANTITIES`; empty for a pure number.
+
     Raises:
-        ValueError: The text is no number with a unit of this dimension, or is out of range.
+        ValueError: The text is no number with a unit of this dimension, or its magnitude is far out
+            of range (beyond about 10^±100). The message says what to write.
     """
     text = text.strip()
     match = re.fullmatch(rf"({NUMBER})\s*(.*)", text)
-    cure = cure_of(text, NUMBER_CURES)
+    cure = number_cure(text)
+    # "1,5 GPa" begins with the number 1 and the unit ",5 GPa".
     if match is None or match[2].startswith((",", "_")):
         what = f'"{text}" does not begin with a number such as 1.5'
         raise ValueError(f"{what}; {cure}" if cure else what)
     digits = match[1]
     unit = match[2].strip()
+    # A unit that begins with another character is the rest of a number, as "x 10^3 N" of a power.
     if cure and re.match(r"[^A-Za-z°%‰µμ(/[]", unit):
         raise ValueError(f'"{text}" is no number with a unit; {cure}')
 
@@ -221,6 +263,7 @@ def _parse_decimal(text: str, si: str) -> Decimal:
 
 
 def _out_of_range() -> str:
+    """Return the message about a magnitude that no quantity has."""
     return f"magnitudes go from {MIN_MAGNITUDE:g} to {MAX_MAGNITUDE:g} in SI, or are 0"
 
 
@@ -228,11 +271,16 @@ def _parse_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
     """Return both ends of an interval such as "20 t ± 5 %" or "20 t ± 1 t" in the SI unit `si`.
 
     Args:
-        match: Groups of the midpoint, its unit, the half-width, and the unit of the half-width.
-        si: SI unit of the quantity.
+        match: Four groups: the midpoint, its unit, the half-width, and the unit of the half-width,
+            where % means a fraction of the midpoint. A unit may be empty.
+        si: SI unit of the quantity, empty for a pure number.
+
+    Returns:
+        Midpoint less half-width, and midpoint plus half-width; the first one is the larger if the
+        half-width is negative.
 
     Raises:
-        ValueError: A number or a unit is wrong.
+        ValueError: A number or a unit is wrong. The message says what to write.
     """
     midpoint_text, unit, width_text, width_unit = (group.strip() for group in match.groups())
     midpoint = _parse_decimal(f"{midpoint_text} {unit}", si)
@@ -248,8 +296,13 @@ def _parse_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
 def _parse_decimals(text: str, si: str) -> list[Decimal]:
     """Return the numbers of a list, both ends of a spread, or one number, in the SI unit `si`.
 
+    Args:
+        text: "[19, 20, 21] t" or "[19 t, 20 t]", whose numbers are returned in their order;
+            "20 t ± 5 %" or "20 t ± 1 t", with ± or +/-, whose ends are returned; or "20 t".
+        si: SI unit of the quantity, empty for a pure number.
+
     Raises:
-        ValueError: A number or a unit is wrong.
+        ValueError: A number or a unit is wrong or missing, also in an empty list.
     """
     if match := re.fullmatch(r"\[(.*)\]\s*(.*)", text, re.DOTALL):
         items, unit = match.groups()
@@ -263,15 +316,18 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
     """Return all numbers of a quantity in the SI unit `si`.
 
     Args:
-        value: Text with a unit, such as "[75, 80] GPa" or "20 t ± 5 %"; a bare number or a list
-            of numbers where no unit is needed.
-        si: SI unit of the quantity, a key of `QUANTITIES`.
+        value: Text with a unit, such as "80 GPa", "[75, 80] GPa" or "20 t ± 5 %"; a bare number or
+            a list of numbers where no unit is needed; a list of texts with units. Truth values are
+            no numbers.
+        si: SI unit of the quantity, a key of `QUANTITIES`, such as "Pa"; empty for a pure number.
 
     Returns:
-        One number, the numbers of a list in their order, or both ends of a spread.
+        One number, the numbers of a list in their order, or the lower and the upper end of a
+        spread. Two texts of one value in different units give the same float.
 
     Raises:
-        ValueError: It is no quantity, its unit is wrong, or it is too large or small.
+        ValueError: It is no quantity, its unit is wrong, its text has more than 1000 letters, or a
+            magnitude other than 0 is outside 1e-36 … 1e18. The message says what to write.
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float | list):
         raise ValueError("this is no quantity")
@@ -283,9 +339,11 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
     try:
         values = _parse_decimals(text, si)
     except ValueError as error:
-        if cure := cure_of(text, FORM_CURES):
+        # What is said of a single number or unit helps little if the form is wrong.
+        if cure := form_cure(text):
             raise ValueError(f'"{text}" is no quantity as it stands; {cure}') from None
         raise error from None
+    # Only now the decimals are rounded, once each.
     floats = tuple(float(x) for x in values)
     if any(x != 0 and not MIN_MAGNITUDE <= abs(x) <= MAX_MAGNITUDE for x in floats):
         raise ValueError(_out_of_range())
@@ -295,8 +353,14 @@ def parse_numbers(value: object, si: str) -> tuple[float, ...]:
 def parse_number(value: object, si: str) -> float:
     """Return a single crisp quantity in the SI unit `si`.
 
+    Args:
+        value: Text with a unit, such as "80 GPa"; a bare number where no unit is needed; or a list
+            of one of these.
+        si: SI unit of the quantity, a key of `QUANTITIES`, such as "Pa"; empty for a pure number.
+
     Raises:
-        ValueError: As for `parse_numbers`, or there are several values.
+        ValueError: It is no quantity or several values, its unit is wrong, or a magnitude other
+            than 0 is outside 1e-36 … 1e18. The message says what to write.
     """
     values = parse_numbers(value, si)
     if len(values) != 1:
@@ -307,17 +371,29 @@ def parse_number(value: object, si: str) -> float:
 def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     """Return a quantity in the SI unit `si` as a fuzzy number, whose kind the count of values says.
 
+    One value is crisp, two are an interval, three a triangular number (lower end, value of
+    membership 1, upper end), four a trapezoidal one. A spread such as "20 t ± 5 %" is an interval.
+
+    Args:
+        value: Text with a unit, such as "[75, 80, 85] GPa"; a bare number or a list of numbers
+            where no unit is needed; a list of texts with units.
+        si: SI unit of the quantity, a key of `QUANTITIES`, such as "Pa"; empty for a pure number.
+
     Raises:
-        ValueError: As for `parse_numbers`; there are more than four values, or they do not rise.
+        ValueError: It is no quantity, its unit is wrong, a magnitude other than 0 is outside
+            1e-36 … 1e18, there are more than four values or they fall, or `value` is a list of one
+            text. The message says what to write.
     """
     values = parse_numbers(value, si)
     if isinstance(value, list) and len(value) == 1 and isinstance(value[0], str):
         raise ValueError("a list of one text, as if of a matrix; without brackets it is a value")
-    if len(values) > len(SHAPES):
+    # Numbers of one to four values, in this order
+    kinds: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
+    if len(values) > len(kinds):
         raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
     if list(values) != sorted(values):
         raise ValueError("values must rise: write the smallest first and the largest last")
-    return SHAPES[len(values) - 1](*values)
+    return kinds[len(values) - 1](*values)
 
 
 def parse_fuzzy_in_any_unit(
@@ -326,11 +402,17 @@ def parse_fuzzy_in_any_unit(
     """Return a quantity that may be of several dimensions, and the SI unit of its dimension.
 
     Args:
-        value: As for `parse_numbers`.
+        value: Text with a unit, such as "80 GPa" or "[1, 2] kN/m"; a bare number or a list of
+            numbers, which is a pure number; a list of texts with units.
         units: SI units of the dimensions, keys of `QUANTITIES`; the first that fits is taken.
 
+    Returns:
+        The fuzzy number (crisp, interval, triangular or trapezoidal by the count of its values) in
+        the SI unit, and this unit.
+
     Raises:
-        ValueError: It is a quantity of none of the dimensions.
+        ValueError: It is a quantity of none of the dimensions. The message is the one that helps
+            most: that of a wrong number, or what was probably meant, or some examples.
     """
     reasons = []
     for si in units:
@@ -341,6 +423,8 @@ def parse_fuzzy_in_any_unit(
     # Each dimension gave a reason. They are the same if the number is wrong, else the unit is.
     if len(set(reasons)) == 1:
         raise ValueError(reasons[0])
+    # Of the reasons that differ, one that names what was probably meant helps most. That of a pure
+    # number says nothing about units.
     for si, reason in zip(units, reasons, strict=True):
         if si and re.search("did you mean|; write", reason):
             raise ValueError(reason)

@@ -5,92 +5,79 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
+from functools import cache
 
 from alphacut.base.errors import cure_of
 
-NUMBER_CURES = {
-    r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
-    r"^[-+\d.]+\s*,\s+[-+\d.]": "several values of one quantity stand in brackets, as"
-    " [19, 20, 21] t; those of several floors or storeys are texts of their own",
-    r"\d,\d": "write a decimal point, as 1.5; several values stand in brackets, as [1, 2]",
-    r"^[-+]?[\d.]*\s*[x×*·⋅]?\s*10\s*(?:\^|\*\*|[⁻⁰-⁹])": "write a power of ten as 3e6",
-    r"^\d+:\d": "write a time in one unit, as 90 s",
-    r"^\d+\s*/\s*\d": "write a fraction as a decimal number",
-    r"\d\s*\D{0,9}\+\s*/?\s*[-−]|(?i:plus)": 'write a spread as "5 m ± 1 m" or "5 m ± 10 %"',
-    r"^\[[^\]]*[;\s][^,\]]*\]|^\(": 'write several values as "[5, 6] m", with commas',
-    r"^\[[^\]]*$": "close the bracket",
-    r"\d\s*(?:[-–—;…]|\.\.+|to|bis)\s*\d": 'write a range as "[5, 6] m"',
-    r"^[<>≤≥~≈]|(?i:^(?:about|ca|max|min))": 'write a value, or a range as "[5, 6] m"',
-    r"(?i:^[-+]?(?:nan|inf))": "write a finite number",
-    r"^[A-Za-z%]+\s*[-+.\d]": "write the number first, as 80 GPa",
-    r"^0[xX]": "write a decimal number",
-}
-"""Cure by a pattern in the text of a quantity; the first that fits holds."""
-FORM_CURES = {
-    r"^\[[^\]]*(?:±|\+/-)": 'write a spread without brackets, as "5 m ± 1 m" or "5 m ± 10 %"',
-    r"^\[[-+\d.eE,\s]*[A-Za-zµμ°%][^,\]]*\]$": 'write the unit behind the bracket, as "[5, 6] m"',
-    r"^[-+\d.eE]+\s*(?:±|\+/-)": 'write the unit behind the first number, as "5 m ± 10 %"',
-    r"(?:±|\+/-)\s*[\d.]+$": 'write a spread with % or a unit, as "5 m ± 10 %" or "5 m ± 1 m"',
-}
-"""Cure by a pattern in the text of several values or a spread whose units stand elsewhere."""
-UNIT_CURES = {
-    r"(?i)^(?:(?:us |short |long |metric )?tons?|to)$": "write t (1000 kg), short_ton or long_ton",
-    r"(?i)^(?:per ?cent|pct\.?|perc\.?|prozent)$": "write %",
-    r"(?i)^(?:‰|per ?mille)$": "write 0.1 % in place of 1 ‰",
-    r"^[\"”″]$": "write in for inches",
-    r"^['’′]$": "write ft for feet",
-}
-"""Cure by a pattern in a unit that is not understood."""
-CONFUSED_PREFIXES = {
-    "mN": "a millinewton; did you mean MN? else write newtons, as 0.09 N",
-    "mPa": "a millipascal; did you mean MPa? else write pascals, as 0.3 Pa",
-    "mJ": "a millijoule; did you mean MJ? else write joules, as 0.02 J",
-    "Mm": "a million metres; did you mean mm? else write km",
-    "Ms": "a million seconds; did you mean ms? else write seconds",
-    "mt": "a thousandth of a tonne; did you mean t? else write kg",
-    "Grad": "a thousand million radians; did you mean deg?",
-    "kt": "a knot or a kilotonne; did you mean t? else write kg, as 1e6 kg",
-    "mHz": "a thousandth of a hertz; did you mean Hz? else write Hz, as 0.05 Hz",
-    "Mt": "a million tonnes; did you mean t? else write kg, as 1e9 kg",
-}
-"""Units that are right by their letters, but almost always a slip of m (milli) and M (mega)."""
-SYMBOLS = (
-    *("Pa", "kPa", "MPa", "GPa", "N", "kN", "MN", "GN", "m", "mm", "cm", "km", "s", "ms", "min"),
-    *("h", "kg", "t", "Hz", "kHz", "g", "gal", "rad", "deg", "rpm", "ft", "in", "lb", "lbf", "kip"),
-    *("ksi", "psi", "J", "kJ", "MJ", "W", "kgf", "turn"),
-)
-"""Common units as Pint spells them."""
-SPELLINGS = {
-    "cps": "Hz",
-    "msec": "ms",
-    "gr": "g",
-    "knm": "kN m",
-    "kns": "kN s",
-    "mnm": "MN m",
-    "mns": "MN s",
-    "nm": "N m",
-    "ns": "N s",
-    "nms": "N m s",
-    "rev": "turn",
-    "u": "turn",
-    "psf": "lbf/ft^2",
-    "pcf": "lbf/ft^3",
-    "kgs": "kg",
-    "lbs": "lb",
-    "mn": "MN",
-    "mpa": "MPa",
-    "kg": "kg",
-}
-"""Spelling of units by their small letters, where the letters of `SYMBOLS` do not give it."""
-PREFIX_NAMES = {
-    "": "", "nano": "n", "micro": "µ", "milli": "m", "centi": "c", "kilo": "k", "mega": "M",
-    "giga": "G",
-}  # fmt: skip
-UNIT_NAMES = {
-    "metre": "m", "meter": "m", "newton": "N", "pascal": "Pa", "gram": "g", "gramme": "g",
-    "second": "s", "sec": "s", "sek": "s", "hertz": "Hz", "joule": "J", "tonne": "t",
-    "radian": "rad", "degree": "deg", "minute": "min", "hour": "h",
-}  # fmt: skip
+
+def number_cure(text: str) -> str:
+    """Return what to write in place of a number, such as "1,5 GPa", by its pattern; empty if none.
+
+    Whether the text is understood is not looked at: the caller shows the cure only if it is not.
+    """
+    # The first pattern that is found holds: thousands come before the decimal comma, of which
+    # "25,000" would be one, and the comma between values before the comma in a number.
+    cures = {
+        r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
+        r"^[-+\d.]+\s*,\s+[-+\d.]": (
+            "several values of one quantity stand in brackets, as [19, 20, 21] t; those of several"
+            " floors or storeys are texts of their own"
+        ),
+        r"\d,\d": "write a decimal point, as 1.5; several values stand in brackets, as [1, 2]",
+        r"^[-+]?[\d.]*\s*[x×*·⋅]?\s*10\s*(?:\^|\*\*|[⁻⁰-⁹])": "write a power of ten as 3e6",
+        r"^\d+:\d": "write a time in one unit, as 90 s",
+        r"^\d+\s*/\s*\d": "write a fraction as a decimal number",
+        r"\d\s*\D{0,9}\+\s*/?\s*[-−]|(?i:plus)": 'write a spread as "5 m ± 1 m" or "5 m ± 10 %"',
+        r"^\[[^\]]*[;\s][^,\]]*\]|^\(": 'write several values as "[5, 6] m", with commas',
+        r"^\[[^\]]*$": "close the bracket",
+        r"\d\s*(?:[-–—;…]|\.\.+|to|bis)\s*\d": 'write a range as "[5, 6] m"',
+        r"^[<>≤≥~≈]|(?i:^(?:about|ca|max|min))": 'write a value, or a range as "[5, 6] m"',
+        r"(?i:^[-+]?(?:nan|inf))": "write a finite number",
+        r"^[A-Za-z%]+\s*[-+.\d]": "write the number first, as 80 GPa",
+        r"^0[xX]": "write a decimal number",
+    }
+    return cure_of(text, cures)
+
+
+def form_cure(text: str) -> str:
+    """Return what to write in place of several values or a spread whose units stand elsewhere.
+
+    It is found by the pattern of the whole text, such as "[5, 6 m]" or "5 ± 10 %", and empty if
+    there is none. "[5 m, 6 m]" is right and has none.
+    """
+    cures = {
+        r"^\[[^\]]*(?:±|\+/-)": 'write a spread without brackets, as "5 m ± 1 m" or "5 m ± 10 %"',
+        r"^\[[-+\d.eE,\s]*[A-Za-zµμ°%][^,\]]*\]$": (
+            'write the unit behind the bracket, as "[5, 6] m"'
+        ),
+        r"^[-+\d.eE]+\s*(?:±|\+/-)": 'write the unit behind the first number, as "5 m ± 10 %"',
+        r"(?:±|\+/-)\s*[\d.]+$": 'write a spread with % or a unit, as "5 m ± 10 %" or "5 m ± 1 m"',
+    }
+    return cure_of(text, cures)
+
+
+def confused_prefix(word: str) -> str:
+    """Return what a unit means, and what was probably meant; empty if it is not easily confused.
+
+    The units here are right by their letters, but almost always a slip of m (milli) and M (mega):
+    a factor of 10⁹ in a structure that is otherwise plausible.
+
+    Args:
+        word: One word of a unit, such as "mN" of "mN/m".
+    """
+    meanings = {
+        "mN": "a millinewton; did you mean MN? else write newtons, as 0.09 N",
+        "mPa": "a millipascal; did you mean MPa? else write pascals, as 0.3 Pa",
+        "mJ": "a millijoule; did you mean MJ? else write joules, as 0.02 J",
+        "Mm": "a million metres; did you mean mm? else write km",
+        "Ms": "a million seconds; did you mean ms? else write seconds",
+        "mt": "a thousandth of a tonne; did you mean t? else write kg",
+        "Grad": "a thousand million radians; did you mean deg?",
+        "kt": "a knot or a kilotonne; did you mean t? else write kg, as 1e6 kg",
+        "mHz": "a thousandth of a hertz; did you mean Hz? else write Hz, as 0.05 Hz",
+        "Mt": "a million tonnes; did you mean t? else write kg, as 1e9 kg",
+    }
+    return meanings.get(word, "")
 
 
 def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
@@ -102,8 +89,19 @@ def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterabl
         fits: Function that tells whether a spelling is a unit of the dimension.
         known: Common units of the dimension.
     """
-    if cure := cure_of(unit.strip(), UNIT_CURES):
+    cures = {
+        r"(?i)^(?:(?:us |short |long |metric )?tons?|to)$": (
+            "write t (1000 kg), short_ton or long_ton"
+        ),
+        r"(?i)^(?:per ?cent|pct\.?|perc\.?|prozent)$": "write %",
+        r"(?i)^(?:‰|per ?mille)$": "write 0.1 % in place of 1 ‰",
+        r"^[\"”″]$": "write in for inches",
+        r"^['’′]$": "write ft for feet",
+    }
+    if cure := cure_of(unit.strip(), cures):
         return cure
+    # A spelling is offered only where it fits the dimension: "KN" is kN for a force, and no hint
+    # for a length.
     for spelling in _spellings(unit):
         if spelling != unit and fits(spelling):
             return f"did you mean {spelling}?"
@@ -118,7 +116,9 @@ def _spellings(unit: str) -> Iterator[str]:
     """Yield other spellings of a unit, the most likely one first.
 
     They are the unit without brackets; with the usual symbol in place of each word, whatever its
-    capitals; with blanks between the symbols; with forces in place of masses; and without powers.
+    capitals, as "kN/m" of "KN/M"; with blanks between the symbols, as "kN m" of "kN-m"; as one
+    word, as "kN" of "kilo newtons"; with forces in place of masses, as "kgf" of "kg"; and without
+    powers. A spelling may be the unit itself, no unit at all, or come twice.
     """
     bare = re.sub(r"[\[\](){}]", "", unit).strip(" .")
     yield bare
@@ -126,20 +126,69 @@ def _spellings(unit: str) -> Iterator[str]:
     yield with_symbols
     yield re.sub(r"(?<=[A-Za-z])\s*[-.·]\s*(?=[A-Za-z])", " ", with_symbols)
     yield _usual_symbol(bare.replace(" ", ""))
+    # Old tables state forces and stresses in kg and kg/cm².
     yield re.sub(r"\b(kg|lb)\b", r"\1f", with_symbols)
     yield re.sub(r"(?<=[A-Za-z])(?:\^|\*\*)?[23²³]", "", with_symbols)
 
 
 def _usual_symbol(word: str) -> str:
-    """Return the symbol of a unit by its name or its letters, as kN of "KN" or "kilonewtons"."""
+    """Return the symbol of a unit by its name or its letters, as kN of "KN" or "kilonewtons".
+
+    Capitals do not matter, a plural s is dropped, and a name may have a slip, as "newtno". A word
+    that is like no unit is returned as it is.
+    """
     small = word.lower()
-    symbols = {symbol.lower(): symbol for symbol in SYMBOLS} | SPELLINGS
-    for prefix, prefix_symbol in PREFIX_NAMES.items():
-        for name, symbol in UNIT_NAMES.items():
-            symbols[prefix + name] = prefix_symbol + symbol
+    symbols = _symbols_by_letters()
     singular = small if small in symbols else small.removesuffix("s")
     if singular in symbols:
         return symbols[singular]
     close = get_close_matches(small, symbols, n=1, cutoff=0.75)
+    # Two letters, or words with another first letter, are alike by chance.
     is_close = len(small) > 2 and bool(close) and close[0][0] == small[0]
     return symbols[close[0]] if is_close else word
+
+
+@cache
+def _symbols_by_letters() -> dict[str, str]:
+    """Return the usual symbol of units by their names and spellings in small letters."""
+    # The symbols as Pint spells them
+    usual = (
+        "Pa kPa MPa GPa N kN MN GN m mm cm km s ms min h kg t Hz kHz g gal rad deg rpm ft in lb lbf"
+        " kip ksi psi J kJ MJ W kgf turn"
+    )
+    symbols = {symbol.lower(): symbol for symbol in usual.split()}
+    # Other letters than those of the symbols: products, abbreviations, units of other countries.
+    symbols |= {
+        "cps": "Hz",
+        "msec": "ms",
+        "gr": "g",
+        "knm": "kN m",
+        "kns": "kN s",
+        "mnm": "MN m",
+        "mns": "MN s",
+        "nm": "N m",
+        "ns": "N s",
+        "nms": "N m s",
+        "rev": "turn",
+        "u": "turn",
+        "psf": "lbf/ft^2",
+        "pcf": "lbf/ft^3",
+        "kgs": "kg",
+        "lbs": "lb",
+        "mn": "MN",
+        "mpa": "MPa",
+        "kg": "kg",
+    }
+    prefixes = {
+        "": "", "nano": "n", "micro": "µ", "milli": "m", "centi": "c", "kilo": "k", "mega": "M",
+        "giga": "G",
+    }  # fmt: skip
+    names = {
+        "metre": "m", "meter": "m", "newton": "N", "pascal": "Pa", "gram": "g", "gramme": "g",
+        "second": "s", "sec": "s", "sek": "s", "hertz": "Hz", "joule": "J", "tonne": "t",
+        "radian": "rad", "degree": "deg", "minute": "min", "hour": "h",
+    }  # fmt: skip
+    for prefix, prefix_symbol in prefixes.items():
+        for name, symbol in names.items():
+            symbols[prefix + name] = prefix_symbol + symbol
+    return symbols

@@ -33,10 +33,14 @@ RUN_AGAIN = f"make it anew by {command_to_paste('run', 'CASE.toml')}"
 
 
 def plain_name(name: str) -> str:
-    """Return the name of a file in a folder of results or its folder of figures.
+    """Return a name if it is that of a file in a folder of results, or in its folder of figures.
+
+    It has letters, digits and ".", "_", "+" and "-", such as "envelope.nc" or "figures/peaks.svg",
+    up to 101 of them after "figures/", begins with no dot there and has no ".." inside. So no name
+    in a list that was tampered with leads out of the folder.
 
     Raises:
-        ValueError: The name leads elsewhere.
+        ValueError: The name is another one, such as "../a", "/a" or "a/b".
     """
     if re.fullmatch(r"(figures/)?(?!.*\.\.)[\w+-][\w.+-]{0,100}", name) is None:
         raise ValueError("no plain name")
@@ -76,7 +80,17 @@ class ResultsFolder:
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Return the folder with what manifest.json lists, nothing if it is missing or damaged.
+        """Return a folder of results with its list of files, which is read from manifest.json.
+
+        Without the list, or without the folder, nothing is listed. If the list is no JSON object of
+        the right form, or its checksum is wrong, nothing is listed either and `is_damaged` is set.
+
+        Args:
+            path: The folder.
+
+        Returns:
+            The folder, whose `files` have, by name, the SHA-256 of the content of a file and the
+            digest of what it was made from.
 
         Raises:
             RefusedError: The list is of another format or program, or is no regular file.
@@ -88,10 +102,13 @@ class ResultsFolder:
             document = json.loads(read_regular(file))
         except OSError as error:
             raise RefusedError(str(file), str(error), "a regular file of this program") from None
+        # Python's parser raises a RecursionError for thousands of nested brackets.
         except (ValueError, RecursionError):
             document = None
         if not isinstance(document, dict):
             return cls(path, is_damaged=True)
+        # The format is looked at before the form, so that results of another version of this
+        # program are not taken for damaged ones, which a run may replace.
         version = document.get("format_version")
         value = f"of format {version}"
         allowed = f"files of format {FORMAT}"
@@ -107,7 +124,10 @@ class ResultsFolder:
         return cls(path, {name: Listed(*pair) for name, pair in pairs.items()})
 
     def require_own_files(self, option: str) -> None:
-        """Refuse a folder of other files, in which no run has written its list.
+        """Raise RefusedError for a folder of other files, in which no run has written its list.
+
+        A folder is this program's if it has the list manifest.json, damaged or not; an empty one,
+        a missing one, and one with hidden files alone are allowed, too.
 
         Args:
             option: Option that names the folder, for the message.
@@ -122,11 +142,20 @@ class ResultsFolder:
         return tuple(name for name, entry in self.files.items() if entry.source == source)
 
     def content(self, name: str) -> bytes:
-        """Return the content of a listed file.
+        """Return the content of a listed file, which is compared with its digest in the list.
+
+        The list has no digest of a store of samples, which changes; its content is returned as it
+        is.
+
+        Args:
+            name: Name of the file in this folder, such as "envelope.nc" or "figures/peaks.svg".
 
         Raises:
-            RefusedError: The file is not listed, missing, changed or a link.
+            RefusedError: The file is not listed, missing, changed, or a link, a device or a pipe;
+                or a folder that leads to it is a link.
         """
+        # The whole file is read before it is compared, so that what was compared is what is used:
+        # a library that opened it by its name might read something else.
         what = f"without {name} in its manifest"
         require(name in self.files, str(self.path), what, COMPLETE, RUN_AGAIN)
         file = self.path / name
@@ -142,7 +171,15 @@ class ResultsFolder:
         return content
 
     def dataset(self, name: str) -> xarray.Dataset:
-        """Return the dataset in a listed NetCDF file; raises RefusedError as `content` does."""
+        """Return the dataset in a listed NetCDF file, whose values are all in memory.
+
+        Args:
+            name: Name of the file in this folder, such as "envelope.nc".
+
+        Raises:
+            RefusedError: The file is not listed, missing, changed or a link.
+            OSError: The file, which is as a run has written it, is no NetCDF file.
+        """
         import netCDF4
         import xarray
 
@@ -151,12 +188,18 @@ class ResultsFolder:
         return xarray.load_dataset(backends.NetCDF4DataStore(file))
 
     def require_free(self, name: str) -> None:
-        """Refuse a name that an unlisted file, a pipe or a folder has, so that none is lost.
+        """Raise RefusedError if a new file of a name would replace what this program has not made.
 
-        A link with a listed name is free: the file will replace it, not its target.
+        A name is free if nothing has it, or a regular file or a link that is listed; of a link the
+        file will replace the link, not its target. If the list is damaged (`is_damaged`), any
+        regular file or link may be replaced.
+
+        Args:
+            name: Name of the file in this folder, such as "figures/peaks.svg".
 
         Raises:
-            RefusedError: Something else has the name, or a folder that leads to it is a link.
+            RefusedError: A file that is not listed, a folder, a pipe or a device has the name, or a
+                folder that leads to it is a link or no folder.
         """
         file = self.path / name
         allowed = "a place for a file of this run"
@@ -174,16 +217,20 @@ class ResultsFolder:
         require(is_free, str(file), kind, allowed, cure=cure)
 
     def put_files(self, source: str, folder: Path, before: str = "") -> None:
-        """Copy all files below a folder here, and list them.
+        """Copy all files below another folder to this one, and list them.
 
         Args:
-            source: Digest of what they were made from.
-            folder: The folder.
-            before: Digest of what an earlier result was made from, whose other files are removed;
-                empty for none.
+            source: Digest of what they were made from, which the list states.
+            folder: The folder that is copied, with its folders below.
+            before: Digest of what an earlier result was made from. Files of that result leave the
+                list, and those that are not replaced here are removed, unless their content has
+                changed since. Empty for none.
 
         Raises:
-            RefusedError: Something else is in the place of a file.
+            RefusedError: What this program has not made is in the place of a file; then nothing is
+                changed.
+            FailedError: The disk is full.
+            OSError: A file cannot be read or written.
         """
         paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
         contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
@@ -193,22 +240,28 @@ class ResultsFolder:
             self._remove(name, made_before[name].digest)
 
     def put_text(self, name: str, text: str) -> None:
-        """Write a text of the run itself, such as summary.json, and list it."""
+        """Write a text of the run itself, such as summary.json, and list it; errors as `_write`."""
         self._write("", {name: text.encode()})
 
     def _write(
         self, source: str, contents: Mapping[str, bytes], forget: Iterable[str] = ()
     ) -> None:
-        """List files in place of others, and then write them.
+        """List files in place of others in manifest.json, and then write them.
 
         Args:
-            source: Digest of what they were made from.
-            contents: Their contents by name.
-            forget: Names that leave the list.
+            source: Digest of what the files were made from; empty for a text of the run itself.
+            contents: Content of each file by its name in this folder.
+            forget: Names of listed files that leave the list; the files stay.
 
         Raises:
-            RefusedError: Something else is in the place of a file.
+            RefusedError: What this program has not made is in the place of a file; then nothing is
+                changed.
+            FailedError: The disk is full.
+            OSError: A file cannot be written.
         """
+        # The list comes first. A run that is killed in between leaves listed files that are missing
+        # or do not match, which are made anew. In the other order it would leave files that no list
+        # names, which no later run may replace.
         for name in contents:
             self.require_free(name)
         for name in forget:
@@ -219,7 +272,17 @@ class ResultsFolder:
                 partial.write_bytes(content)
 
     def add_to_list(self, files: Mapping[str, Listed]) -> None:
-        """Add files to the list, and write it with a checksum of its own."""
+        """Add files to `self.files`, and write the whole list to manifest.json.
+
+        The list has the format of the folder and a checksum of its own. The files need not exist.
+
+        Args:
+            files: Digest of the content, and digest of the origin, of each file by its name.
+
+        Raises:
+            FailedError: The disk is full.
+            OSError: The list cannot be written.
+        """
         self.files |= files
         document = {
             "format_version": FORMAT,
@@ -232,6 +295,7 @@ class ResultsFolder:
 
     def clear(self) -> None:
         """Remove every listed file, and empty the list; links are removed, not followed."""
+        # A file of a listed name belongs to this program, whatever its content is by now.
         for name in self.files:
             self._remove(name)
         self.files = {}
@@ -239,9 +303,13 @@ class ResultsFolder:
         self.add_to_list({})
 
     def _remove(self, name: str, digest: str = "") -> None:
-        """Remove a link, or a regular file with this digest, or with any if it is empty.
+        """Remove a file of this folder if it is what it is taken for; otherwise it stays.
 
-        Everything else stays.
+        No error is raised if there is nothing, or it cannot be removed.
+
+        Args:
+            name: Name of the file in this folder. A link is removed itself, not its target.
+            digest: SHA-256 that the content of a regular file must have; empty for any content.
         """
         file = self.path / name
         try:
@@ -252,7 +320,10 @@ class ResultsFolder:
             return
 
     def _require_real_parents(self, name: str) -> None:
-        """Require that the folders between this one and a file are real ones.
+        """Raise an error unless the folders between this one and a file are real ones, no links.
+
+        Otherwise a file would be read or written outside this folder. Of "figures/peaks.svg" it is
+        the folder "figures"; a name without a folder passes.
 
         Raises:
             NotADirectoryError: One is a link or no folder.

@@ -32,10 +32,14 @@ T = TypeVar("T")
 
 
 def to_document(value: object) -> Any:
-    """Return a result as a JSON document.
+    """Return a result as a JSON document, of dictionaries, lists, numbers, texts and None.
+
+    Dataclasses and named tuples become dictionaries of their fields, enumerations their values,
+    arrays and tuples lists, and keys of mappings texts. Numbers that are not finite stay, and the
+    caller decides how they are written. What is none of these is returned as it is.
 
     Args:
-        value: A dataclass, named tuple, mapping, sequence, array, enumeration, number, text or
+        value: A dataclass, named tuple, mapping, list, tuple, array, enumeration, number, text or
             None, or any nesting of these.
     """
     if isinstance(value, Enum):
@@ -45,7 +49,7 @@ def to_document(value: object) -> Any:
     if is_dataclass(value):
         return {x.name: to_document(getattr(value, x.name)) for x in fields(value)}
     if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        value = value._asdict()
+        value = value._asdict()  # before tuples without names below
     if isinstance(value, Mapping):
         return {str(key): to_document(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -54,28 +58,45 @@ def to_document(value: object) -> Any:
 
 
 def from_document(kind: type[T], document: object, path: str = "") -> T:
-    """Return the result of a kind that a JSON document holds.
+    """Return the result of a kind that a JSON document holds, as `to_document` has written it.
 
     Args:
-        kind: The type that `to_document` was given. Metadata of `Annotated` are functions that
-            check a value, and raise ValueError.
-        document: What `json` has read.
+        kind: The type of the result: a dataclass, typed dict, named tuple, enumeration, float, int,
+            bool, str, None, Any or object; a list, tuple, mapping, union, Literal or array of
+            these with their arguments. Metadata of `Annotated` are functions that check the value,
+            and raise ValueError.
+        document: What `json` has read. Where a float is expected, null is NaN.
         path: Keys that lead to the document, for messages; empty for a whole one.
 
     Raises:
         ValueError: The document holds no such result. The message begins with the path of what is
-            missing, unknown or of another type.
+            missing, unknown or of another type, as "peaks.0.value".
     """
     return cast("T", _read(kind, document, path))
 
 
 def _read(kind: Any, document: Any, path: str) -> Any:
-    """Return the value of a kind that a document holds; arguments and errors of `from_document`."""
+    """Return the value of a kind that a JSON document holds.
+
+    Args:
+        kind: A dataclass, typed dict, named tuple, enumeration, float, int, bool, str, None's type,
+            list, dict, or a kind with arguments such as ``list[float]``. Any and object stand for
+            every document.
+        document: What `json` has read: dict, list, str, int, float, bool or None.
+        path: Keys that lead to the document, for messages; empty for a whole one.
+
+    Returns:
+        An object of the kind. For float it is NaN if the document is None, and true is no number.
+
+    Raises:
+        ValueError: The document holds no such value; the message begins with the path.
+    """
     if get_origin(kind) is not None:
         return _read_parametrised(kind, document, path)
     if kind is Any or kind is object:
         return document
-    is_bool = isinstance(document, bool)  # which Python takes for a number
+    # Python takes True for the number 1, JSON does not.
+    is_bool = isinstance(document, bool)
     if kind is float:
         if document is None:
             return np.nan
@@ -91,7 +112,19 @@ def _read(kind: Any, document: Any, path: str) -> Any:
 
 
 def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
-    """Return the value of a kind with arguments, such as ``dict[str, float]`` or a union."""
+    """Return the value of a kind with arguments that a JSON document holds.
+
+    Args:
+        kind: ``Annotated[kind, function, …]``, whose functions raise ValueError for a wrong value;
+            a union, of which the first kind that fits is taken; a Literal; an array of NumPy, whose
+            entries become floats; a mapping, whose keys are texts in the document; ``list[kind]``,
+            ``tuple[kind, ...]``, or a tuple with a kind for each entry.
+        document: What `json` has read.
+        path: Keys that lead to the document, for messages; empty for a whole one.
+
+    Raises:
+        ValueError: The document holds no such value; the message begins with the path.
+    """
     origin = get_origin(kind)
     arguments = get_args(kind)
     if origin is Annotated:
@@ -105,7 +138,8 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
         _require(document in arguments, document, path)
         return document
     if origin is np.ndarray:
-        return _checked(lambda rows: np.array(rows, float), document, path)  # null becomes nan
+        # null becomes NaN; lists of different lengths, and texts, raise ValueError
+        return _checked(lambda rows: np.array(rows, float), document, path)
     if issubclass(origin, Mapping):
         _require(isinstance(document, dict), document, path)
         values = {}
@@ -114,6 +148,7 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
             values[key] = _read(arguments[1], entry, _below(path, key))
         return values
     _require(isinstance(document, list), document, path)
+    # One kind for all entries, or one for each
     kinds = arguments
     if origin is list or arguments[-1] is ...:
         kinds = arguments[:1] * len(document)
@@ -123,10 +158,16 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
 
 
 def _read_union(kinds: tuple[Any, ...], document: Any, path: str) -> Any:
-    """Return what the first kind that fits the document makes of it.
+    """Return the value that a document holds of the first of several kinds that fits it.
+
+    Args:
+        kinds: Members of a union in their order. If None is among them, null is None, also where
+            a float before it would take null for NaN.
+        document: What `json` has read.
+        path: Keys that lead to the document, for messages.
 
     Raises:
-        ValueError: No kind fits; the message is of the first that is not None.
+        ValueError: No kind fits; the message is that of the first kind but None.
     """
     if document is None and type(None) in kinds:
         return None
@@ -142,14 +183,29 @@ def _read_union(kinds: tuple[Any, ...], document: Any, path: str) -> Any:
 
 
 def _read_fields(kind: Any, document: Any, path: str) -> Any:
-    """Return a dataclass, typed dict or named tuple from the values of its fields by name."""
+    """Return a dataclass, typed dict or named tuple from the values of its fields by name.
+
+    Fields with a default may be missing. Fields that a dataclass makes itself (`init=False`) may be
+    there and are not read.
+
+    Args:
+        kind: The class, whose annotations are the kinds of the fields.
+        document: What `json` has read.
+        path: Keys that lead to the document, for messages; empty for a whole one.
+
+    Raises:
+        ValueError: The document is no object, a field is unknown or missing, or its value is of
+            another kind; the message begins with the path. Also what the class itself raises.
+    """
     _require(isinstance(document, dict), document, path)
+    # An unknown field tells of another version of the program, or of a slip in a file by hand.
     known = _known_fields(kind)
     for name in document:
         is_known = name in known.types or name in known.derived
         _require(is_known, name, _below(path, name))
     for name in known.required:
         _require(name in document, None, _below(path, name))
+    # What a dataclass makes itself follows from the other fields, and is made again by its class.
     values = {}
     for name, entry in document.items():
         if name not in known.derived:
@@ -168,7 +224,13 @@ class _KnownFields:
 
 @cache
 def _known_fields(kind: Any) -> _KnownFields:
-    """Return the fields of a dataclass, typed dict or named tuple."""
+    """Return the fields of a dataclass, typed dict or named tuple, which is cached.
+
+    Returns:
+        Type of each field that a document may have, by its name; names of those without a default;
+        and names of those that a dataclass makes itself (`init=False`).
+    """
+    # Annotations may be texts (PEP 563), and `Annotated` carries the checks of values.
     hints = get_type_hints(kind, include_extras=True)
     if is_typeddict(kind):
         return _KnownFields(hints, tuple(kind.__required_keys__))
