@@ -49,9 +49,6 @@ class Row(NamedTuple):
     outputs: bytes
     checksum: bytes
 
-    create_table = """CREATE TABLE sample
-(model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
-
     @classmethod
     def from_sample(cls, model: bytes, point: str, sample: Sample) -> Row:
         """Return the row of a sample, with its checksum."""
@@ -103,6 +100,11 @@ class Store:
         2
     """
 
+    create_table = """CREATE TABLE sample
+(model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
+    """Statement that makes the table, with a column for each field of `Row`. SQLite keeps its text,
+    by which a store is known."""
+
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._rows: dict[tuple[bytes, str], Row] = {}
@@ -142,7 +144,7 @@ class Store:
             _prepare(self._connection)
             check = self._connection.execute("pragma quick_check").fetchone()
             tables = self._connection.execute(schema).fetchall()
-            is_intact = check == ("ok",) and tables == [(Row.create_table,)]
+            is_intact = check == ("ok",) and tables == [(self.create_table,)]
             for columns in self._connection.execute(samples):
                 row = Row._make(columns)
                 if row.is_intact:
@@ -241,7 +243,7 @@ def _prepare(connection: sqlite3.Connection) -> None:
     if connection.execute("pragma application_id").fetchone() != (_APPLICATION,):
         connection.execute(f"pragma application_id = {_APPLICATION}")
     if not connection.execute("select 1 from sqlite_master where name = 'sample'").fetchall():
-        connection.execute(Row.create_table)
+        connection.execute(Store.create_table)
 
 
 def _is_store(path: Path) -> bool:
