@@ -400,9 +400,8 @@ class FuzzyCell:
             require_choice("input", name, parameters)
             numbers[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
 
-        # Loss factors are no coordinates of the samples. A campaign needs one input at least.
-        # The stiffness does not depend on loss factors, and theirs on those of the phases is
-        # linear.
+        # Loss factors are no coordinates of the samples: the stiffness does not depend on them, and
+        # those of the cell are linear in them. A campaign needs one input at least.
         sampled = {name: x for name, x in numbers.items() if not name.endswith("_loss")}
         if not sampled:
             sampled = {"unchanged": Crisp(1.0)}
@@ -743,8 +742,8 @@ def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array
 
     # To first order the loss factor of a constant is the sum of those of the phases times their
     # energy fractions. So it is extreme where each phase has the end of its cut that the sign of
-    # its fraction says. A fraction may be negative: E of the plane can fall
-    # where a phase becomes stiffer in shear.
+    # its fraction says. A fraction may be negative: E of the plane can fall where a phase becomes
+    # stiffer in shear.
     slopes = fractions.sum(axis=1).T  # (constants, phases)
     lower = cuts[:, 0, np.newaxis]
     upper = cuts[:, 1, np.newaxis]

@@ -83,6 +83,9 @@ class StiffnessBounds:
         Args:
             average: In the plane, "axes" for C33, the modulus along the axes, or "isotropic" for
                 Hill's mean over all directions of the plane.
+
+        Raises:
+            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         if self.dimension == 3:
             return self._hill(1)
@@ -110,6 +113,9 @@ class StiffnessBounds:
             Lower and upper bound. Without a lower bound of the stiffness (percolating pores) the
             lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
             upper one is infinite.
+
+        Raises:
+            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
@@ -147,6 +153,9 @@ class StiffnessBounds:
         Returns:
             Lower and upper bound. Where a bound of the stiffness is missing, they are the limits of
             an isotropic solid but for rounding: −1 in space or −∞ in the plane, and 1/2.
+
+        Raises:
+            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
@@ -315,20 +324,22 @@ def _rounding(stiffness: Array) -> float:
 
 
 def inverse_below(matrix: Array) -> Array:
-    """Return a lower bound of the inverses of all symmetric matrices ≤ `matrix`, shape (n, n).
+    """Return a lower bound of the inverses of all positive definite matrices ≤ `matrix`.
 
-    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse of
-    positive definite matrices falls. FailedError if `matrix` is singular to rounding.
+    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse falls. The
+    argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
+    `matrix` is singular to rounding.
     """
     inverse, error = _inverse(matrix)
     return np.asarray(inverse - error)
 
 
 def inverse_above(matrix: Array) -> Array:
-    """Return an upper bound of the inverses of all symmetric matrices ≥ `matrix`, shape (n, n).
+    """Return an upper bound of the inverses of all symmetric matrices ≥ `matrix`.
 
-    The order is Loewner's, A ≤ B if B − A is positive semidefinite. FailedError if `matrix` is
-    singular to rounding.
+    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse of
+    positive definite matrices falls. The argument, symmetric positive definite, and the result have
+    the shape (n, n). FailedError if `matrix` is singular to rounding.
     """
     inverse, error = _inverse(matrix)
     return np.asarray(inverse + error)

@@ -164,6 +164,9 @@ def _spacing(file: TiffFile) -> tuple[float, float, float]:
 
     Args:
         file: The open file.
+
+    Raises:
+        ValueError: ImageJ's spacing is no number.
     """
     if file.is_ome and file.ome_metadata:
         return ome_spacing(file.ome_metadata)

@@ -143,7 +143,7 @@ def write_vti(
     Args:
         path: Name of the file, which ends in .vti; it is replaced.
         named: Arrays of one shape, (y, x) or (z, y, x), one at least, by the names that they get.
-            They are written as doubles.
+            They are written as doubles; shapes are not checked.
         lengths: Sides of a pixel or voxel in m, along the axes of the arrays. A picture becomes a
             layer that is as thick as a pixel is long along x.
 

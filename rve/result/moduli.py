@@ -103,7 +103,18 @@ def _bulk_and_shear(phases: Sequence[AnyPhase], space: bool) -> Array:
 
 
 def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, float]:
-    """Return what a reference material adds to K and to G of each phase, in Pa."""
+    """Return the terms of Hashin and Shtrikman's bounds that a reference material gives, in Pa.
+
+    A bound of K is X in 1/(X + term) = Σ fraction/(K of the phase + term), and that of G likewise.
+
+    Args:
+        bulk: K of the reference, in Pa: of three dimensions, or of plane strain.
+        shear: G of the reference, in Pa.
+        space: Whether the composite is one of space; else of the plane across fibres.
+
+    Returns:
+        The term of K, and that of G.
+    """
     if space:
         # By Hashin and Shtrikman (1963) the terms are those of a spherical inclusion in the
         # reference, of Eshelby's tensor.
@@ -197,16 +208,16 @@ def square_moduli(stiffness: Array) -> Array:
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, by which C11 is taken.
+    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, with C11 also by each axis.
 
     Args:
         stiffness: Plane stiffnesses in Voigt's order 11, 22, 12, shape (…, 3, 3).
-        square: Whether C11 and C22 are equal but for the mesh.
+        square: Whether C11 and C22 are equal but for the mesh, so that their mean is enough.
 
     Returns:
-        The three moduli (last axis) with the mean of C11 and C22, shape (…, 1, 3); if not `square`,
-        then also with C11 and with C22 alone, shape (…, 3, 3) with these three on the last but one
-        axis.
+        The three moduli, on the last axis. The last but one axis is how C11 is taken: the mean of
+        C11 and C22 alone, shape (…, 1, 3), or, if not `square`, the mean, C11 and C22, shape (…, 3,
+        3).
     """
     moduli = [square_moduli(stiffness)]
     if not square:

@@ -325,7 +325,11 @@ class HomogenisedStiffness:
 
     @property
     def error(self) -> dict[str, float]:
-        """Declared relative error of E by source; their sum is `estimated_error`."""
+        """Declared relative error of E by source; empty if none is declared.
+
+        Sources are "space", the cell at each θ, and "theta", the quadrature. The errors add up to
+        `estimated_error`, that of all sources together; they are NaN if one is unknown.
+        """
         errors = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
         total = sum(errors.values())
         if total == 0:

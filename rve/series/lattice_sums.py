@@ -108,7 +108,7 @@ def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
 
 
 def _zeta(n: int) -> float:
-    """Return Riemann's ζ(n) for n ≥ 4, by the formula of Euler and Maclaurin.
+    """Return Riemann's ζ(n) for a whole number n ≥ 4, by the formula of Euler and Maclaurin.
 
     After the terms below 100 follow ∫ x^-n dx from 100 on, half the next term, and two corrections.
     What remains is at most the third one, n (n + 1) … (n + 4) 100^(−n−5) / 30240 < 3e-19.
@@ -124,6 +124,10 @@ def _lipschitz(n: int, power: int) -> float:
 
     Lipschitz' formula turns the sum over all rows of the lattice into this one. Terms beyond q = 39
     are below rounding for n < 40.
+
+    Args:
+        n: Exponent of the lattice sum, from 4 to 39.
+        power: 1 for Σ p^-n over the rows, 2 for Σ j p^-n, where j numbers the rows.
     """
     q = np.arange(1.0, 40.0)
     logarithm = n * np.log(2 * np.pi) - lgamma(n) + (n - 1) * np.log(q) - 2 * np.pi * q

@@ -316,7 +316,8 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     Returns:
         `values` and their absolute `errors` in Pa, shape (phases, K and G, 3 moduli), matrix first;
         and `moduli_at`, the function from complex K and G of the phases, shape (2,) each, to the
-        three mean moduli.
+        three mean moduli: C11 + C12, C11 − C12 and C33 of plane cells, K, (C11 − C12)/2 and C44 in
+        space.
     """
     rule = ThetaRule(mean.curve.theta, mean.curve.weights)
     values = _rule_energies(series, cell, rule, mean.terms)

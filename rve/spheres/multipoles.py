@@ -212,9 +212,10 @@ def _log_weight(n: Array, m: Array) -> Array:
 def _projection_factor(pair: _Pair) -> Array:
     """Return a factor in the harmonic part of degree k of (x·P) F, for the image P of a multipole.
 
-    F is the irregular solid harmonic (n, m) about P, expanded about the origin. The result is the
-    factor of f_{n+k-2}^{m-j}(P) in that part, times (2k − 1)(2n + 2k − 1); f is an irregular solid
-    harmonic.
+    F is the irregular solid harmonic (n, m) about the point P, expanded in regular ones of the
+    position x about the origin. The product x·P F is no longer harmonic; its part of degree k, made
+    harmonic, holds the irregular solid harmonic f_{n+k-2}^{m-j} at P times this result over (2k −
+    1)(2n + 2k − 1).
 
     Args:
         pair: Degrees n, k and orders m, j, in shapes that broadcast to that of the result.

@@ -63,13 +63,18 @@ class Basis:
 
 
 def _basis(dimension: int, *, stress: bool) -> Basis:
-    """Return the functions of one coordinate of stresses or of displacements.
+    """Return the functions of one coordinate whose products over the axes are those of an element.
 
     Stresses are second derivatives of potentials, so that the slopes of these are continuous.
 
     Args:
         dimension: 2 for pixels, 3 for voxels.
         stress: Whether the unknowns are potentials of stresses; else they are displacements.
+
+    Returns:
+        `functions`, each by its coefficients of 1, x, x², … on [0, 1]; `owners`, for each function
+        the number of its unknown in a cell and how many cells further this cell is; and `places`,
+        the coordinate of each unknown in its cell, and whether it is odd, as a slope is.
     """
     if dimension == 3 and not stress:  # values at both ends
         return Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))

@@ -170,6 +170,9 @@ def modes_of(
 ) -> Iterator[SlabModes]:
     """Yield the strain or stress modes of fields plus uniform fields, by groups of cells.
 
+    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
+    Legendre polynomials that are orthonormal on a cell.
+
     Args:
         element: Element of displacements, with modes of the strain, or of stresses.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
@@ -179,8 +182,9 @@ def modes_of(
             shape; None for no distance.
 
     Yields:
-        SlabModes with `slab`, the index of the cells in an array of the grid's shape, `modes`,
-        shape (modes, fields, cells), and a bound of their errors.
+        SlabModes: `slab`, the index of the cells in an array of the grid's shape; `modes`, shape
+        (modes, fields, cells); and a matrix A, `amplification`, and magnitudes b of unknowns,
+        `local`, with which modes are off by at most A b + 2⁻⁵³ |modes|. Every cell is in one group.
     """
     if isinstance(fields, np.ndarray) and element.dimension == 3:
         return _modes_by_rows(element, fields, mean_modes, field_errors)

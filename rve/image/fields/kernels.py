@@ -230,7 +230,8 @@ def _fill_strips(
     """Pass a row of unknowns along x on to modes along x and z, and keep them as a strip.
 
     The modes along x of row y are found in the n layers of unknowns from layer z on, around the
-    periodic grid; their combinations along z are the modes of the voxels in layer z.
+    periodic grid; their combinations along z are the modes of the voxels in layer z. A row has nx
+    voxels.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
@@ -244,10 +245,12 @@ def _fill_strips(
         field: Unknowns of a periodic field, shape (unknowns of a voxel, z, y, x).
         z: Index of the layer of voxels.
         y: Index of the row of unknowns, taken modulo the size of the grid.
-        shifted: Work array for a row of each layer moved by each function, shape (n, n, x).
-        lines: Work array for modes along x of each layer, shape (n, n × x).
-        strips: Modes of each term, shape (terms, n modes along z, n, n modes along x × x). The
-            third index is y modulo n; the entries of row y are overwritten but for the highest
+        shifted: Work array for a row of each layer moved by each function, shape (n layers, n
+            functions, nx).
+        lines: Work array for the modes along x of each layer, shape (n layers, n · nx): mode k of
+            voxel x at k · nx + x.
+        strips: Modes of each term, shape (terms, n modes along z, n rows, n · nx), the last axis as
+            of `lines`. Row y stands at y modulo n; its entries are overwritten but for the highest
             modes, which are zero where a derivative lowers the degree.
     """
     n = tables.shape[-1]
@@ -281,6 +284,8 @@ def _fill_strips(
 def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Array) -> None:
     """Combine n strips of rows of unknowns to the modes of the Voigt components in a row of voxels.
 
+    A row has nx voxels; mode k along x of voxel x stands at k · nx + x.
+
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
@@ -288,10 +293,10 @@ def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Arra
         terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
             orders of its derivative along z, y, x).
         strips: Modes along z and x of each term in the rows of unknowns y … y + n − 1, shape
-            (terms, n modes along z, n, n modes along x × x). The third index is the row modulo n.
+            (terms, n modes along z, n rows, n · nx). A row stands at its index modulo n.
         y: Index of the row of voxels.
         modes: Overwritten by the sums of the terms; shape (6 components, n modes along z, n modes
-            along y, n modes along x × x).
+            along y, n · nx).
     """
     n = tables.shape[-1]
     nx = modes.shape[-1] // n
@@ -314,7 +319,8 @@ def _add_forces(
 ) -> None:  # fmt: skip
     """Pass the sums of a row of unknowns back along z and x, and add them to the nodal forces.
 
-    This is the transpose of the pass from unknowns to strips, `_fill_strips`.
+    This is the transpose of the pass from unknowns to strips, `_fill_strips`. A row has nx voxels;
+    mode k along x of voxel x stands at k · nx + x.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
@@ -325,13 +331,12 @@ def _add_forces(
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
-        sums: What the modes of voxels exert on each term of a row, shape (terms, n, n modes along
-            z, n modes along x × x). The second index is y modulo n; the entries of row y are set to
-            zero.
+        sums: What the modes of voxels exert on each term of a row, shape (terms, n rows, n modes
+            along z, n · nx). Row y stands at y modulo n; its entries are set to zero.
         z: Index of the layer of voxels, whose unknowns lie in the n layers from z on.
         y: Index of the row of unknowns, taken modulo the size of the grid.
-        lines: Work array for modes along x of each layer, shape (n, n × x).
-        shifted: Work array for the forces of each function, shape (n, n, x).
+        lines: Work array for modes along x of each layer, shape (n layers, n · nx).
+        shifted: Work array for the forces of each function, shape (n layers, n functions, nx).
         result: Nodal forces, shape (unknowns of a voxel, z, y, x); changed.
     """
     n = tables.shape[-1]
