@@ -260,15 +260,21 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     """Add guaranteed bounds of the exact response to an envelope from trajectories.
 
     Args:
-        followed: The envelope, whose bounds are estimated.
-        over: The same problem, of a linear structure.
+        followed: The envelope, whose bounds are estimated or attained.
+        over: The response for which it was computed, of a linear structure, over the boxes of the
+            inputs.
         proof: The method of the proof, which is run here.
         tick: Called with the completed fraction.
 
     Returns:
-        A copy with the guaranteed bounds as `outer`, and with the larger distance of each end from
-        the guaranteed bound and from the attained value as `error`. If the proof fails with an
-        `UnprovedError`, the envelope is returned as it is.
+        A copy with the guaranteed bounds as `outer`, their addition between the time nodes as
+        `between`, and as `error` the larger distance of each end from the guaranteed bound and from
+        the attained value of the proof. The facts "gap" and "estimated_error" are those of the
+        proof and of this error. If the proof fails with an `UnprovedError`, the envelope is
+        returned as it is.
+
+    Raises:
+        FailedError: The proof contradicts attained values.
     """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))

@@ -67,7 +67,9 @@ class Answer(ABC):
 
     def __str__(self) -> str:
         """Return the question, the table and the sentences."""
-        return f"{self.title}\n{text_table(*self.table())}{fill(self.all_words(), 100)}\n"
+        table = self.table()
+        sentences = fill(self.all_words(), 100)
+        return f"{self.title}\n{text_table(table.head, table.rows)}{sentences}\n"
 
     __repr__ = __str__
 

@@ -201,9 +201,9 @@ class LimitResult:
         """The value of the limit in words, such as "30.00 mm" or "1 % (30.00 mm)".
 
         It is the text that the author of the limit stated, if there is one, with typographic minus
-        signs. Percentages and ratios such as "1/200" are followed by the value in the SI unit of
-        the output, if the output has one. Without a stated text it is the value with four digits
-        and a suitable prefix of the unit.
+        signs. A percentage, or a ratio of 1 to a whole number such as "1/200", is followed by the
+        value in the SI unit of the output, if the output has one. Without a stated text it is the
+        value with four digits and a suitable prefix of the unit.
         """
         in_si = engineering(self.limit, self.unit)
         if not self.stated:

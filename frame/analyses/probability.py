@@ -240,12 +240,14 @@ def probability(
     events = {}
     for k, (name, limit) in enumerate(named.items()):
         about = about_limit(limit, model.unit_of(limit.output))
-        of_limit = PeakRatios(*(bound[:, :, k] for bound in ratios))
-        events[name] = _limit_probability(about, of_limit, level_of_points, is_random=bool(random))
+        events[name] = _limit_probability(
+            about, ratios.of_limit(k), level_of_points, is_random=bool(random)
+        )
     if len(named) > 1:
         about = LimitResult(output=ANY, is_event=True)
-        of_any = PeakRatios(*(bound.max(axis=2) for bound in ratios))
-        events[ANY] = _limit_probability(about, of_any, level_of_points, is_random=bool(random))
+        events[ANY] = _limit_probability(
+            about, ratios.of_any(), level_of_points, is_random=bool(random)
+        )
     return Probability(
         encloses=enclosed_set(inputs.values()),
         alpha=np.asarray(cuts.alpha),
@@ -370,6 +372,18 @@ class PeakRatios(NamedTuple):
     lower: Array
     upper: Array
     within_steps: Array
+
+    def of_limit(self, number: int) -> PeakRatios:
+        """Return the ratios to the limit with a number, shape (points, draws)."""
+        return PeakRatios(
+            self.lower[:, :, number], self.upper[:, :, number], self.within_steps[:, :, number]
+        )
+
+    def of_any(self) -> PeakRatios:
+        """Return the largest ratio over all limits; it exceeds 1 if any limit is exceeded."""
+        return PeakRatios(
+            self.lower.max(axis=2), self.upper.max(axis=2), self.within_steps.max(axis=2)
+        )
 
 
 def _peak_ratios(

@@ -48,14 +48,16 @@ def nominal_mode(model: StructureModel) -> NominalMode:
 
     Raises:
         RefusedError: The structure has no matrices of mass, damping and stiffness, as a general
-            Lagrangian system.
+            Lagrangian system; or its stiffness lets it drift, so that a mode does not oscillate.
     """
     if not has_matrices(model):
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
     modes = nominal_modes(model)
-    period = 2 * pi / float(modes.frequencies[0])
-    return NominalMode(period=period, ratio=float(modes.damping_ratios[0]))
+    omega = float(modes.frequencies[0])
+    allowed = "a positive definite stiffness"
+    require(omega > 0, "stiffness", "one that lets the structure drift", allowed)
+    return NominalMode(period=2 * pi / omega, ratio=float(modes.damping_ratios[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +137,8 @@ def scaled_records(
 
     Raises:
         RefusedError: `measure` is unknown, two records have the same name, a record is zero
-            throughout, the structure has no matrices of mass, damping and stiffness, or its first
-            period is above 1000 s.
+            throughout, the structure has no matrices of mass, damping and stiffness, it may drift,
+            or its first period is above 1000 s.
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
     # Results of records are told apart by the names.

@@ -90,7 +90,8 @@ class Tolerances(Answer):
             text = "–"
             relative = ""
             if self.kept is not None:
-                ends = rounded_ends(*support.kept, Nature.ATTAINED)
+                low, high = support.kept
+                ends = rounded_ends(low, high, Nature.ATTAINED)
                 text = " … ".join(dict.fromkeys(engineering(end, support.unit) for end in ends))
                 # A deviation from zero has no percentage.
                 relative = f"about {support.nominal:g}"

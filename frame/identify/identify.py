@@ -324,9 +324,9 @@ class Identified:
     def predictions(self) -> Predictions:
         """Return proved bounds of all natural frequencies of the frame over the box of each level.
 
-        They are in Hz, and stand beside the mean measured frequencies of all modes, those that are
-        held out included. For a refuted frame there are none: lower bounds are +∞ and upper bounds
-        are -∞.
+        They are in Hz, shape (levels, modes), by rising frequency; the frame has as many modes as
+        floors. Beside them stand the mean measured frequencies of all modes, by number, those that
+        are held out included. For a refuted frame lower bounds are +∞ and upper bounds are -∞.
         """
         chain = self.evidence.chain
         lower = np.full((len(self.alpha), len(chain.mass)), np.inf)

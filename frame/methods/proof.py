@@ -288,7 +288,9 @@ def bound_levels(
     direct = direct_error_in_steps(model)
     model = model.in_units(scale)
     error = model_error / scale
-    rounding = remainder_bounds(model, *model.boxes.unit_ends(0)).rounding[..., 0]
+    lower, upper = model.boxes.unit_ends(0)
+    # The first entry of the last axis is the rounding of values, the others that of slopes.
+    rounding = remainder_bounds(model, lower, upper).rounding[..., 0]
     # Model error and rounding are added to the bounds on either side. The search has the rest of
     # the gap, a little less so that rounding does not make the sum larger than the gap.
     least_gap = float((2 * error + rounding).max())

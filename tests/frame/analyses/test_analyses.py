@@ -9,6 +9,7 @@ from alphacut.base.errors import RefusedError
 from alphacut.frame import (
     Accelerogram,
     Limit,
+    MatrixStructure,
     Peak,
     StoreyFrame,
     decide,
@@ -260,6 +261,14 @@ def test_two_records_of_one_name_are_refused():
     twice = [Accelerogram(0.05, scale * np.ones(20), name="push") for scale in (1.0, 3.0)]
     with pytest.raises(RefusedError, match="suite is push; allowed: a name of its own"):
         over_records(ONE, {"m1": Interval(900, 1100)}, twice, duration=1, step=0.05)
+
+
+def test_records_need_a_structure_that_oscillates():
+    free = np.array([[1e3, -1e3], [-1e3, 1e3]])
+    drifting = MatrixStructure({"k": 1.0}, [(1.0, np.eye(2))], [("k", free)], {"q2": [0.0, 1.0]})
+    record = Accelerogram(0.05, np.ones(20))
+    with pytest.raises(RefusedError, match="stiffness is one that lets the structure drift"):
+        over_records(drifting, {"k": Interval(0.9, 1.1)}, [record], duration=1, step=0.05)
 
 
 def one_level(lower, upper, reached, nature, error=0.0, outputs=("q1",)):
