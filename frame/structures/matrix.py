@@ -526,7 +526,7 @@ def require_symmetric(key: str, array: Array, names: Sequence[object]) -> None:
         RefusedError: The array is not symmetric; the message has the two entries that differ most.
     """
     asymmetry = np.abs(array - array.T)
-    i, j = np.unravel_index(asymmetry.argmax(), asymmetry.shape)
+    i, j = divmod(int(asymmetry.argmax()), len(array))  # entries are counted row by row
     is_symmetric = asymmetry[i, j] <= 1e-9 * np.abs(array).max()
     pair = f"[{names[i]}, {names[j]}] is {array[i, j]:g}, [{names[j]}, {names[i]}]"
     what = f"not symmetric: {pair} is {array[j, i]:g}"
