@@ -55,10 +55,13 @@ def require_map(radius_map: RadiusMap) -> None:
         radius_map: Function of θ with the attribute `distribution`, the distribution of θ.
 
     Raises:
-        RefusedError: The distribution lacks members or has a support that is not finite, not in
-            order or too narrow; or the radii are not one for each θ, or outside (0, 1).
-        AttributeError: The map has no attribute `distribution`.
+        RefusedError: It is no such function; the distribution lacks members or has a support that
+            is not finite, not in order or too narrow; or the radii are not one for each θ, or
+            outside (0, 1).
     """
+    is_map = callable(radius_map) and hasattr(radius_map, "distribution")
+    value = type(radius_map).__name__
+    require(is_map, "radius map", value, allowed="functions of θ with its `distribution`")
     distribution = radius_map.distribution
     require_distribution(distribution)
     require_support(distribution.lower, distribution.upper)

@@ -200,13 +200,21 @@ class _Text(_Numbers):
             raise DamagedMeshError(f"with {count} numbers promised and fewer there")
         values = self.values[self.place : self.place + count]
         self.place += count
-        # All numbers were read as floats, which hold whole ones exactly only up to 2⁵³.
-        is_whole = np.isfinite(values) & (values == np.floor(values)) & (np.abs(values) < 2.0**53)
-        if kind != "f8" and not is_whole.all():
-            raise DamagedMeshError("with a count or tag that is no whole number")
+        if kind != "f8":
+            _require_whole(values)
         if kind == "u8" and (values < 0).any():
             raise DamagedMeshError("with a count or tag below 0")
         return values
+
+
+def _require_whole(values: Array) -> None:
+    """Raise DamagedMeshError unless numbers of a text, shape (n,), are counts or tags.
+
+    Each must be whole and below 2⁵³ in magnitude, up to which floats hold whole numbers exactly.
+    """
+    is_whole = np.isfinite(values) & (values == np.floor(values)) & (np.abs(values) < 2.0**53)
+    if not is_whole.all():
+        raise DamagedMeshError("with a count or tag that is no whole number")
 
 
 class _Binary(_Numbers):
@@ -221,7 +229,18 @@ class _Binary(_Numbers):
         return self.records(count, np.dtype(self.order + kind))
 
     def records(self, count: int, dtype: np.dtype[Any]) -> NDArray[np.generic]:
-        """Return the next records of a type of NumPy, shape (count,); errors as of `take`."""
+        """Return the next records of a structured or plain type of NumPy, and move behind them.
+
+        Args:
+            count: How many; 0 gives an empty array.
+            dtype: Type of a record, with its byte order.
+
+        Returns:
+            Array of shape (count,) that cannot be written to.
+
+        Raises:
+            DamagedMeshError: `count` is negative or more than what is left.
+        """
         # The count comes from the file. It is compared with the bytes that are there before any
         # memory is taken, so that a damaged count cannot ask for terabytes.
         if not 0 <= count * dtype.itemsize <= len(self.content) - self.place:
@@ -393,8 +412,8 @@ def _nodes_of_version_2(source: _Numbers) -> tuple[Ints, Array]:
         Tags, shape (n,), and coordinates, shape (n, 3). Neither need be unique or finite here.
 
     Raises:
-        DamagedMeshError: There are fewer numbers than the count says, or no count. A tag in text
-            that is no whole number is cut to one.
+        DamagedMeshError: There are fewer numbers than the count says, no count, or a tag in text
+            that is no whole number.
     """
     if isinstance(source, _Binary):
         order = source.order
@@ -403,6 +422,7 @@ def _nodes_of_version_2(source: _Numbers) -> tuple[Ints, Array]:
         return table["tag"].astype(np.int64), table["point"].astype(float)
     count = source.count()
     rows = source.floats(4 * count).reshape(count, 4)
+    _require_whole(rows[:, 0])
     return rows[:, 0].astype(np.int64), rows[:, 1:].copy()
 
 

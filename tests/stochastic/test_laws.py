@@ -100,6 +100,7 @@ class Wide:
         (Wide(), r"r at θ = -3 is -1; allowed: radii inside \(0, 1\)"),
         (Wide(Own(upper=np.inf)), "two finite ends"),
         (Wide(rise=np.zeros((1, 1))), r"is \(1, 65\); allowed: the shape of θ"),
+        (0.5, "radius map is float; allowed: functions of θ"),
     ],
 )
 def test_maps_that_are_none_are_refused(radius, words):

@@ -25,7 +25,7 @@ from alphacut.rve.mesh.file import (
     refined,
     write,
 )
-from alphacut.rve.mesh.msh import parse_msh
+from alphacut.rve.mesh.msh import DamagedMeshError, parse_msh
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.prism_grid import Prisms
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -217,7 +217,7 @@ def test_prisms_that_are_no_cell_are_refused(tmp_path, change, message):
 
 @pytest.mark.parametrize("version", [2.2, 4.1])
 def test_a_periodic_mesh_that_gmsh_scaled_is_refused_with_the_cure(tmp_path, version):
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         gmsh.open(str(MESHES / "two-particles.msh"))
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.ScalingFactor", 0.5)
@@ -266,7 +266,7 @@ def test_gmsh_reads_no_file(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["paper-coarse.msh", "ring.msh"])
 @pytest.mark.parametrize(("version", "is_binary"), [(2.2, 0), (2.2, 1), (4.1, 0), (4.1, 1)])
 def test_each_version_of_msh_is_read_as_gmsh_reads_it(tmp_path, name, version, is_binary):
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         gmsh.merge(str(MESHES / name))
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", is_binary)
@@ -335,6 +335,14 @@ def test_a_mesh_that_contradicts_itself_is_refused(tmp_path, old, new, message):
     (tmp_path / "cell.msh").write_text(TEXT.replace(old, new, 1))
     with pytest.raises(RefusedError, match=message):
         read_grid(tmp_path / "cell.msh")
+
+
+@pytest.mark.parametrize("tag", ["1.5", "nan", "1e300"])
+def test_a_node_of_version_2_without_a_whole_tag_is_refused(tag):
+    head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    nodes = f"$Nodes\n1\n{tag} 0 0 0\n$EndNodes\n$Elements\n0\n$EndElements\n"
+    with pytest.raises(DamagedMeshError, match="no whole number"):
+        parse_msh((head + nodes).encode())
 
 
 def test_a_file_that_is_none_is_refused(tmp_path):
