@@ -72,9 +72,10 @@ class RadiusLimits:
     def capped(self, sample: AreaWeighted) -> AreaWeighted:
         """Return a copy of a sample with the reduced radii r_n of discs capped at `Shape.reach`.
 
-        Reach is the largest r_n of a map: particles touch the sides of a square cell at 1. With
-        stated limits, and for spheres, the sample itself is returned: limits cut off what is
-        tighter.
+        r_n is the radius of a particle over half the side of a square or cube as large as its cell.
+        Reach is the largest r_n of a map, 0.99 for discs; at 1 particles touch the sides of a
+        square cell. With stated limits, and for spheres, the sample itself is returned: limits cut
+        off what is tighter.
 
         Args:
             sample: Reduced radii of all cells, weighted by area or volume.
@@ -97,9 +98,14 @@ class RadiusLimits:
         return sample.capped(shape.reach)
 
     def capped_fraction(self, sample: AreaWeighted) -> float:
-        """Return the fraction of area or volume in cells with an r_n above `Shape.reach`.
+        """Return the fraction of area or volume in cells that are tighter than a map allows.
 
-        Reach is the largest reduced radius of a map. The fraction is 0 with stated limits.
+        Their reduced radius (of the particle, over half the side of a square or cube as large as
+        the cell) is above `Shape.reach`, 0.99 for discs and 0.97 for spheres. The fraction is 0
+        with stated limits.
+
+        Args:
+            sample: Reduced radii of all cells, weighted by area or volume.
         """
         if self.stated is not None:
             return 0.0
@@ -180,8 +186,8 @@ class FittedRadiusMap:
         """Ends and nominal values of the slopes "a2" and "a4", rounded to eight digits.
 
         The slopes are dr/dξ at the lower and at the upper end of θ, ξ from 0 to 1 over its support.
-        Ends that differ from the nominal value by 1e-6 of a3 − a1, which is rounding of the linear
-        program, are that value.
+        Ends that differ from the nominal value by at most 1e-6 of a3 − a1, which is rounding of the
+        linear program, are that value.
 
         Returns:
             Lower end, nominal value and upper end by name.
@@ -265,6 +271,10 @@ class FittedRadiusMap:
 
     def numbers(self) -> dict[str, object]:
         """Return all numbers of the fit by the keys of its JSON file; lengths are in m.
+
+        r_n is the reduced radius: of a particle, over half the side of a square or cube as large as
+        its cell; a1 to a4 are the parameters of the cubic map r(θ): its values a1 and a3 and slopes
+        a2 and a4 at the lower and at the upper end of θ.
 
         Of the particles: their kind and number, the number of packings, the smallest and the
         largest radius, and fractions of area or volume (measured; as the mean over the cells, eq.
@@ -475,7 +485,10 @@ class FuzzyFit:
 
 
 def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
-    """Fit the radius map to a sample of reduced radii r_n and make its slopes fuzzy.
+    """Fit the radius map to a sample of reduced radii and make its slopes fuzzy.
+
+    A reduced radius r_n is that of a particle over half the side of a square or cube as large as
+    its cell.
 
     Args:
         rule: Limits of r_n between which it is fitted.
@@ -483,13 +496,14 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
         seed: Seed of the bootstrap, 0 or more.
 
     Returns:
-        The values within the limits; the p-box that contains their distribution but for its
-        bootstrap band, with the fuzzy slopes; the bootstrap band of the slopes; and the half-width
-        of the band of the distribution function.
+        The values within the limits; the p-box (bounds of the distribution function) that contains
+        their distribution but for its bootstrap band, with the fuzzy slopes; the bootstrap band of
+        the slopes; and the half-width of the band of the distribution function.
 
     Raises:
-        RefusedError: All cells have one r_n, more than 15 % of the cells are too tight, fewer than
-            ten values are within the limits, or there are fewer than five groups.
+        RefusedError: All cells have one r_n, more than 15 % of the cells are too tight for a map
+            without stated limits, fewer than ten values are within the limits, or there are fewer
+            than five groups.
         FailedError: No p-box contains the sample.
     """
     capped = rule.capped(sample)
@@ -519,7 +533,10 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
 
 
 def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
-    """Return number and distances of direct neighbours, and the correlation of their r_n.
+    """Return number and distances of direct neighbours, and the correlation of their reduced radii.
+
+    Neighbours are those of a Delaunay triangulation of the centres. A reduced radius is that of a
+    disc over half the side of a square as large as its cell.
 
     Args:
         sections: Particles and cells; those without a diagram (spheres) are left out.
@@ -528,7 +545,8 @@ def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
         "neighbours" with "counted", the number of particles whose neighbours were counted, the
         "mean" number of neighbours and the "mean_distance" of their centres in m, None where there
         are none; and "correlation", the mean over the sections of the correlation of reduced radii
-        of cells that share a wall. Empty for spheres, whose cells have no diagram.
+        of cells that share a wall, NaN where it has no pairs or no spread. Empty for spheres, whose
+        cells have no diagram.
     """
     diagrams = [section.diagram for section in sections if section.diagram]
     if not diagrams:

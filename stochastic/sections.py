@@ -83,7 +83,7 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
         sections: Particles of one kind with their cells, at least one section.
 
     Raises:
-        RefusedError: A cell is smaller than its particle.
+        RefusedError: A cell is smaller than its particle, which overlaps of particles bring about.
     """
     # Cells of one packing depend on one another, so that the bootstrap must draw packings. Patches
     # of a single section depend on one another along their edges alone.
@@ -105,7 +105,16 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
 
 
 def _patches(section: ParticleCells) -> Ints:
-    """Return the number of the patch that the particle of each counted cell lies in, shape (k,)."""
+    """Return the patch in which the particle of each counted cell lies, shape (k,).
+
+    A section is divided into 5 × 5 equal patches, a cube into 5 × 5 × 5.
+
+    Args:
+        section: Particles with the indices of those whose cells count.
+
+    Returns:
+        Numbers from 0 to 24, or to 124; the last coordinate counts fastest.
+    """
     per_side = 5
     particles = section.particles
     place = (per_side * particles.centres[section.counted] / particles.size).astype(int)

@@ -53,8 +53,8 @@ def extrude(
     Returns:
         Grid of six-node triangles times layers, with the heights of its levels from 0 to 1. Its
         15-node prisms are numbered layer by layer. Where `radius` is positive, phase 0 is the
-        matrix, phase 1 the inclusion, and `conforming` is true; else there is the phase "matrix"
-        alone. The arguments are not checked.
+        matrix, phase 1 the inclusion, and `conforming` is true: nodes are to follow the interface.
+        Else there is the phase "matrix" alone. The arguments are not checked.
     """
     has_bends = bool(radius) and not is_round(outline)
     bends = refinement if has_bends else 0.0
@@ -73,6 +73,8 @@ def extrude(
     num_nodes = len(plane.points)
     on_levels = np.arange(layers + 1)[:, np.newaxis, np.newaxis] * num_nodes + plane.triangles
     first_on_mid_level = (layers + 1) * num_nodes + np.arange(layers) * num_vertices
+    # `BELOW` and `ABOVE` are the places of a prism's lower and upper six-node triangle in Basix's
+    # order, `MID_LEVEL` those of the middles of its vertical edges.
     cells = np.empty((layers, len(triangles), 15), np.int64)
     cells[..., BELOW] = on_levels[:-1]
     cells[..., ABOVE] = on_levels[1:]
@@ -259,7 +261,8 @@ def _number_nodes(prisms: Prisms, level: Ints, *, planar: Ints, layers: int, ver
     levels. Within a level the order is that of the plane mesh.
 
     Args:
-        prisms: The prisms.
+        prisms: The prisms. Of the 15 nodes of each, those at `MID_LEVEL` are the middles of the
+            vertical edges above its vertices 0, 1, 2.
         level: Level of each node, counted from 0 at the lowest θ; −1 for middles of vertical edges.
         planar: Node of the plane mesh below each node, −1 where its column does not reach level 0.
         layers: Number of layers, one less than the levels.

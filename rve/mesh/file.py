@@ -71,7 +71,7 @@ def mesh_content(path: Path | str) -> bytes:
 
     Raises:
         RefusedError: The file does not exist, is a pipe or a device, is too large for the free
-            memory, or begins with neither $MeshFormat nor $Comments; so does an empty file.
+            memory, is empty, or begins with neither $MeshFormat nor $Comments.
     """
     try:
         require_text(Path(path))
@@ -416,7 +416,7 @@ def write(
         fields: Values at the nodes of the prisms by name, shape (m, 15, components). Each becomes a
             view behind the mesh. Element k of a view is the k-th prism.
     """
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.model.add("cell")
         model = gmsh.model.getCurrent()

@@ -86,6 +86,10 @@ def triangles(
         Vertices, shape (n, 2); vertices of each triangle, shape (m, 3); and phase of each triangle,
         shape (m,): matrix 0, particle 1. Vertices of the interface are near the outline, on a
         spline.
+
+    Raises:
+        ImportError: Gmsh is not installed, and the mesh is not in the cache.
+        Exception: Whatever Gmsh raises if it cannot mesh the square.
     """
     gradings: list[Sizes] = []
     if near_particle:
@@ -100,8 +104,7 @@ def triangles(
     generate = partial(gmsh_triangles, size, radius, outline, sizes)
 
     # The key of the cache is all that Gmsh is given: the numbers, the outline at the points of its
-    # spline, its bends, this file, and the version of Gmsh.
-    # A function cannot be hashed, and two outlines that agree at these points give one mesh.
+    # spline, its bends, this file, and the version of Gmsh. The function itself cannot be hashed.
     angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
     numbers = np.array([size, radius, near_particle, refinement, *extents(outline)])
     points, bends = bend_radii(outline)
@@ -134,7 +137,7 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
         Exception: Whatever Gmsh raises if it cannot mesh the square, such as an outline that
             crosses itself or a side.
     """
-    with model() as gmsh:
+    with open_gmsh() as gmsh:
         phase_surfaces = surfaces(size, radius, outline)
         if sizes is not None:
             # Nothing else sets the edge lengths.
@@ -208,7 +211,7 @@ def edges(triangles: Ints, inside: Mask) -> Edges:
 
 
 @contextmanager
-def model() -> Iterator[Any]:
+def open_gmsh() -> Iterator[Any]:
     """Open Gmsh with an empty model, and close it when the `with` block ends or raises.
 
     Gmsh prints nothing and uses one thread. Ctrl-C takes effect at the end of the block; a second
@@ -259,8 +262,9 @@ def _square_loop(geo: Any, size: float) -> int:
 def _spline_steps(outline: Outline) -> int:
     """Return the number of steps of the spline through each quarter of an outline, a multiple of 4.
 
-    It is about four for a radian by which the outline turns where it bends most, so that the spline
-    keeps lobes apart, and at least 16 and at most 128. Vertices are put on the outline itself
+    It is 4 ⌈q⌉, at least 16 and at most 128, with q the largest ratio on the outline of the
+    distance from the centre and the bend radius. So there are about four steps for a radian by
+    which the outline turns, which keeps lobes apart. Vertices are put on the outline itself
     afterwards.
 
     Args:
@@ -334,7 +338,10 @@ def particle_grading(outline: Outline, radius: float) -> Sizes:
     half_height = radius * unit.half_height
     min_distance = radius * unit.min_distance
 
-    def over_nominal(x: float, y: float) -> float:  # Gmsh asks a point at a time: no NumPy
+    def over_nominal(x: float, y: float) -> float:
+        """Return the edge length at a point over the nominal one, in (0, 1]."""
+        # Gmsh asks for a point at a time, where NumPy would be slower. The cell's sides are at ±1,
+        # and the outline's extents are symmetric.
         x, y = abs(x), abs(y)
         by_distance = PER_RADIUS * max(hypot(x, y), min_distance)
         # Width of the gap to the cell's side. At the height y beside a circle of the radius a it is

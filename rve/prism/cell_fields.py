@@ -121,7 +121,8 @@ class CellFields:
             where diagonals of the division have their midpoints, come last among the points. Their
             coordinates and values are interpolated as in the prism, and their `node` is −1.
         """
-        # Sides that two prisms share get one number, by their corners.
+        # `SIDES` has the four corners and then the four edge midpoints of each of the three
+        # rectangular sides. Sides that two prisms share get one number, by their corners.
         prism_sides = self.cells[:, SIDES].reshape(-1, 8)
         corners = np.sort(prism_sides[:, :4], axis=1)
         _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
@@ -138,10 +139,17 @@ class CellFields:
         sides = prism_sides[first]
 
         def with_centres(values: Array) -> Array:
-            """Append the values at the centres of sides to those at points, along the first axis.
+            """Append the values at the centres of the prisms' sides to those at points.
 
-            There the serendipity shape functions are 1/2 at the four midpoints of a side's edges
-            and −1/4 at its four corners.
+            `sides` has the corners and then the edge midpoints of each rectangular side, shape
+            (sides, 8). At the centre the serendipity shape functions are 1/2 at the four midpoints
+            and −1/4 at the four corners.
+
+            Args:
+                values: Values at the n points, shape (n, …).
+
+            Returns:
+                New array of shape (n + sides, …).
             """
             at_midpoints = values[sides[:, 4:]].sum(axis=1) / 2
             at_corners = values[sides[:, :4]].sum(axis=1) / 4

@@ -30,8 +30,8 @@ def solved_fields(
         options: PETSc's options of the linear solver.
 
     Returns:
-        Displacements and stresses for each load at the nodes; nodes where phases meet stand once
-        for each phase.
+        Total displacements in halves of the cell's side and stresses in Pa for each load at the
+        nodes; nodes where phases meet stand once for each phase.
 
     Raises:
         ConvergenceError: The linear solver did not reach its tolerance.

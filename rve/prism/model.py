@@ -219,13 +219,19 @@ class PrismModel(CellModel):
     ) -> CellFields:
         """Solve the cell for one inclusion, and return displacements and stresses at the nodes.
 
+        The macroscopic strains (ε11, ε22, 2 ε12) are (0.01, 0.01, 0) and (0, 0, 0.02), and also
+        (0.01, −0.01, 0) if the model solves for the whole stiffness, a phase is anisotropic or the
+        particle is no circle.
+
         Args:
-            radius_map: Radius r(θ) of the particle, with the distribution of θ.
+            radius_map: Radius r(θ) of the particle, in halves of the cell's side, with the
+                distribution of θ.
             matrix: Material outside the particle.
             inclusions: A list with the material of the particle.
 
         Returns:
-            Fields under the model's two or three macroscopic strains.
+            Total displacements, in halves of the cell's side, and stresses in Pa for each of these
+            strains. Nodes of the interface stand twice, once for each phase.
 
         Raises:
             RefusedError: There is not exactly one inclusion, an argument is of the wrong kind, a

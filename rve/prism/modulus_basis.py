@@ -174,9 +174,14 @@ def _products(matrix: PETSc.Mat, fields: Array) -> Array:
 
 
 def _energies(preconditioner: ThetaPreconditioner, residuals: Array) -> Array:
-    """Return rᵀ P⁻¹ r of residuals r, shape (fields, size), about the energy of their error."""
-    # The error of a field is K⁻¹ r, and its energy rᵀ K⁻¹ r. P⁻¹ is near K⁻¹, which would take a
-    # further solution.
+    """Return estimates rᵀ P⁻¹ r of the energy of the errors that residuals r show, shape (fields,).
+
+    Args:
+        preconditioner: P⁻¹, set up; it is near the inverse K⁻¹ of the stiffness.
+        residuals: Residuals, shape (fields, unknowns).
+    """
+    # The error of a field is K⁻¹ r, and its energy rᵀ K⁻¹ r, for which K would have to be solved.
+    # The preconditioner takes vectors of several fields, one after another.
     r = PETSc.Vec().createWithArray(residuals.ravel(), comm=PETSc.COMM_SELF)
     corrections = r.duplicate()
     preconditioner.apply(None, r, corrections)

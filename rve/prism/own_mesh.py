@@ -118,6 +118,10 @@ class _NamedModel(NamedPhasesModel):
             law: Distribution of the random number θ.
             phases: Materials by name, as for `solve`.
 
+        Returns:
+            Total displacements, in halves of the cell's side, and stresses in Pa for each load.
+            Nodes where phases meet stand once for each phase.
+
         Raises:
             MeshError: The file holds no mesh of a cell of prisms.
             RefusedError: The file, the distribution, the phases, the level set or an option of

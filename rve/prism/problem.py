@@ -58,9 +58,12 @@ class SliceStrains:
         """Return integrals over no part of the cell, to which `add` adds those over triangles.
 
         Args:
-            rule: Nodes and weights of the slices in θ.
+            rule: Nodes and weights in θ; a slice is the plane cell at one node.
             phases: Number of phases.
             fields: Number of strain fields.
+
+        Returns:
+            θ and weights of the slices, and zeros for mean strains, area fractions and products.
         """
         slices = len(rule.nodes)
         return cls(
@@ -324,16 +327,19 @@ class PrismProblem:
         return values
 
     def assemble(self, stiffness: Sequence[Array]) -> PETSc.Mat:
-        """Assemble the reduced stiffness of eq. 7 and return it.
+        """Assemble the reduced stiffness Pᵀ A P of a(u, v) = ∫ f_Θ C ε(u) : ε(v) dx dθ.
 
-        Each call overwrites and returns the same matrix. The stiffness of the phases stays set in
-        the form, where `loads` takes it from.
+        P leads from the unknowns (periodic, zero at one corner) to displacements of nodes; f_Θ is
+        the density of θ. Each call overwrites and returns the same matrix. The stiffness of the
+        phases stays set in the form, where `loads` takes it from.
 
         Args:
-            stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each,
-                in Pa, in the order of the grid's names (of a level set matrix, inclusion).
+            stiffness: Stiffness C of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3)
+                each, in Pa, in the order of the grid's names (of a level set matrix, inclusion).
         """
-        at_points = np.tensordot(self._phases, np.array(stiffness), axes=(0, 0))  # eq. 13
+        # `_phases` is 1 in the phase and 0 else, shape (phases, prisms, 1, 1), or of a level set
+        # (phases, prisms, slices, points). The sum picks the phase's stiffness (eq. 13).
+        at_points = np.tensordot(self._phases, np.array(stiffness), axes=(0, 0))
         self._elastic.stiffness.x.array[:] = at_points.ravel()
         self._elastic.assemble(self.matrix)
         return self.matrix
@@ -405,11 +411,12 @@ class PrismProblem:
 def solve_over_prisms(
     problem: PrismProblem, stiffness: Sequence[Array], strains: Array, *, options: SolverOptions
 ) -> Solved:
-    """Solve the cell problem (eq. 7) over prisms under some macroscopic strains, and average.
+    """Solve the cell problem over prisms under some macroscopic strains, and average over slices.
 
-    It is for several MPI ranks, meshes from files, level sets and preconditioners that need a
-    matrix with entries. Without these, assembly over slices (`slices.solve_sample`) is the default
-    and faster.
+    Sought is the periodic u, zero at one corner, with ∫ f_Θ C (ε̄ + ε(u)) : ε(v) dx dθ = 0 for all
+    such v (eq. 7), f_Θ the density of θ. A slice is the plane cell at one quadrature point of θ.
+    The function is for several MPI ranks, meshes from files, level sets and preconditioners that
+    need a matrix with entries; else assembly over slices (`slices.solve_sample`) is the default.
 
     Args:
         problem: Mesh, constraint and form, moved to the radius map. Its stiffness matrix is
@@ -420,7 +427,7 @@ def solve_over_prisms(
         options: PETSc's options, with those of the default solver.
 
     Returns:
-        Mean strains of each phase on each slice of θ for each load, iterations for each load, the
+        Mean strains of each phase on each slice for each load, iterations for each load, the
         largest relative residual, and the number of unknowns.
 
     Raises:

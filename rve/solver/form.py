@@ -34,6 +34,9 @@ def virtual_work(stiffness: Any, strain_of_u: Any, v: Any, weight: Any) -> Any:
         strain_of_u: UFL vector ε = (ε11, ε22, 2 ε12) of the trial function, or a constant strain.
         v: Test function of two components.
         weight: UFL scalar or number.
+
+    Returns:
+        UFL scalar weight · (C ε) · ε(v), to be multiplied by a measure.
     """
     stress = stiffness * strain_of_u  # eq. 6: σ = C ε in Voigt order
     return weight * ufl.dot(stress, strain(v))

@@ -175,8 +175,8 @@ def solve(
         guesses: First guess of each solution; zero if not given.
 
     Returns:
-        A new vector for each load, the iterations for each load, and the largest |K x − f| over
-        |f|, which is computed anew from the solutions.
+        A new vector for each load, the iterations for each load, and the largest |K x − f| / |f|,
+        computed anew from the solutions; of n loads at once it is the root of the sum of squares.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.

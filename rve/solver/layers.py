@@ -54,15 +54,19 @@ class LayerConstraint:
         self.unknown = numbering.planar[plane_node]
 
     def displacements(self, unknowns: Array) -> Array:
-        """Return Q x_k of all layers k, where x_k are the unknowns that belong to the layer.
+        """Return displacements of the slices of all layers k, which are Q x_k.
+
+        x_k are the unknowns of the two levels and the mid-level of the layer. The matrix Q leads
+        from them to the displacements of DOLFINx's nodes on the slices: periodic, zero at one
+        corner, interpolated along θ. It is the same for all layers.
 
         Args:
             unknowns: Unknowns of several fields, shape (fields, unknowns), level by level: of level
                 0, of the mid-level above it, of level 1, and so on. At least one field.
 
         Returns:
-            Displacements of DOLFINx's nodes on the slices, shape (fields, layers, 2 nodes), with
-            both components of a node after one another.
+            Displacements, shape (fields, layers, 2 nodes), with both components of a node after one
+            another.
         """
         # The unknowns of a layer follow one another, and those of the level above it are also the
         # first ones of the next layer: x_k are overlapping windows of x.
@@ -72,7 +76,10 @@ class LayerConstraint:
         return np.array(products.getDenseArray().T).reshape(*windows.shape[:2], -1)
 
     def forces(self, on_slices: Array) -> Array:
-        """Return the sum of Qᵀ f_k over the layers k, the reduced forces.
+        """Return the reduced forces Σ_k Qᵀ f_k of forces f_k on the slices of each layer k.
+
+        The matrix Q leads from the unknowns of a layer (of its two levels and its mid-level) to the
+        displacements of DOLFINx's nodes on its slices.
 
         Args:
             on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes), with both
@@ -197,12 +204,13 @@ class LayerPattern:
         """Yield the diagonal blocks of the stiffness in the basis of the preconditioner.
 
         First come the blocks of the piecewise linear hat functions of θ, one at each level, then
-        those of the quadratic bubble functions, one in each layer. A block is Bᵀ A B over the
-        layers where the function is not zero.
+        those of the quadratic bubble functions, one in each layer. A block is the sum over the
+        layers of the stiffness of the slices, weighted by the squared function and with periodic
+        partners added up.
 
         Args:
-            blocks: Blocks of 2 × 2 entries, row by row, of the matrices A_k of all layers, shape
-                (layers, blocks, 4).
+            blocks: Blocks of 2 × 2 entries, row by row, of the stiffness matrices of the slices of
+                each layer, shape (layers, blocks, 4), layers at least 1.
 
         Yields:
             Matrix in CSR of all unknowns of a plane, or for bubbles of those of its vertices. The
@@ -232,10 +240,12 @@ class LayerMatrix:
         self._layers = pattern.block_diagonal(blocks)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Set y to K x, with K = Σ Qᵀ A_k Q; called by PETSc.
+        """Set y to K x, with K = Σ_k Qᵀ A_k Q; called by PETSc.
 
-        Several x may stand one after another in a vector. They are multiplied together, which takes
-        little longer than one of them, since matrices are read once.
+        A_k is the stiffness of the slices of layer k, and Q leads from the unknowns of a layer to
+        the displacements of its slices. Several x may stand one after another in a vector. They are
+        multiplied together, which takes little longer than one of them, since matrices are read
+        once.
 
         Args:
             x: One or several vectors of unknowns, level by level.

@@ -42,8 +42,10 @@ class Elimination:
         self, pairs: Ints, cells: Ints, rows: range, size: int, comm: MPI.Intracomm
     ) -> None:
         self._num_nodes = len(pairs)
-        self._sizes = (len(rows), size)  # on this rank, and on all
-        self._map = PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
+        self._local_and_global_size = (len(rows), size)  # of this rank, and of all
+        self._local_to_global = PETSc.LGMap().create(
+            pairs.astype(PETSc.IntType), bsize=2, comm=comm
+        )
         self.matrix = self._zero_matrix(cells, rows)
 
         # Values of the unknowns of this rank's nodes are fetched from the ranks that own them.
@@ -66,7 +68,7 @@ class Elimination:
             This rank's rows of the matrix, marked as symmetric positive definite. Entries at held
             nodes are dropped when they are added by local numbers.
         """
-        num_pairs = self._sizes[1] // 2
+        num_pairs = self._local_and_global_size[1] // 2
         has_unknown = cells >= 0
         all_cells = np.arange(len(cells))[:, np.newaxis]
         cell = np.broadcast_to(all_cells, cells.shape)[has_unknown]
@@ -80,24 +82,32 @@ class Elimination:
 
         blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
         bsr = blocks, neighbours.indices, neighbours.indptr
-        pattern = sp.bsr_matrix(bsr, shape=self._sizes).tocsr()
+        pattern = sp.bsr_matrix(bsr, shape=self._local_and_global_size).tocsr()
         indptr = pattern.indptr.astype(PETSc.IntType)
         indices = pattern.indices.astype(PETSc.IntType)
-        matrix = PETSc.Mat().createAIJ((self._sizes, self._sizes), bsize=2, comm=self._map.comm)
+        matrix = PETSc.Mat().createAIJ(
+            (self._local_and_global_size, self._local_and_global_size),
+            bsize=2,
+            comm=self._local_to_global.comm,
+        )
         matrix.setPreallocationCSR((indptr, indices, np.zeros(pattern.nnz)))
-        matrix.setLGMap(self._map, self._map)
+        matrix.setLGMap(self._local_to_global, self._local_to_global)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix
 
     def forces(self, values: Array) -> PETSc.Vec:
         """Return the reduced forces Pᵀ f: forces on periodic partners and of ranks are added.
 
+        The matrix P leads from the unknowns to the displacements of nodes. All ranks must call.
+
         Args:
             values: Forces on this rank's nodes, shape (2 nodes,), with both components of a node
                 after one another. Forces on held nodes are left out.
         """
-        vector = PETSc.Vec().createMPI(self._sizes, bsize=2, comm=self._map.comm)
-        vector.setLGMap(self._map)
+        vector = PETSc.Vec().createMPI(
+            self._local_and_global_size, bsize=2, comm=self._local_to_global.comm
+        )
+        vector.setLGMap(self._local_to_global)
         nodes = np.arange(self._num_nodes, dtype=PETSc.IntType)
         vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
         vector.assemble()

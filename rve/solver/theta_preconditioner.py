@@ -325,8 +325,8 @@ def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.cs
         its vertices.
     """
     # A hat has half of its value on the mid-level below too. Below the first level of this rank
-    # that mid-level belongs to another rank, so that its unknowns are taken as well.
-    # The submatrix on this rank alone then has all entries of its products Tᵀ K T.
+    # that mid-level belongs to another rank, so that its unknowns are taken as well. The submatrix
+    # on this rank alone then has all entries of its products Tᵀ K T.
     rows = numbering.rows
     first = max(0, rows.start - numbering.mid_level_size)
     size = rows.stop - first
@@ -348,6 +348,9 @@ def injection(numbering: LevelNumbering) -> sp.csr_matrix:
     A vertex keeps its own displacement, a midpoint gets the mean of the vertices of its edge, where
     a held vertex counts as zero.
 
+    Args:
+        numbering: Numbers of the unknowns of a plane, with its six-node triangles.
+
     Returns:
         Sparse matrix from the unknowns of the vertices of a plane to those of all its nodes, two at
         each.
@@ -366,6 +369,9 @@ def interpolated_vertices(numbering: LevelNumbering) -> Ints:
     Vertices and nodes are given by the numbers of their pairs of unknowns, under which vertices
     come first. A vertex has itself twice, a midpoint of an edge the two ends of the edge, and −1
     stands for an end that is held.
+
+    Args:
+        numbering: Numbers of the unknowns of a plane, with its six-node triangles.
     """
     plane = numbering.grid.plane
     unknown = numbering.planar

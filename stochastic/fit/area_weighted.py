@@ -93,8 +93,12 @@ class AreaWeighted:
         """Return the smallest value with at least this fraction of the area at or below it.
 
         Args:
-            fraction: Fractions, any shape. Those of 0 or less give the smallest value, and those of
-                1 or more the largest one. 1e-12 is allowed for rounding of the cumulated weights.
+            fraction: Fractions of the area (of the volume for spheres), any shape. Those of 0 or
+                less give the smallest value, and those of 1 or more the largest one. 1e-12 is
+                allowed for rounding of the cumulated weights.
+
+        Returns:
+            Values of the sample, in the shape of `fraction`.
         """
         # The first value at which the cumulated weight reaches the fraction
         row = np.searchsorted(self.cumulated, np.asarray(fraction) - 1e-12)
@@ -116,10 +120,10 @@ class AreaWeighted:
         return float(lower), float(upper)
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
-        """Return a new sample of the values within limits of r_n, the weights scaled to the sum 1.
+        """Return a new sample of the values within limits, the weights scaled to the sum 1.
 
         Args:
-            lower: Lower limit; a value that is equal to it is kept.
+            lower: Lower limit of the reduced radius r_n; a value that is equal to it is kept.
             upper: Upper limit; likewise.
 
         Raises:

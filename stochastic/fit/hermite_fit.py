@@ -56,10 +56,11 @@ class HermiteFit:
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
         """Return the slopes a2, a4 of the monotone cubic H nearest to a sample.
 
-        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, with Q the quantile function of the sample and
-        F_Θ, f_Θ the distribution function and the density of θ. H(θ) = a1 h1 + a2 h2 + a3 h3 + a4
-        h4 with the Hermite functions of ξ from 0 to 1 over the support of θ; a1 and a3 are its
-        ends, a2 and a4 the slopes dH/dξ there.
+        H = a1 h1 + a2 h2 + a3 h3 + a4 h4 with h1 = 1 − 3 ξ² + 2 ξ³, h2 = ξ − 2 ξ² + ξ³, h3 = 3 ξ² −
+        2 ξ³ and h4 = ξ³ − ξ², where ξ runs from 0 to 1 over the support of θ: a1 and a3 are the
+        values of H at its ends, a2 and a4 the slopes dH/dξ there. The distance is ∫ (Q(F_Θ(θ)) −
+        H(θ))² f_Θ dθ, with Q the quantile function of the sample and F_Θ, f_Θ the distribution
+        function and the density of θ.
 
         Args:
             sample: Reduced radii between the limits a1 and a3, with rising values.
@@ -107,11 +108,12 @@ class HermiteFit:
         return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
 
     def _integrals(self, probability: Array) -> Array:
-        """Return integrals ∫ h_i f_Θ dθ from the lower end of θ to quantiles.
+        """Return integrals ∫ h_i f_Θ dθ of two cubics from the lower end of θ to quantiles.
 
-        h_i are the Hermite functions h2 and h4, which the slopes a2 and a4 multiply. The moments
-        m_k = ∫ θ^k f_Θ dθ follow from each other by partial integration. With f' = −θ f of a normal
-        density, m_k = (k − 1) m_{k−2} − [θ^{k−1} f].
+        They are h2 = ξ − 2 ξ² + ξ³ and h4 = ξ³ − ξ², which the slopes a2 and a4 of a map multiply,
+        with ξ from 0 to 1 over the support of θ. The moments m_k = ∫ θ^k f_Θ dθ follow from each
+        other by partial integration. With f' = −θ f of a normal density, m_k = (k − 1) m_{k−2} −
+        [θ^{k−1} f].
 
         Args:
             probability: Probabilities of the quantiles, in [0, 1], shape (n,).
@@ -136,8 +138,9 @@ class HermiteFit:
     def _hermite_at_nodes(self) -> tuple[Array, Array]:
         """Weights, shape (8,), of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8).
 
-        h1 … h4 are the Hermite cubics of ξ in [0, 1], which runs over the support of θ. The rule is
-        exact for polynomials of degree 15, and products of two cubics have degree 6.
+        These are h1 = 1 − 3 ξ² + 2 ξ³, h2 = ξ − 2 ξ² + ξ³, h3 = 3 ξ² − 2 ξ³ and h4 = ξ³ − ξ², with
+        ξ from 0 to 1 over the support of θ. The rule is exact for polynomials of degree 15, and
+        products of two cubics have degree 6.
         """
         rule = gauss_rule(self.distribution, points=8)
         width = self.distribution.upper - self.distribution.lower
@@ -183,8 +186,8 @@ class HermiteFit:
 
         The distance is the root of the mean square over θ. With the Gram matrix L Lᵀ of the
         functions that a2 and a4 multiply and x = Lᵀ (slopes − best), this is the shortest x with G
-        x ≥ h, a row for each of 401 ξ at which the slope of the map must not fall below a small
-        limit. It follows from a problem of non-negative least squares (least distance programming:
+        x ≥ h, a row for each of 401 even ξ in [0, 1] at which dr/dξ must be at least 2e-5 (a3 −
+        a1). It follows from a problem of non-negative least squares (least distance programming:
         Lawson, Hanson 1974, chapter 23).
         """
         from scipy.optimize import nnls
@@ -341,11 +344,12 @@ class PBox:
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
-    """Return the p-box of least area that contains a sample of r_n and the map fitted to it.
+    """Return the p-box of least area that contains a sample and the map fitted to it.
 
-    A p-box is the region between two distribution functions: here those of the cubic maps r(θ) with
-    the smallest and with the largest radii that slopes a2 and a4 in two intervals (the supports)
-    give. The supports are the solution of a linear program in their ends.
+    The sample is of reduced radii r_n, the radius of a particle over half the side of a square or
+    cube as large as its cell. A p-box is the region between two distribution functions: here those
+    of the cubic maps r(θ) with the smallest and with the largest radii that slopes a2 and a4 in two
+    intervals (the supports) give. The supports are the solution of a linear program in their ends.
 
     Args:
         fit: Ends a1 and a3 of the map, which are the limits of r_n, and distribution of θ.
@@ -401,19 +405,21 @@ def least_pbox(
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
     """Return inequalities A x ≤ b by which a p-box contains the band around a sample.
 
-    At each step of the sample's distribution function the largest radius must reach the value where
-    the lower edge of the band rises, and the smallest radius must not pass the value where the
-    upper edge does. Steps at which an edge is below 0 or above 1 give no inequality.
+    A p-box is the region between the distribution functions of the smallest and of the largest
+    radius. At each step of the sample's distribution function the largest radius must reach the
+    value where the lower edge of the band rises, and the smallest radius must not pass the value
+    where the upper edge does. Steps at which an edge is below 0 or above 1 give no inequality.
 
     Args:
-        fit: Ends a1 and a3 of the map and distribution of θ.
+        fit: Ends a1 and a3 of the cubic map r = a1 h1 + a2 h2 + a3 h3 + a4 h4 and distribution of
+            θ.
         sample: Reduced radii within the ends.
         band: Half-width of the band around the sample's distribution function, in probability, in
             [0, 1).
 
     Returns:
-        A of shape (inequalities, 4), for x = (a2 lower, a2 upper, a4 lower, a4 upper), and b of
-        shape (inequalities,).
+        A of shape (inequalities, 4), for the ends x = (a2 lower, a2 upper, a4 lower, a4 upper) of
+        the supports of both slopes, and b of shape (inequalities,).
     """
     # The p-box's function of the largest radius may exceed the sample's function before a step by
     # the band, so that its quantile at this probability is the step's value or more. Likewise the

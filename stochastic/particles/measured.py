@@ -35,19 +35,23 @@ def read_particles(
 ) -> Particles:
     r"""Read the circles of a section from a CSV file, or find them in an image of it.
 
+    Exactly one of `size` and `pixel` is given, and says which of the two the file is.
+
     Args:
         path: CSV file with the columns ``x [mm], y [mm], r [mm]`` (or d, a diameter), where `size`
             is given; image of round particles of one brightness in a matrix of another, where
             `pixel` is.
-        size: Width and height of the section, a window with a corner at the origin, in m.
-        pixel: Side of a pixel, in m.
+        size: Width and height of the section, a window with a corner at the origin, in m, positive.
+        pixel: Side of a pixel, in m, from 1e-12 to 1.
 
     Returns:
-        The circles, in m from the section's corner.
+        The circles in a window that is not periodic: centres in m from the lower left corner of the
+        section, radii in m. Particles of an image that its edge cuts are left out.
 
     Raises:
-        RefusedError: The file cannot be read, circles leave the section or overlap, or the image
-            hides its particles; or not one of `size` and `pixel` is given.
+        RefusedError: The file cannot be read; a circle has a wrong unit, leaves the section or
+            overlaps another one; the image hides its particles or more than 2 % of their area is
+            not round; or not exactly one of `size` and `pixel` is given, or it is out of range.
 
     Example:
         >>> from pathlib import Path

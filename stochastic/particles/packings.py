@@ -123,9 +123,9 @@ def pack(
         FailedError: The particles still overlap after all steps.
 
     Example:
-            >>> sections = pack(50, packings=3, fraction=0.2, radii=(1e-3, 4e-3), seed=1)
-            >>> len(sections), len(sections[0]), round(sections[0].fraction, 3)
-            (3, 50, 0.2)
+        >>> sections = pack(50, packings=3, fraction=0.2, radii=(1e-3, 4e-3), seed=1)
+        >>> len(sections), len(sections[0]), round(sections[0].fraction, 3)
+        (3, 50, 0.2)
     """
     for key, number in {"particles": particles, "packings": packings, "seed": seed}.items():
         checked_number(key, number, whole=True, positive=key != "seed")

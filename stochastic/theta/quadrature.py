@@ -80,10 +80,10 @@ def gauss_rule(distribution: ThetaDistribution, *, points: int) -> ThetaRule:
             disagree.
 
     Example:
-            >>> from alphacut.stochastic import TruncatedNormal
-            >>> rule = gauss_rule(TruncatedNormal(), points=3)
-            >>> rule.mean(rule.nodes**2).round(4).item()
-            0.9733
+        >>> from alphacut.stochastic import TruncatedNormal
+        >>> rule = gauss_rule(TruncatedNormal(), points=3)
+        >>> rule.mean(rule.nodes**2).round(4).item()
+        0.9733
     """
     checked_number("points", points, whole=True, least=1)
     # An object that is compared by identity would keep its place in the cache for itself alone.
@@ -214,7 +214,7 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     Args:
         nodes: At least two rising nodes, shape (n,).
         values: Values at the nodes, shape (n,).
-        at: Points, any shape. Beyond the nodes the interpolation is continued.
+        at: Points, at least one, any shape. Beyond the nodes the interpolation is continued.
 
     Returns:
         Values at the points, in the shape of `at`.

@@ -374,7 +374,7 @@ def _meshes() -> list[Format]:
         return []
 
     def write(path: Path, version: float, binary: int) -> None:
-        with square.model() as gmsh:
+        with square.open_gmsh() as gmsh:
             gmsh.merge("meshes/paper-coarse.msh")
             gmsh.option.setNumber("Mesh.MshFileVersion", version)
             gmsh.option.setNumber("Mesh.Binary", binary)

@@ -75,7 +75,7 @@ def test_gmsh_takes_no_settings_of_the_caller(tmp_path):
     (tmp_path / ".gmshrc").write_text("Mesh.ElementOrder = 3;\nGeometry.Tolerance = 0.1;\n")
     program = """
 from alphacut.rve.mesh import square
-with square.model() as gmsh:
+with square.open_gmsh() as gmsh:
     print(gmsh.option.getNumber("Mesh.ElementOrder"), gmsh.option.getNumber("Geometry.Tolerance"))
 """
     variables = os.environ | {"HOME": str(tmp_path)}
@@ -91,7 +91,7 @@ def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option(tmp_p
     from alphacut.rve.mesh.msh import parse_msh
     from alphacut.rve.mesh.periodicity import MeshError
 
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         base = gmsh.model.occ.addRectangle(-1, -1, 0, 2, 2)
         made = gmsh.model.occ.extrude([(2, base)], 0, 0, 1, numElements=[1], recombine=True)
         gmsh.model.occ.synchronize()

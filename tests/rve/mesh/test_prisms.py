@@ -74,7 +74,7 @@ def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused(
         gmsh.write(str(tmp_path / "cell.msh"))
         return read_prisms(parse_msh((tmp_path / "cell.msh").read_bytes()))
 
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", is_binary)
         gmsh.option.setNumber("Mesh.SaveAll", 1)
@@ -93,7 +93,7 @@ def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused(
 
 
 def test_a_mesh_of_plane_triangles_is_told_to_make_prisms(tmp_path):
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         surface = square.surfaces(0.5, 0.0, circle)[0]
         gmsh.model.addPhysicalGroup(2, [surface], name="matrix")
         gmsh.model.mesh.generate(2)
@@ -110,7 +110,7 @@ def test_the_rule_of_prisms_prints_in_full_since_forms_are_told_apart_by_that():
 
 @pytest.mark.parametrize("version", [2.2, 4.1])
 def test_a_volume_in_two_groups_is_refused_from_each_version_of_msh(tmp_path, version):
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         surfaces = [(2, square.surfaces(1.0, 0.0, circle)[0])]
         gmsh.model.geo.extrude(surfaces, 0, 0, 1, numElements=[1], recombine=True)
         gmsh.model.geo.synchronize()

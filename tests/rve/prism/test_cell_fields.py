@@ -41,7 +41,7 @@ def particle_volume():
 
 @pytest.mark.parametrize("written", [".msh"], indirect=True)
 def test_gmsh_reads_its_jacobians_groups_and_fields(written):
-    with square.model() as gmsh:
+    with square.open_gmsh() as gmsh:
         gmsh.open(str(written))
         points, weights = gmsh.model.mesh.getIntegrationPoints(18, "Gauss4")
         sums = {}
