@@ -145,7 +145,8 @@ def convolve(
     of its degree in the order of `monomials(d, degree)`; a coefficient is an array itself.
 
     Args:
-        a: Coefficients of the first one, shape (monomials, *shape of a coefficient).
+        a: Coefficients of the first one, shape (monomials, *shape of a coefficient); there is at
+            least one monomial.
         b: Coefficients of the second one. Coefficients of both have equally many axes.
         degrees: Degrees of both.
         d: Number of variables.
@@ -203,9 +204,9 @@ def product_part(
     """Return the homogeneous part of one degree of the product of two polynomials.
 
     Args:
-        a: Homogeneous parts of the first polynomial by degree, from 0; missing ones are zero. A
-            part has the shape (monomials of the degree, *shape of a coefficient), in the order of
-            `monomials(d, degree)`.
+        a: Homogeneous parts of the first polynomial by degree, from 0, at least one; those of
+            higher degrees are zero. A part has the shape (monomials of the degree, *shape of a
+            coefficient), in the order of `monomials(d, degree)`.
         b: Those of the second one.
         degree: Degree of the part that is returned.
         d: Number of variables.

@@ -169,9 +169,9 @@ def recording_in_si(
         samples: The samples, shape (n,).
         channel: Name of the channel in the file.
         remarks: Clauses on what is unusual in the file.
-        stated: Peaks in the file's head. If the peak of the samples is none of them by more than 5
-            %, the recording bears a remark; by more than a factor of 2 from all of them, it is
-            refused.
+        stated: Peaks in the file's head. If each of them differs from the peak of the samples by
+            more than 5 %, the recording bears a remark; if each does so by more than a factor of 2,
+            it is refused.
 
     Returns:
         The recording, with samples in m/s².

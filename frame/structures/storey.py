@@ -577,10 +577,10 @@ class StoreyFrame(LinearSystem):
     def stability_coefficients(self, ends: Mapping[str, tuple[float, float]]) -> Array:
         """Return the largest P_z / (k_z l_z) of each storey in a box of parameters, shape (n,).
 
-        P_z is the weight of all floors above storey z, under the frame's own gravity, or standard
-        gravity if it has none; k_z is the stiffness and l_z the height of the storey. Below 0.1
-        second-order effects may be neglected (EN 1998-1, 4.4.2.2, where the storey is elastic);
-        from 1 on the storey buckles.
+        P_z is the weight that storey z carries, of the floor on it and all above, under the frame's
+        own gravity, or standard gravity if it has none; k_z is the stiffness and l_z the height of
+        the storey. Below 0.1 second-order effects may be neglected (EN 1998-1, 4.4.2.2, where the
+        storey is elastic); from 1 on the storey buckles.
 
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
@@ -594,8 +594,8 @@ class StoreyFrame(LinearSystem):
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
         """Raise an error if the weight buckles a storey somewhere in a box of parameters.
 
-        A storey z stands if its stiffness k_z is more than P_z / l_z, with the weight P_z of all
-        floors above and its height l_z. A frame without gravity stands always.
+        A storey z stands if its stiffness k_z is more than P_z / l_z, with the weight P_z of the
+        floor on it and all above, and its height l_z. A frame without gravity stands always.
 
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
@@ -616,15 +616,15 @@ class StoreyFrame(LinearSystem):
     def _worst_storeys(self, ends: Mapping[str, tuple[float, float]]) -> _Storeys:
         """Return the storeys where k_z l_z / P_z is smallest over a box of parameters.
 
-        Here k_z is the stiffness of storey z, l_z its height, and P_z the weight of all floors
-        above it. All storeys have their smallest ratio at one corner of the box.
+        Here k_z is the stiffness of storey z, l_z its height, and P_z the weight of the floor on it
+        and all above. All storeys have their smallest ratio at one corner of the box.
 
         Args:
             ends: Lower and upper end of parameters in SI units, by name; others are nominal.
 
         Returns:
             Arrays of shape (n,), from below: `stiffness`, k_z in N/m at that corner, and
-            `mass_over_height`, the mass of all floors above storey z over l_z, in kg/m.
+            `mass_over_height`, the mass that storey z carries over l_z, in kg/m.
 
         Raises:
             KeyError: The frame has no lengths.
