@@ -145,10 +145,11 @@ class CriticalMeasures:
     def from_demands(cls, records: Sequence[Increments], name: str) -> CriticalMeasures:
         """Return the critical measures of a frame that yields, from the measures that were tried.
 
-        The first crossing, from which on some structure of the cut exceeds the limit, lies between
-        `low` and `low_reached`: the last measure without and the first one with an exceedance. The
-        last non-exceedance, from which on all structures that were tried exceed it, lies between
-        `high_reached` and `high`. What lies beyond the largest measure is infinite.
+        The first crossing is the smallest measure at which some structure of the cut exceeds the
+        limit. It lies between `low_reached`, the smallest one at which this was seen, and `low`,
+        the measure tried before it. The last non-exceedance is the largest measure at which some
+        structure keeps the limit. It lies between `high_reached`, the largest one at which this was
+        seen, and `high`, the measure tried after it. A range without end is infinite.
 
         Args:
             records: Demands (peak over limit) under each record at rising measures, at least one.
@@ -774,7 +775,17 @@ def increments_of(
 ) -> Increments:
     """Run the incremental dynamic analysis of a record, and return the demands by name.
 
-    Names are those of the limits and then those of their events.
+    Args:
+        analysis: The analysis of the record, with the same limits and events in the same order.
+        limits: Limits by name. Limits that share an event make up the event of this name.
+        progress: Called with the completed fraction.
+
+    Returns:
+        Peak over limit at the measures that were tried, by the names of the limits and then of
+        their events.
+
+    Raises:
+        RefusedError: A response does not exist.
     """
     measure, demands = analysis.run(progress)  # (2, levels, limits and events, measures)
     names = [*limits, *events_of(limits)]

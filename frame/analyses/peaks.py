@@ -369,7 +369,11 @@ def _inputs_at_peak(band: Envelope, column: int, name: str) -> dict[str, float]:
     # A magnitude is largest at the upper end, or at the lower end with its sign changed.
     upper_end = band.attained.upper[0, :, column], band.upper_at[0, :, column]
     lower_end = -band.attained.lower[0, :, column], band.lower_at[0, :, column]
-    chosen = {"max": [upper_end], "min": [lower_end]}.get(name[:3], [upper_end, lower_end])
+    chosen = [upper_end, lower_end]
+    if name.startswith("max "):
+        chosen = [upper_end]
+    elif name.startswith("min "):
+        chosen = [lower_end]
     values = np.array([value for value, _ in chosen])  # (ends, times)
     points = np.array([point for _, point in chosen])  # (ends, times, inputs)
     is_known = np.isfinite(points).all(axis=-1) & np.isfinite(values)

@@ -266,7 +266,15 @@ def tolerances(
         tried[1.0] = at_one
 
     def peaks_at(scale: float) -> Peaks:
-        """Return the peaks on the supports at a scale by output, and keep them in `tried`."""
+        """Return the peak of each limited output on the supports of all inputs at a scale.
+
+        Peaks are kept in `tried` by their scale, and are computed only if they are not there: from
+        an envelope on the level 0 alone, with an error of `error` of each peak if possible.
+
+        Raises:
+            RefusedError: A response does not exist.
+            FailedError: No bounds are found.
+        """
         if scale not in tried:
             band = envelope(
                 model,

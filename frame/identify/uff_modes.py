@@ -85,6 +85,9 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
             given twice.
         IndexError: A line of the head has too few words.
     """
+    # The sixth line has six codes: of the model, the analysis, the kind of the data (as of a
+    # displacement in three directions), its meaning, the type of its numbers, and their count at a
+    # node.
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
     is_normal = analysis == 2
     is_complex = analysis in (3, 7)

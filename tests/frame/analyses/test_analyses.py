@@ -263,6 +263,14 @@ def test_two_records_of_one_name_are_refused():
         over_records(ONE, {"m1": Interval(900, 1100)}, twice, duration=1, step=0.05)
 
 
+def test_an_output_whose_name_begins_as_minimum_has_the_peak_of_its_magnitude():
+    rows = {"minor": [1.0], "q": [1.0]}
+    model = MatrixStructure({"k": 1e3}, [(1.0, np.eye(1))], [("k", np.eye(1))], rows, q0=[0.1])
+    inputs = {"k": Interval(800, 1200)}
+    found = peaks(envelope(model, inputs, duration=0.05, step=0.01, progress=False))
+    assert found["minor"].reached_at == found["q"].reached_at
+
+
 def test_records_need_a_structure_that_oscillates():
     free = np.array([[1e3, -1e3], [-1e3, 1e3]])
     drifting = MatrixStructure({"k": 1.0}, [(1.0, np.eye(2))], [("k", free)], {"q2": [0.0, 1.0]})
