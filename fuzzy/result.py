@@ -217,10 +217,14 @@ class Bounds:
 
     @cached_property
     def proved(self) -> Ends:
-        """Ends that no value of the output exceeds, by proof; infinite where nothing is proved."""
+        """Ends that no value of an output exceeds, by proof, with the shape of `lower`.
+
+        They are the bounds of guaranteed outputs. Of the others they are the field `outer`, or −inf
+        and inf if it is not known.
+        """
         infinite = np.full(self.lower.shape, np.inf)
         outer = self.outer or Ends(-infinite, infinite)
-        # Of attained and estimated outputs a proof by other means may be known: the ends `outer`.
+        # Another method may have proved something of attained and estimated outputs, too.
         lower = np.where(self._guaranteed, self.lower, outer.lower)
         upper = np.where(self._guaranteed, self.upper, outer.upper)
         return Ends(lower, upper)
@@ -333,9 +337,11 @@ class Bounds:
         """Yield a line of text for each level of an output, with its extremes over time.
 
         A line has the name with its unit, the level, both ends, and what the ends are worth: that
-        the true range may be wider, for attained bounds; their error, for estimated ones; the gap
-        to what is attained, for guaranteed ones. Ends are rounded to six digits, attained ones
-        inwards and others outwards. The nature is added where it is not that of all outputs.
+        the true range may be wider, for attained bounds; their error, for estimated ones; for
+        guaranteed ones the gap to the ends that inputs are known to reach, which is left out where
+        it is not known whether these inputs belong to the set that is meant (`encloses`). Ends are
+        rounded to six digits, attained ones inwards and others outwards. The nature is added where
+        it is not that of all outputs.
 
         Args:
             output: Name of one of the outputs.

@@ -70,12 +70,12 @@ def fit_message(
 
 
 def cure_of(text: str, cures: Mapping[str, str], default: str = "") -> str:
-    """Return the cure of the first regular expression that is found in a text.
+    """Return the hint of the first regular expression that is found anywhere in a text.
 
     Args:
-        text: The text that is refused.
-        cures: Cures by their regular expressions, in the order in which they are tried.
-        default: Cure of a text in which none is found.
+        text: The text that is refused, as a user has written it.
+        cures: Hints what to write instead, by regular expressions, which are tried in this order.
+        default: Hint for a text in which none is found.
     """
     for pattern, cure in cures.items():
         if re.search(pattern, text):

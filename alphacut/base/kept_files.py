@@ -44,7 +44,7 @@ def is_special(path: Path) -> bool:
 
 
 def read_regular(path: Path, size: int = -1) -> bytes:
-    """Return the content of a regular file, or its first `size` bytes.
+    """Return the content of a regular file, or at most its first `size` bytes if that is not −1.
 
     Raises:
         OSError: There is no such file, or it is a link, a device, a pipe or a folder.

@@ -118,7 +118,7 @@ def factor(unit: str, si: str) -> Decimal:
 
     Args:
         unit: The unit as it was written, without blanks at its ends. Only a pure number may have
-            none, and the unit %.
+            none.
         si: SI unit of the dimension, a key of `QUANTITIES`, such as "N"; empty for a pure number.
 
     Raises:
@@ -142,7 +142,16 @@ def factor(unit: str, si: str) -> Decimal:
 
 
 def _factor_by_pint(unit: str, si: str) -> Decimal:
-    """Return the value of one unit in the SI unit `si` by Pint, or raise any exception."""
+    """Return the value of one unit in the SI unit `si` by Pint, such as 4448.2… for "kip" in "N".
+
+    Args:
+        unit: The unit as it was written. Powers need no sign, as in "cm4".
+        si: SI unit of the dimension; for a pure number, which is empty, there is no unit.
+
+    Raises:
+        Exception: The unit is unknown, of another dimension, or one of which Pint has another
+            meaning than people. Pint's parser raises whatever Python's parser raises.
+    """
     # Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds
     refused = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
     if not si or re.search(refused, unit):

@@ -81,7 +81,9 @@ def confused_prefix(word: str) -> str:
 
 
 def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
-    """Return what to write in place of a unit that is none of a dimension; empty if unknown.
+    """Return what to write in place of a unit that is none of a dimension.
+
+    It is a clause such as "did you mean kN?" or "write ft for feet", and empty if no unit is alike.
 
     Args:
         unit: The unit as it was written.
@@ -150,8 +152,11 @@ def _usual_symbol(word: str) -> str:
 
 @cache
 def _symbols_by_letters() -> dict[str, str]:
-    """Return the usual symbol of units by their names and spellings in small letters."""
-    # The symbols as Pint spells them
+    """Return the usual symbols of units, as Pint spells them, by small letters.
+
+    The keys are the symbols themselves, other spellings and abbreviations, and names with or
+    without a prefix, as "kn", "knm" and "kilonewton" for "kN", "kN m" and "kN".
+    """
     usual = (
         "Pa kPa MPa GPa N kN MN GN m mm cm km s ms min h kg t Hz kHz g gal rad deg rpm ft in lb lbf"
         " kip ksi psi J kJ MJ W kgf turn"

@@ -294,7 +294,15 @@ class ResultsFolder:
             partial.write_text(as_json(document, indent=1), encoding="utf-8")
 
     def clear(self) -> None:
-        """Remove every listed file, and empty the list; links are removed, not followed."""
+        """Remove every listed file, and empty the list, which is written to manifest.json.
+
+        Of a link the link is removed, not its target. What cannot be removed stays, without an
+        error; so do files that are not listed, and folders.
+
+        Raises:
+            FailedError: The disk is full.
+            OSError: The list cannot be written.
+        """
         # A file of a listed name belongs to this program, whatever its content is by now.
         for name in self.files:
             self._remove(name)

@@ -90,7 +90,14 @@ class Campaign:
         return self._samples
 
     def output_names(self, domain: Domain) -> tuple[str, ...]:
-        """Evaluate the nominal point, and return the names of all outputs, columns of every sample.
+        """Evaluate the nominal point of the inputs, and return the names of all outputs.
+
+        An output that is an array has a name for each entry, such as "s[0]". The names are in the
+        order of the columns of the samples. The point becomes a sample of the campaign.
+
+        Args:
+            domain: Inputs, whose nominal values have the membership 1, in the order of the names
+                of the function's inputs.
 
         Raises:
             SpentError: The budget is used up, and the point is not among the samples.

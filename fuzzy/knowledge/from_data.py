@@ -118,7 +118,7 @@ def mean_cuts(data: Observations) -> Stepwise:
         data: The sorted values, one or more, and their physical bounds, infinite for none.
 
     Returns:
-        Cuts within the bounds, which are the cut at α = 0. They are exact at the some 980 levels
+        Cuts within the bounds, which are the cut at α = 0. They are exact at the 999 levels
         `LEVELS` from 1e-9 to 1; between two levels the cut of the lower one, the wider one, holds.
 
     Raises:
@@ -147,13 +147,15 @@ def mean_cuts(data: Observations) -> Stepwise:
 
 
 def _stepwise_at_levels(low: float, high: float, *, lower: Array, upper: Array) -> Stepwise:
-    """Return the number with the cut [low, high] at α = 0 and given cuts at the `LEVELS`.
+    """Return the number with the cut [low, high] at α = 0 and given cuts at the 999 `LEVELS`.
+
+    The levels rise from 1e-9 to 1. Each cut holds up to the next level.
 
     Args:
         low: Lower end of the support.
         high: Upper end of the support.
         lower: Lower ends at the `LEVELS`, rising, from `low` on, shape (levels,).
-        upper: Upper ends, falling, up to `high`.
+        upper: Upper ends, falling, from `high` on, shape (levels,).
     """
     levels = tuple(np.append(0.0, LEVELS))
     return Stepwise(levels, tuple(np.append(low, lower)), tuple(np.append(high, upper)))
@@ -161,7 +163,15 @@ def _stepwise_at_levels(low: float, high: float, *, lower: Array, upper: Array) 
 
 @lru_cache(maxsize=64)
 def _band_half_width(n: int) -> Array:
-    """Return the half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1]."""
+    """Return the half width of Smirnov's band at each of the 999 levels α of `LEVELS`.
+
+    The distribution function of a quantity differs from that of n independent values of it, the
+    fraction of values up to x, by no more than the half width at all x, with P ≥ 1 − α.
+
+    Returns:
+        Half widths in [0, 1], falling with α, shape (levels,). They are cached and must not be
+        changed.
+    """
     from scipy.stats import ksone
 
     # The distribution function leaves the band at either side with at most α/2 (Smirnov's one-sided
@@ -181,7 +191,7 @@ def student_cuts(data: Observations) -> tuple[Stepwise, float]:
         data: The sorted values and their physical bounds, infinite for none.
 
     Returns:
-        The cuts, exact at the some 980 levels `LEVELS` from 1e-9 to 1 (in between the next wider
+        The cuts, exact at the 999 levels `LEVELS` from 1e-9 to 1 (in between the next wider
         one holds), and the level from which they hold: 0 with two bounds, else the lowest of the
         `LEVELS`, below which the number repeats that cut.
 
@@ -212,7 +222,7 @@ def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple
     """Clip α-cuts to physical bounds, and make them nested.
 
     Args:
-        lower: Lower ends at the some 980 levels `LEVELS`, from 1e-9 to 1, shape (levels,). At low
+        lower: Lower ends at the 999 levels `LEVELS`, from 1e-9 to 1, shape (levels,). At low
             levels they may be −inf; the last one is finite.
         upper: Upper ends in the same order; they may be inf where the lower ends are −inf.
         bounds: Lower and upper physical bound; −inf and inf where there is none.

@@ -272,10 +272,11 @@ class SingleLinkage:
     def run(self, first: Array) -> None:
         """Search the minimum and the maximum of all outputs in all cuts, from some first samples.
 
-        Each cut is sampled, and descents start from the best samples, in rounds, until the stopping
-        rule of Boender and Rinnooy Kan holds for both bounds of every output or their search is
-        given up. If `outputs` is empty, each cut gets 100 samples and no descents. Results are in
-        `states`, and all samples in the campaign.
+        Each cut is sampled, and descents start from the best samples, in rounds. The search of a
+        bound ends when the expected fraction of the cut in basins that were not seen is below 0.002
+        (Boender and Rinnooy Kan, 1987), or is given up where the best optimum lies at a kink or
+        jump, or 1,000 samples have equal values. If `outputs` is empty, each cut gets 100 samples
+        and no descents. Results are in `states`, and all samples in the campaign.
 
         Args:
             first: Uniform samples of the widest cut in unit coordinates (0 at the lower, 1 at the
@@ -578,7 +579,7 @@ class SingleLinkage:
         Optima are equal if their values differ by no more than the tolerance (1e-5 of the range of
         the output and 1e-9 of its magnitude), and if their inputs differ by up to 1 % of the width
         of the cut or no larger value is found at three points between them. So all ends of descents
-        in a flat valley count as one optimum, and two equal hills as two.
+        in one flat valley count as one optimum, and the bottoms of two valleys as two.
 
         Args:
             cut: The α-cut whose list is searched.

@@ -84,20 +84,36 @@ def _listed_point(x: float, points: list[float], width: float) -> float:
 
 
 def level_grids(domain: Domain, *, inner: bool) -> list[Grid]:
-    """Return the points of the transformation method: for each level a list of points by input.
+    """Return the points of the transformation method for all inputs (Hanss 2005).
 
     Args:
         domain: Inputs and levels.
-        inner: Whether to take points between the ends of the α-cuts, as `hanss_points` does.
+        inner: Whether to take, beside the ends of an α-cut, the midpoints of neighbouring points of
+            the next level up.
+
+    Returns:
+        For each level, from the lowest, a list by input of its points in rising order.
     """
     columns = [hanss_points(x, domain.alpha, inner=inner) for x in domain.inputs.values()]
     return [list(level) for level in zip(*columns, strict=True)]
 
 
 def bounds_at(campaign: Campaign, domain: Domain, points: Array, method: str) -> Bounds:
-    """Evaluate points (n, inputs), equal ones once, and return the bounds that they attain.
+    """Evaluate some points, and return the bounds of the outputs that they attain.
 
+    On each level the bounds are the extremes over the points in its cut, of the nature "attained".
     Samples that the campaign has taken for other reasons do not count.
+
+    Args:
+        campaign: Evaluates the points and keeps them as samples.
+        domain: Inputs and levels; the cut of a level is the box of the α-cuts of all inputs.
+        points: Points, one or more in each cut, shape (n, inputs).
+        method: Name of the method, which is stated in the result.
+
+    Raises:
+        SpentError: The budget does not carry the evaluations.
+        CampaignError: The model failed at some points.
+        ValueError: No point lies in the cut of a level.
     """
     # Levels may share points, and each is evaluated once.
     distinct = np.unique(points, axis=0)

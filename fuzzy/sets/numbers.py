@@ -90,10 +90,15 @@ class FuzzyNumber(ABC):
         return Cut(lower, _interpolate(alpha, cuts.alpha, cuts.upper))
 
     def membership(self, x: ArrayLike) -> Array:
-        """Return the grade of membership μ at some values: 0 outside the support, 1 in the core.
+        """Return the grade of membership μ in [0, 1] at some values.
+
+        It is 0 outside the cut at α = 0, 1 inside the cut at α = 1, and linear between the corners.
 
         Args:
             x: Values of any shape, which the result has, too. It is NaN where `x` is NaN.
+
+        Raises:
+            RefusedError: This is a number of measured values, which do not decide the cut at α = 0.
         """
         cuts = self.cuts
         x = np.asarray(x, float)
@@ -107,6 +112,9 @@ class FuzzyNumber(ABC):
         """Draw the membership function on Matplotlib axes, new ones by default, and return them.
 
         `line` has keywords of `Axes.plot`, such as `color`.
+
+        Raises:
+            RefusedError: This is a number of measured values, which do not decide the cut at α = 0.
         """
         if axes is None:
             axes = new_axes()
