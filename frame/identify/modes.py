@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.frame.structures.storey import StoreyFrame, chain_matrix, diagonal
@@ -258,12 +258,18 @@ def measured_mode(
         of the reference floor.
 
     Raises:
-        RefusedError: Values contradict their deviation, a deviation is not positive, the counts
-            differ, all amplitudes are 0, or that of the reference floor is 0 in a measurement or
-            scatters by more than 20 %.
+        RefusedError: There is no frequency, a value is no finite number, values contradict their
+            deviation, a deviation is not positive, the counts differ, all amplitudes are 0, or that
+            of the reference floor is 0 in a measurement or scatters by more than 20 %.
     """
+    key = f"mode {mode}: frequencies"
+    require_numbers(key, frequencies)
     values = np.asarray(frequencies, float)
-    rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
+    require(values.size > 0, key, value=[], allowed="one or more, in Hz")
+    rows = {}
+    for floor, row in (shapes or {}).items():
+        require_numbers(f"mode {mode}: amplitudes of floor {floor}", row)
+        rows[floor] = np.asarray(row, float)
     counts = [row.size for row in rows.values()]
     are_alike = values.ndim == 1 and not set(counts) - {values.size}
     allowed = f"{values.size} of each floor, as many as frequencies"
@@ -271,7 +277,7 @@ def measured_mode(
     deviation = None
     if frequency_deviation is not None:
         deviation = frequency_deviation * float(values.mean())
-    frequency = _mean(values, deviation, f"mode {mode}: frequencies", "frequency_deviation")
+    frequency = _mean(values, deviation, key, "frequency_deviation")
     if not rows:
         return MeasuredMode(mode, frequency)
 

@@ -27,10 +27,12 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         floors: Floor of each measured unknown, named NODE.DIRECTION, such as ``{"12.x": 1}``.
 
     Raises:
-        RefusedError: The file has no mode, a data set is damaged, a mode is given twice, a
-            frequency is not positive and finite, an unknown is missing or not finite, or the phases
-            of a shape differ too much for a real shape.
+        RefusedError: Two unknowns belong to one floor, the file has no mode, a data set is damaged,
+            a mode is given twice, a frequency is not positive and finite, an unknown is missing or
+            not finite, or the phases of a shape differ too much for a real shape.
     """
+    is_clear = len(set(floors.values())) == len(floors)
+    require(is_clear, "floors", floors, "one unknown for each floor")
     content = read_bytes(path)
     try:
         sets = [_parse_shape(found.head, found.lines) for found in data_sets(content, 55)]

@@ -51,6 +51,7 @@ def test_modes_that_are_not_there_are_refused(tmp_path):
     for sets, floors, words in (
         ([mode], {"99.x": 1}, r"without 99\.x"),
         ([mode, mode], FLOORS, "mode 1 again"),
+        ([mode], {"11.x": 1, "12.x": 1}, "one unknown for each floor"),
         ([uff55(1, [*SHAPE, 9.0], nodes=(11, 12, 13, 12))], FLOORS, "node 12 twice"),
         (["no universal file\n"], FLOORS, "without a mode"),
         ([mode.replace("         3\n", "         6\n", 1)], FLOORS, "data sets 55"),
