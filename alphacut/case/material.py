@@ -79,7 +79,7 @@ class RadiusMapSection(ThetaSection):
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """Return the map at crisp values of its parameters, by their names."""
-        # eq. 12: r = Σ a_i H_i(ξ) with the four Hermite functions on −1 ≤ ξ ≤ 1
+        # eq. 12: r = Σ a_i H_i(ξ) with the four Hermite functions on 0 ≤ ξ ≤ 1
         a1, a2, a3, a4 = [values[name] for name in self.numbers]
         return HermiteMap(a1, a2, a3, a4, self.distribution)
 

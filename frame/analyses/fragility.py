@@ -9,10 +9,12 @@ proportional to the record; the limit is then exceeded on a set of measures, whi
 incremental dynamic analysis (`incremental`). α is a level of possibility, not a probability, and is
 never multiplied by one.
 
-A case reaches `fragility_of` as follows. `alphacut/stages/suite.py` computes the peaks under each
-record (`suites.record_peaks`, `peaks.close_peaks`), `alphacut/stages/answers.py` passes them on,
-and `alphacut/report/results.py` prints the first columns of `Fragility.table`. The CSV files are
-written by `alphacut/report/tables.py` from `Fragility.records`.
+A case reaches `fragility_of` as follows. `alphacut/case/limits.py` has the keys of [fragility].
+`alphacut/stages/suite.py` computes the peaks under each record (`record_peaks` of
+`frame/analyses/suites.py`, `close_peaks` of `frame/analyses/peaks.py`),
+`alphacut/stages/answers.py` passes them on, and `alphacut/report/results.py` prints three columns
+of `Fragility.table`: limit, median of the sample, guarantee. Tables in files, with the lognormal
+fit, are written by `alphacut/report/tables.py`.
 """
 
 from __future__ import annotations
@@ -110,7 +112,8 @@ class CriticalMeasures:
 
         Args:
             peaks: Bounds of the limited peak under each record, at least one.
-            measures: Intensity measure m of each record, positive and unscaled.
+            measures: Intensity measure m of each record, positive and scaled as the record was for
+                its peak.
             limit: Limit L > 0 in SI units. If the peak is the smallest value of an output, it is
                 the limit of the largest value of the output with its sign changed.
 
