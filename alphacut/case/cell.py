@@ -103,6 +103,7 @@ class CellContent(Section, defer_build=True):
         if self.mesh_cell is not None:
             return self.radius or ThetaSection(), self.mesh_cell
         allowed = "a section [cell] with a particle"
+        # An image has no random θ: bounds of its stiffness need no samples.
         if self.image_cell is not None:
             cure = f"run {command_to_paste('modulus', 'CASE.toml')}"
             raise RefusedError("cell", "an image", allowed, cure)
@@ -181,6 +182,7 @@ class CellContent(Section, defer_build=True):
         require_alone("radius", has_radius and is_computed, "stage microstructure")
         require_alone("radius", has_radius and has_fraction, "cell.fraction")
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
+        # A model that cannot solve this cell is refused here, and not after the stages before it.
         if self.cell is not None:
             method = self.modulus.method
             methods = self.cell.methods

@@ -79,8 +79,11 @@ class Content(CellContent):
             if not section.reads_peaks:
                 continue
             for limit in section.limits:
-                is_mean = limit.side == "mean"  # over records; it follows from the peaks under each
-                peaks[limit.output if is_mean else limit.peak] = None
+                name = limit.peak
+                # The mean over records follows from the peaks of the magnitude under each record.
+                if limit.side == "mean":
+                    name = limit.output
+                peaks[name] = None
         return tuple(peaks)
 
     @property
@@ -99,6 +102,7 @@ class Content(CellContent):
     @property
     def structure_sections(self) -> dict[str, StructureSection]:
         """The sections of structures in the case, of which there may be one, by their names."""
+        # The fields of structures are those of the class that `with_structures` derives from this.
         sections = {name: getattr(self, name, None) for name in STRUCTURES}
         return {name: section for name, section in sections.items() if section is not None}
 
@@ -110,6 +114,7 @@ class Content(CellContent):
     @cached_property
     def structure(self) -> Structure | None:
         """The structure, with stand-ins for what is yet to be computed; built once."""
+        # Checks of a case ask for it many times, and to build it may read matrices from files.
         section = self.structure_section
         if section is None:
             return None
@@ -220,8 +225,8 @@ class Content(CellContent):
             value = None
             if n_sections:
                 value = f"beside {n_sections - 1} more"
-            *names, last = (f"[{name}]" for name in sorted(STRUCTURES))
-            raise RefusedError("frame", value, f"one of {', '.join(names)} and {last}")
+            names = [f"[{name}]" for name in sorted(STRUCTURES)]
+            raise RefusedError("frame", value, f"one of {', '.join(names[:-1])} and {names[-1]}")
         return structure
 
     def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
@@ -249,6 +254,8 @@ class Content(CellContent):
             is_exact = envelope.integrator != "midpoint"
             allowed = "exact where columns yield"
             require(is_exact, "envelope.integrator", envelope.integrator, allowed)
+        # [envelope] is checked even where studies take its place, since questions are about its
+        # response. It has no name, which validation of a study would ask for.
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         self._require_study("envelope", main_study, envelope, structure)
         names: list[str] = []
@@ -294,9 +301,10 @@ class Content(CellContent):
         for output in study.figures:
             require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
+        # A force that begins after the end would act on nothing: a unit of time may be wrong.
         for number, force in enumerate(self.force, start=1):
             history = force.history.history
-            if history is None:
+            if history is None:  # an impulse, at the start
                 continue
             acts = history.start < study.duration
             value = f"from {history.start:g} s"
@@ -317,5 +325,6 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
     Raises:
         BadInput: With every problem of the case at once, as one line each.
+        RefusedError: A change is no "KEY=VALUE", or its key is unknown or given twice.
     """
     return parse(with_structures(Content, built=True), path, changes)

@@ -83,6 +83,10 @@ class CaseLimit:
         A relative limit of a base shear is a fraction of the weight of all floors; any other one is
         a fraction of the height of the storey.
 
+        Args:
+            structure: The structure, for its weight, heights and the units of its outputs.
+            key: Key of the limits in the case, for messages.
+
         Raises:
             RefusedError: The structure has no floor masses, or no height of the storey; or the
                 limit is not in the unit of the output.
@@ -143,11 +147,16 @@ class CaseLimit:
         if not structure.model.floors or not words:
             return (self,)
         names = [f"{self.output}{z}" for z in range(1, structure.model.floors + 1)]
-        word = rf"\b{self.output}\b"  # the "a" of "max a" alone
-        texts = (re.sub(word, x, self.text) for x in names)
-        event = self.text if len(names) > 1 else ""
-        of_storeys = zip(names, texts, strict=True)
-        return tuple(replace(self, output=x, text=y, event=event) for x, y in of_storeys)
+        # Of a single storey the event would be its limit itself.
+        event = ""
+        if len(names) > 1:
+            event = self.text
+        limits = []
+        for name in names:
+            # Whole words alone are replaced: in "max a <= 1 g" the second a, not that of max.
+            text = re.sub(rf"\b{self.output}\b", name, self.text)
+            limits.append(replace(self, output=name, text=text, event=event))
+        return tuple(limits)
 
 
 def parse_limit(value: object) -> CaseLimit:
@@ -169,7 +178,10 @@ def parse_limit(value: object) -> CaseLimit:
     ratio = re.fullmatch(r"1\s*/\s*([1-9][0-9]{0,8})", text)
     has_reference = name.startswith(("drift", "residual")) or name == BASE_SHEAR
     is_relative = has_reference and (ratio is not None or text.endswith("%"))
-    unit = "" if is_relative else Output(name).unit
+    # Fractions without a reference, such as "q1 <= 5 %", are refused by their unit.
+    unit = Output(name).unit
+    if is_relative:
+        unit = ""
     try:
         if ratio is not None and is_relative:
             number = 1 / int(ratio[1])
@@ -182,6 +194,7 @@ def parse_limit(value: object) -> CaseLimit:
             number = quantity.parse_number(text, unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
+    # A magnitude is never below 0, while values of an output may be negative.
     require(number > 0 or side in ("max", "min"), "", value, allowed)
     return CaseLimit(cast("Side", side or ""), name, number, is_relative, str(value))
 
@@ -220,7 +233,8 @@ class QuestionSection(Section):
         """
         key = f"{self.key}.limits"
         limits = tuple(limit.limit(structure, key) for limit in self.limits)
-        structure.require_quantities(key, [*dict.fromkeys(x.output for x in self.limits)])
+        # The output need not be observed by the structure: limited peaks are computed anyway.
+        structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
         with _naming(key):
             limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
         return limits
@@ -245,8 +259,9 @@ def _naming(key: str) -> Iterator[None]:
     try:
         yield
     except RefusedError as error:
-        is_limits = error.key == "limits" or error.key.startswith("limit of")
-        name = key if is_limits else error.key
+        name = error.key
+        if name == "limits" or name.startswith("limit of"):
+            name = key
         raise RefusedError(name, error.value, error.allowed, error.cure) from None
 
 
@@ -265,6 +280,8 @@ class ProbabilitySection(QuestionSection):
 
     random: tuple[str, ...] = ()
     """inputs that are random, with the shape of their membership"""
+    # The error of a probability p falls as √(p (1 − p)/samples): 200 give 0.035 at p = 1/2. Each
+    # sample is a response at each fuzzy point, so that more take long.
     samples: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 200
     """random draws at each fuzzy point"""
 

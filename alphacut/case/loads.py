@@ -61,6 +61,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     if kind == "impulse":
         require(not words, "", value, allowed)
         return ForceHistory(None, "N*s")
+    # A static force has acted for ever, at its first value. A harmonic one has no such value.
     if kind == "harmonic":
         fits = len(numbers) in (1, 2) and n_options <= 1 and not is_static
     else:
@@ -80,7 +81,8 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
             return ForceHistory(History.constant(start, is_static=is_static))
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    # any other first word is the name of a file
+    # Any other first word is the name of a file. A misspelt kind is one as well, so that the
+    # message of a missing file names the kinds.
     try:
         path = case_file(kind, info)
     except RefusedError as error:
@@ -88,8 +90,11 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     force = read_force_history(path)
     # A file with a unit has forces, and amplitudes are factors of them; one without has numbers,
     # and amplitudes are forces.
+    unit = "N"
+    if force.has_unit:
+        unit = ""
     history = History(force.step, force.samples, start, is_static=is_static)
-    return ForceHistory(history, "" if force.has_unit else "N")
+    return ForceHistory(history, unit)
 
 
 def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
@@ -209,7 +214,7 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
     require(is_relative, "", value, allowed)
-    # sorted, so that a suite has the same order on every file system
+    # Sorted, so that a suite has the same order, and the same results, on every file system.
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)

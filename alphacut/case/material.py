@@ -38,6 +38,7 @@ Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
 
+# θ is normal before it is cut off: beyond 10 standard deviations there is a probability of 1e-23.
 Theta = Annotated[float, Quantity(minimum=-10, maximum=10)]
 
 
@@ -94,7 +95,7 @@ class RadiusMapSection(ThetaSection):
         """
         # r(θ) is linear in a1 … a4, so that its extremes over the box of their supports are at
         # corners: the map stays in (0, 1) if it does at the 2⁴ corners.
-        for ends in itertools.product(*({*x.support} for x in self.numbers.values())):
+        for ends in itertools.product(*(set(x.support) for x in self.numbers.values())):
             corner = dict(zip(self.numbers, ends, strict=True))
             try:
                 self.at(corner)  # refuses such a map
@@ -286,7 +287,7 @@ class RoundCell(Section):
     @property
     def loss_names(self) -> tuple[str, ...]:
         """Names of the loss factors as inputs, in the order of `losses`."""
-        return LOSSES[: len(self.losses)]
+        return LOSSES[: len(self.losses)]  # both, or none
 
     def require_consistent(self) -> None:
         """Refuse keys of the particle and of the losses that do not fit each other.
@@ -299,7 +300,7 @@ class RoundCell(Section):
         Raises:
             RefusedError: With the key that does not fit, or the shape of the particles is unknown.
         """
-        outline = self.outline or circle  # refuses unknown shapes
+        outline = self.outline or circle  # `outline` refuses unknown shapes
         has_ratio = self.inclusion_poisson is not None
         is_isotropic = self.stiffness is None
         key = "cell.inclusion_poisson"
@@ -442,6 +443,7 @@ class ImageCell(Section):
 
 def _cell_kind(table: Mapping[str, object]) -> str:
     """Kind of a cell by a key that it alone has."""
+    # Without a tag Pydantic would try all kinds, and tell the errors of each.
     if "image" in table:
         return "<image>"
     return "<mesh>" if "phases" in table else "<round>"

@@ -51,13 +51,15 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     match value:
         case [str(factor), str(file)]:
             name, _, member = file.partition(":")
-            unknowns = info.data.get("unknowns", ())  # missing where they are refused themselves
+            # Pydantic leaves refused keys out: without names the number of rows is not judged.
+            unknowns = info.data.get("unknowns", ())
             rows = len(unknowns) or MAX_ROWS
             path = case_file(name, info)
             array = read_matrix(path, name=member, max_rows=rows)
             if unknowns:
                 _require_shape(path.name, array, rows)
                 require_symmetric(path.name, array, unknowns)
+            # Such a term does nothing, which nobody writes on purpose: the array is another one.
             require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
             return Monomial.parse(factor), array
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
@@ -151,9 +153,14 @@ class MatricesSection(StructureSection):
                 there, or the matrices make no structure, for example because M is not positive
                 definite.
         """
-        damping = self.damping_ratio if isinstance(self.damping_ratio, MaterialDamping) else None
-        ratios = {} if damping else damping_ratios_by_name(self.damping_ratio, None)
-        # a structure needs one parameter at least, from which numbers take their type
+        damping = None
+        ratios: dict[str, FuzzyNumber] = {}
+        if isinstance(self.damping_ratio, MaterialDamping):
+            damping = self.damping_ratio
+        else:
+            ratios = damping_ratios_by_name(self.damping_ratio, None)
+        # A structure needs one parameter at least, from which its numbers take their type: one that
+        # is used by nothing stands for none.
         numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
@@ -206,6 +213,7 @@ class MatricesSection(StructureSection):
         """
         has_modulus = ["E" in dict(factor.powers) for factor, _ in self.stiffness]
         require(any(has_modulus), "damping_ratio", "material", "a term of the stiffness with E")
+        # All energy is in the material: each mode has the same ratio, and one parameter is enough.
         if all(has_modulus):
             return damping_ratios_by_name(damping, loss)
         ratios: list[FuzzyNumber] = []
@@ -225,6 +233,7 @@ class MatricesSection(StructureSection):
         """Return how each unknown moves rigidly with the ground, shape (unknowns,)."""
         if isinstance(self.direction, dict):
             return self._vector_over_unknowns("direction", self.direction)
+        # Rotations move with the ground only where a table says so: their direction is their own.
         directions = [name.rpartition(".")[2] for name in self.unknowns]
         return np.array([float(direction == self.direction) for direction in directions])
 

@@ -29,10 +29,12 @@ class PackingSection(Section):
     Radii are log-normal between two limits (the paper's eq. 11), or those of a file.
     """
 
+    # How much statistics vary from packing to packing cannot be told from fewer than five.
     packings: Annotated[int, Quantity(minimum=5, maximum=10_000, is_integer=True)] = 20
     """independent packings"""
     particles: Annotated[int, Quantity(minimum=10, maximum=1_000_000, is_integer=True)]
     """particles in each packing"""
+    # Equal discs jam at an area fraction of about 0.84, spheres at a smaller volume fraction.
     fraction: Annotated[float, Quantity(above=0, below=0.84)]
     """area fraction, or volume fraction, of the particles"""
     smallest_radius: Length | None = Field(default=None, description="lower end of the radii")
@@ -56,10 +58,13 @@ class PackingSection(Section):
             spheres: Whether the particles are spheres, which pack less densely than discs.
 
         Raises:
-            RefusedError: The fraction is above that of the densest random packing, or the radii of
-                the file or the two limits make no distribution.
+            RefusedError: The fraction is near that of random close packing or above it, or the
+                radii of the file or the two limits make no distribution.
         """
-        shape = SPHERES if spheres else DISCS
+        # Still nearer to random close packing the simulation would not come to an end.
+        shape = DISCS
+        if spheres:
+            shape = SPHERES
         fits = self.fraction <= shape.densest
         key = "microstructure.packing.fraction"
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
@@ -83,12 +88,15 @@ class PackingSection(Section):
             FailedError: Particles still overlap after all steps of the packing.
         """
         self.require_readable(spheres=spheres)
+        shape = DISCS
+        if spheres:
+            shape = SPHERES
         return pack(
             self.particles,
             packings=self.packings,
             fraction=self.fraction,
             radii=self.radii,
-            shape=(SPHERES if spheres else DISCS).particles,
+            shape=shape.particles,
             seed=seed,
             workers=workers,
             progress=progress,
@@ -171,7 +179,7 @@ class MicrostructureSection(Section):
         """Refuse a fraction that does not pack, and a file that is not read."""
         if self.packing is not None:
             self.packing.require_readable(spheres=spheres)
-        _ = self.measured
+        _ = self.measured  # reads the file, which may be no image or have no circles
 
     def require_consistent(self) -> None:
         """Refuse several sources of the particles, or none."""

@@ -47,6 +47,7 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
         tolerance, unit = quantity.parse_fuzzy_in_any_unit(value, ("m", "N", ""))
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
+    # A tolerance of the whole peak or more would let every bound pass.
     lower, upper = tolerance.support
     is_allowed = lower == upper > 0 and (unit != "" or upper < 1)
     require(is_allowed, "", value, allowed)
@@ -54,6 +55,8 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
 
 
 def _file_name(value: str) -> str:
+    # The name becomes part of a file's name: with a slash or ".." it could leave the folder of the
+    # results, and other signs are not allowed on every file system.
     match = re.fullmatch(r"(?!.*\.\.)[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,63}", value)
     require(bool(match), "", value, "up to 64 letters, digits and . _ + -, as a file's name")
     return value

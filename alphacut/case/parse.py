@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -56,7 +57,8 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        # Pydantic tries each member of a union, whose errors may be the same: each is told once.
+        # Pydantic tries each member of a union, whose errors may be the same: each text is told
+        # once. All problems are told together, so that a case is mended in one round.
         problems: dict[str, RefusedError] = {}
         for x in _refusals(model, error):
             place = str(path)
@@ -81,7 +83,7 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
     except (RecursionError, ValueError) as error:
         shown = "the file"
         place = str(path)
-        # an integer of too many digits has no line
+        # An integer of more digits than Python converts raises a ValueError without a line.
         if match := re.search(r"\(at line (\d+), column \d+\)", str(error)):
             place += f":{match[1]}"
             shown = text.splitlines()[int(match[1]) - 1].strip() or shown
@@ -172,8 +174,10 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
         return RefusedError(cause.key or key, cause.value, cause.allowed, cause.cure)
     if kind == "missing":
         about = keys_of(model).get(_without_indices(key))
-        words = about.description if about is not None else None
-        return RefusedError(key, None, words or "a section")
+        words = "a section"
+        if about is not None and about.description:
+            words = about.description
+        return RefusedError(key, None, words)
     given = detail["input"]
     # The value is shown as TOML has it, which is near enough to how it stood in the file.
     value = printable(given).replace("'", '"')
@@ -231,16 +235,19 @@ def apply_changes(
     Raises:
         RefusedError: A change has no value, or its key is unknown or given before.
     """
+    # Studies are entries of an array, which a key without an index does not tell apart.
     full_keys = [key for key in keys_of(model) if not key.startswith("study.")]
     keys: list[str] = []
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
-        # a key without its section is met by the section that has it
+        # A key without its section is met by the first section that has it; another unknown one by
+        # the key that is spelt most alike.
         if key not in full_keys:
             close = [full for full in full_keys if full.endswith(f".{key}")]
-            cure = f"did you mean {close[0]}?" if close else suggestion(key, full_keys)
-            cure = cure or "docs/case-format.md has all keys"
+            cure = suggestion(key, full_keys) or "docs/case-format.md has all keys"
+            if close:
+                cure = f"did you mean {close[0]}?"
             raise RefusedError("--set", f"{change}, of an unknown key", allowed, cure)
         require(bool(equals), "--set", f"{change}, without a value", allowed)
         require(key not in keys, "--set", f"{change}, of a key given before", "each key once")
@@ -255,13 +262,13 @@ def _set_key(table: object, key: str, value: object) -> None:
     Missing tables are added. If an outer name has a value that is no table, nothing is set:
     validation refuses that value.
     """
-    *outer, last = key.split(".")
-    for name in outer:
+    names = key.split(".")
+    for name in names[:-1]:
         if not isinstance(table, dict):
             return
         table = table.setdefault(name, {})
     if isinstance(table, dict):
-        table[last] = value
+        table[names[-1]] = value
 
 
 def _parse_value(text: str) -> object:
@@ -280,7 +287,7 @@ def _parse_value(text: str) -> object:
     return text
 
 
-@cache
+@cache  # the walk reads the source of all sections
 def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
     """Return all keys below the class of a section by their full names, sections left out."""
     return {name: info for name, info, is_section in _walk_keys("", model) if not is_section}
@@ -298,7 +305,7 @@ def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldIn
     """
     for key, info in model.described_fields().items():
         name = f"{prefix}{key}"
-        parts = [info.annotation, *_annotation_parts(info.annotation)]
+        parts = itertools.chain([info.annotation], _annotation_parts(info.annotation))
         models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
         yield name, info, bool(models)
         for inner in models:
@@ -307,7 +314,8 @@ def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldIn
 
 def quantity_of(info: FieldInfo) -> Quantity | None:
     """Return the quantity of a key, or of the entries of its array."""
-    for part in (*info.metadata, *_annotation_parts(info.annotation)):
+    # Pydantic moves what annotates the key itself into `metadata`, and leaves what is deeper.
+    for part in itertools.chain(info.metadata, _annotation_parts(info.annotation)):
         if isinstance(part, Quantity):
             return part
     return None
@@ -323,6 +331,6 @@ def allowed_values(info: FieldInfo) -> str:
 
 def _annotation_parts(annotation: Any) -> Iterator[Any]:
     """Yield everything inside an annotation, what is annotated with it too."""
-    for part in (*get_args(annotation), *getattr(annotation, "__metadata__", ())):
+    for part in get_args(annotation) + getattr(annotation, "__metadata__", ()):
         yield part
         yield from _annotation_parts(part)

@@ -20,6 +20,8 @@ from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
 
+# The ranges are those in which structures vibrate: masses and stiffnesses are positive, so that
+# M and K are positive definite, and dampers are not negative, so that nothing feeds energy.
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
 Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
 Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
@@ -85,10 +87,10 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
 
 
 def _ratio(value: object) -> FuzzyNumber:
-    return cast("FuzzyNumber", RATIO.parse(value))
+    """Return a fuzzy damping ratio; refuse one from 1 on, at which nothing oscillates."""
+    return cast("FuzzyNumber", Quantity(minimum=0, below=1, fuzzy=True).parse(value))
 
 
-RATIO = Quantity(minimum=0, below=1, fuzzy=True)
 DampingRatios = Annotated[
     MaterialDamping | tuple[FuzzyNumber, ...], PlainValidator(_parse_damping_ratios)
 ]
@@ -167,6 +169,7 @@ class Structure:
             try:
                 self.model.require_quantity(name)
             except RefusedError as error:
+                # The model speaks of its own argument; the user wrote a key of the case.
                 raise RefusedError(key, error.value, error.allowed) from None
 
 
@@ -174,6 +177,7 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     """Return the record of a file that the case names; warn of what is unusual in it."""
     path = case_file(value, info)
     ground = read_record(path)
+    # What is unusual need not be wrong: it is told, and the record is taken as it is.
     for remark in ground.remarks:
         warnings.warn(f"of {path.name} {remark}", stacklevel=2)
     return ground
@@ -228,6 +232,7 @@ class StructureSection(Section):
     @property
     def moves_by_itself(self) -> bool:
         """Whether the structure starts displaced or moving, so that it needs no loads."""
+        # A system that is not linear is a pendulum, whose weight moves it.
         linear = self.nominal.linear
         return linear is None or not linear.is_at_rest
 
@@ -345,7 +350,7 @@ class Frame(StructureSection):
             coefficients: Weight over stiffness and height of each storey, shape (floors,). From 1
                 on the storey buckles, so that a weight in the case would be no cure.
         """
-        lightest = 1e-5  # those of buildings are above 1e-4
+        lightest = 1e-5  # buildings have coefficients above 1e-4
         largest = coefficients.max()
         doubt = "are the units of stiffness, masses and lengths right?"
         if largest >= 1:
@@ -402,22 +407,31 @@ class Frame(StructureSection):
         arguments: dict[str, Any] = {
             name: tuple(number.nominal for number in numbers) for name, numbers in lists.items()
         }
+        # Stiffnesses need no second moment: None is its absence, which an empty tuple is not.
         arguments["second_moment"] = arguments["second_moment"] or None
-        if ratios:
-            nominal_ratios = tuple(ratio.nominal for ratio in ratios.values())
-            arguments["damping_ratio"] = nominal_ratios if len(ratios) > 1 else nominal_ratios[0]
+        # A number is the ratio of all modes; a tuple must have one ratio for each.
+        if len(ratios) == 1:
+            arguments["damping_ratio"] = ratios["zeta"].nominal
+        elif ratios:
+            arguments["damping_ratio"] = tuple(ratio.nominal for ratio in ratios.values())
+        nominal_modulus = None
+        if young is not None:
+            nominal_modulus = young.nominal
+        # A storey may buckle under its weight with the modulus of a stand-in, and stand with that
+        # which a stage computes.
+        gravity = self.gravity
+        if young is STAND_IN:
+            gravity = 0.0
         try:
             model = StoreyFrame(
                 **arguments,
-                modulus=None if young is None else young.nominal,
+                modulus=nominal_modulus,
                 damper_placement=self.damper_placement or "ground",
                 outputs=self.outputs,
                 rayleigh=(self.rayleigh_mass.nominal, self.rayleigh_stiffness.nominal),
                 rayleigh_of=self.rayleigh_of,
                 ground=self.accelerogram,
-                # A storey may buckle under its weight with the modulus of a stand-in, and stand
-                # with that which a stage computes.
-                gravity=0.0 if young is STAND_IN else self.gravity,
+                gravity=gravity,
             )
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
@@ -485,9 +499,10 @@ class Pendulum(StructureSection):
             RefusedError: The values make no pendulum.
         """
         keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
-        arguments = (*keys[:4], "phi0", "omega0")
+        arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
         numbers = [getattr(self, key) for key in keys]
         values = {name: x.nominal for name, x in zip(arguments, numbers, strict=True)}
         model = pendulum(**values)
+        # The model also observes the angle; a case has the force in the bar alone.
         model = replace(model, observed={"force": model.observed["force"]})
         return Structure(model, dict(zip(model.parameters, numbers, strict=True)))

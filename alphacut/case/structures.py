@@ -52,7 +52,10 @@ def _whole_case(
     """
     fields: dict[str, Any] = {}
     for name, place in structures:
-        fields[name] = (resolve_name(place) | None if built else object, None)
+        kind: Any = object
+        if built:
+            kind = resolve_name(place) | None
+        fields[name] = (kind, None)  # the type of the field, and its default
     # Pydantic takes fields from the last base on: those of the cell, of structures, of the rest.
     bases: Any = (content, create_model("Structures", __base__=CellContent, **fields))
     whole: type[CellContent] = create_model(content.__name__, __base__=bases)

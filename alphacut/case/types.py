@@ -40,6 +40,8 @@ class Section(BaseModel):
     What a key is stands in its field, or in the line below it.
     """
 
+    # An unknown key is refused, since it is a misspelt one, whose default would act in silence.
+    # Sections are frozen because stages are kept by the digest of what they were made from.
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
     @classmethod
@@ -123,7 +125,9 @@ class Quantity:
     def allowed(self) -> str:
         """The allowed values in words."""
         dimension = QUANTITIES[self.si]
-        words = "whole number" if self.is_integer else dimension.name
+        words = dimension.name
+        if self.is_integer:
+            words = "whole number"
         bounds = {
             "above": self.above,
             "from": self.minimum,
@@ -133,7 +137,9 @@ class Quantity:
         for word, bound in bounds.items():
             if math.isfinite(bound):
                 words += f" {word} {bound:g}"
-        return f'{words}, as "{dimension.example}"' if self.si else words
+        if self.si:
+            words += f', as "{dimension.example}"'
+        return words
 
     def parse(self, value: object) -> FuzzyNumber | float | int:
         """Return the quantity in SI that a value of the case states, such as "80 GPa ± 5 %".
@@ -148,8 +154,12 @@ class Quantity:
         try:
             number = self._parsed(value)
         except ValueError as error:
-            cure = f"{error}; {self.cure}" if self.cure else str(error)
+            cure = str(error)
+            if self.cure:
+                cure += f"; {self.cure}"
             raise RefusedError("", value, self.allowed, cure) from None
+        # A value that is possible at all must be allowed: the whole support lies in the range if
+        # both its ends do.
         ends: list[float] = []
         if isinstance(number, FuzzyNumber):
             ends.extend(number.support)
@@ -167,9 +177,12 @@ class Quantity:
         """Return what to write for a ratio that is too large, but would fit as a percentage."""
         if self.si or self.is_integer or not is_number(value):
             return ""
+        # 5 for 5 % is the usual slip: it is named where the hundredth part would be allowed.
         ratio = float(cast("float", value)) / 100
         is_meant = ratio > 0 and self._contains(ratio)
-        return f'write "{value} %" or {ratio:g}' if is_meant else ""
+        if not is_meant:
+            return ""
+        return f'write "{value} %" or {ratio:g}'
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
         """Return the quantity that a value states, in SI, whether or not it lies in the range.
@@ -187,8 +200,9 @@ class Quantity:
             raise ValueError(reason)
         if not self.si and isinstance(value, str) and "%" not in value and "[" not in value:
             raise ValueError(f'{reason}, or "5 %" for 0.05')
-        parse = quantity.parse_fuzzy if self.fuzzy else quantity.parse_number
-        return parse(value, self.si)
+        if self.fuzzy:
+            return quantity.parse_fuzzy(value, self.si)
+        return quantity.parse_number(value, self.si)
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
@@ -286,7 +300,10 @@ def _stiffness(rows: list[list[object]]) -> VoigtPhase:
         return VoigtPhase(tuple(moduli))
     except (TypeError, ValueError) as error:
         allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
-        cure = str(error) if "the unit" in str(error) else ""
+        # Other reasons, such as the length of a row, are said by the allowed values.
+        cure = ""
+        if "the unit" in str(error):
+            cure = str(error)
         raise RefusedError("", rows, allowed, cure) from None
 
 
@@ -296,6 +313,7 @@ ModulusOrStiffness = Annotated[
     Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
 ]
 Loss = Annotated[FuzzyNumber, Quantity(minimum=0, maximum=0.5, fuzzy=True)]
+# An isotropic solid has positive bulk and shear moduli for −1 < ν < 1/2 alone.
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]

@@ -87,7 +87,9 @@ def decision(section: DecisionSection, response: Response, _: Progress) -> Decis
     """
     structure = response.structure
     found = response.suite or response.peaks
-    assert found is not None
+    assert found is not None  # a question that reads peaks has them computed before
+    # Limits over a suite are on the worst record, and means over the records. Units go along, since
+    # the analysis knows the names of outputs and inputs alone.
     limits = section.limits_of(structure)
     return decide(
         found,
@@ -113,6 +115,7 @@ def probability_of(section: ProbabilitySection, response: Response, tick: Progre
         FailedError: A response could not be computed.
     """
     structure = response.structure
+    # An input is random or fuzzy, not both: random ones are taken from the fuzzy ones.
     random = structure.inputs(section.random, "probability.random")
     return probability(
         structure.model,
@@ -139,14 +142,16 @@ def tolerances_of(section: TolerancesSection, response: Response, tick: Progress
         RefusedError: A limit does not fit the structure, or an input is inadmissible at a scale.
     """
     # The known peaks hold for the lowest α-cut, which is the support only at α = 0.
-    is_known = response.task.section.alpha[0] == 0
+    known_peaks = None
+    if response.task.section.alpha[0] == 0:
+        known_peaks = response.peaks
     return tolerances(
         response.structure.model,
         response.inputs,
         section.limits_of(response.structure),
         **response.times,
         most=section.most,
-        at_one=response.peaks if is_known else None,
+        at_one=known_peaks,
         progress=tick,
     )
 
@@ -188,6 +193,7 @@ ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
 
 def stage(kind: type[Answer], section: QuestionSection, response: Response) -> Stage[Answer]:
     """Return the stage of the answer of a kind to the question of a section."""
+    # Answers are kept in the units and words of this package, so that its source counts as well.
     compute = partial(_computed, kind, section, response)
     packages = ("fuzzy", "frame", "alphacut")
     return Stage(kind.key, [section, response], packages, kind, compute)

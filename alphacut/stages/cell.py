@@ -71,6 +71,7 @@ class CellProblem:
     @classmethod
     def of(cls, content: CellContent, petsc: Mapping[str, str] | None = None) -> Self:
         """Return the cell of a case."""
+        # The stated fraction goes along to be compared with that of a computed radius map.
         radius, cell = content.random_cell
         stated = content.stated_fraction
         return cls(radius, cell, content.mesh, content.modulus, stated, petsc or {})
@@ -78,6 +79,7 @@ class CellProblem:
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Parameters of the cell by name, crisp or fuzzy, in SI."""
+        # The map of particles of one size follows from the fraction, which is then the parameter.
         of_radius = getattr(self.radius, "numbers", {})
         if isinstance(self.cell, RoundCell) and self.cell.fraction is not None:
             of_radius = {"fraction": self.cell.fraction}
@@ -124,6 +126,7 @@ class CellProblem:
     @property
     def average(self) -> str | None:
         """Average of a plane stiffness that the case asks for; None of spheres."""
+        # A cubic stiffness has one average alone, that of Hill.
         if self.cell.particles == "spheres":
             return None
         return self.modulus.average
@@ -145,6 +148,8 @@ class CellProblem:
         Raises:
             RefusedError: The model needs DOLFINx, which is not installed.
         """
+        # DOLFINx takes seconds to import, and is not on every machine: only the models that need it
+        # import it, when they are asked for.
         try:
             if isinstance(self.cell, RoundCell):
                 return self._round_model(self.cell, estimate=estimate, parallel=parallel)
@@ -196,8 +201,9 @@ class CellProblem:
         Its E and ν are those of the average that the case asks for.
 
         Args:
-            options: `estimate`, whether errors are declared, and `parallel`, whether all MPI ranks
-                work on one cell together; as of `model`.
+            options: `estimate`, whether errors are declared, if need be by a reference solution (by
+                default true), and `parallel`, whether all MPI ranks work on one cell together (by
+                default false).
 
         Raises:
             RefusedError: The model needs a library that is not installed, or cannot solve the cell.
@@ -237,6 +243,7 @@ class CellProblem:
             fractions = self.nominal.fraction(rule.nodes)
         fraction = float(rule.mean(fractions))
         found: References = {"fraction": fraction}
+        # The classical bounds are those of two isotropic phases.
         phases = [phase for phase in self.cell.nominal_phases if isinstance(phase, Phase)]
         if len(phases) < 2:
             return found
@@ -273,7 +280,9 @@ class CellProblem:
             allowed = "a periodic cell of prisms"
             raise RefusedError("mesh.file", value, allowed, error.cure) from None
         try:
-            mesh_law(grid, self.nominal_radius)  # both refuse what does not fit
+            # Both refuse what does not fit: a range of θ other than that of [radius], and physical
+            # groups that have no phase in the case or phases that have no group.
+            mesh_law(grid, self.nominal_radius)
             in_order_of(grid.names, self.nominal_phases)
         except RefusedError as error:
             place = self.mesh.file.name
@@ -285,6 +294,7 @@ def key_and_unit(name: str) -> tuple[str, float]:
 
     They are E_x_GPa and 1e9 of E_x, nu_xy and 1 of nu_xy.
     """
+    # Poisson's ratios are the only constants without a unit.
     if name.startswith("nu"):
         return name, 1.0
     return f"{name}_GPa", GPA
@@ -322,6 +332,8 @@ def require_bounds(young: tuple[float, float], references: References, particles
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
+    # The interval of E and that of the bounds, which is widened by the slack, must have a point in
+    # common: the bounds are at the stated fraction, E is at that of the map.
     low, high = references["hashin_shtrikman_E_GPa"]
     fraction = references["fraction_of_case"]
     slack = 5e-3
@@ -334,6 +346,7 @@ def require_bounds(young: tuple[float, float], references: References, particles
 
 def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:
     """Require the sum of the declared relative errors of E within a tolerance, if any."""
+    # Errors of several sources may add up; 1e-9 of the tolerance is left to their own rounding.
     total = sum(error.values())
     if tolerance is not None and total > tolerance * (1 + 1e-9):
         what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"

@@ -97,7 +97,8 @@ class EnvelopeTask:
             RefusedError: It is in the unit of no output.
         """
         units = {Output(x).unit for x in structure.outputs}
-        tolerance = self.section.tolerance or Tolerance(1e-3, "")  # a fraction of each peak
+        # A thousandth of each peak is below what a figure shows and what a limit is judged by.
+        tolerance = self.section.tolerance or Tolerance(1e-3, "")
         value = f"{tolerance.value:g} {tolerance.unit}"
         allowed = f"a fraction, or {', '.join(sorted(units))}"
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
@@ -105,6 +106,7 @@ class EnvelopeTask:
 
     def has_response_of(self, section: EnvelopeSection) -> bool:
         """Return whether it has the inputs and the duration of [envelope]."""
+        # Method, levels and time step are those of [envelope] in each study.
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
@@ -182,6 +184,7 @@ class EnvelopeTask:
         # Where the method has searched the peaks themselves, a second search finds no more.
         is_searched = envelope.searched_peaks is not None
         limited = [x for x in self.limited if not is_searched or x not in found]
+        # Both bounds hold, so that the tighter end of either is taken.
         if loose := loose_peaks(found, limited, gap):
             found = tightest(found, replace(self, limited=loose).close_peaks(structure, progress))
         return found
@@ -225,6 +228,7 @@ class EnvelopeTask:
 
     def close_peaks(self, structure: Structure, progress: Progress) -> dict[str, Peak]:
         """Return the peaks of the limited outputs, by the method that bounds them most closely."""
+        # The structure is observed at the limited outputs alone: fewer outputs are a faster proof.
         structure.require_quantities("limits", outputs_of(self.limited))
         response = self._response(structure)
         return close_peaks(structure.model, names=self.limited, progress=progress, **response)
@@ -264,13 +268,19 @@ def tasks(
     found = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
     if not found:
         found = [EnvelopeTask("all", section.fuzzy, section.duration, section)]
-    return tuple(
-        replace(task, limited=limited) if task.has_response_of(section) else task for task in found
-    )
+    # Questions are about the response of [envelope]. A study with this response bounds the limited
+    # peaks as well, which saves a second computation.
+    tasks_of_case = []
+    for task in found:
+        if task.has_response_of(section):
+            task = replace(task, limited=limited)
+        tasks_of_case.append(task)
+    return tuple(tasks_of_case)
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
     """Return the stage of one study."""
+    # The outputs that are drawn and the name are left out: neither changes a bound.
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
     inputs += [task.limited]
     compute = partial(task.compute, structure)
@@ -304,7 +314,9 @@ def require_tolerance(
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
         peak = result.numbers.peak[name]
-        if peak.nature is Nature.ESTIMATED:  # of a band of responses that were made alone
+        # The error of an estimated peak also has what lies between the time nodes, which the band
+        # at the nodes does not have.
+        if peak.nature is Nature.ESTIMATED:
             error = max(error, float(peak.error.max()))
         if not allowed.unit:
             error = error / peak.upper.max()

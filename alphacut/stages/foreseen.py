@@ -46,6 +46,7 @@ def foreseen_material(content: Content) -> Material | None:
     if content.has_stated_modulus and not content.has_material_damping:
         return Material()
     cell = content.particle_cell
+    # A radius map that stage microstructure will compute is not there yet.
     has_map = cell is not None and bool(content.radius_map or cell.fraction_map)
     if cell is None or "series" not in cell.methods or not has_map:
         return None
@@ -84,9 +85,8 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
     known = foreseen_material(content)
     if known is not None:
         return (known,)
-    # steel, rubber
-    small_loss = Crisp(1e-3)
-    large_loss = Crisp(0.3)
+    small_loss = Crisp(1e-3)  # steel
+    large_loss = Crisp(0.3)  # rubber
     if content.has_stated_modulus:
         return Material(loss=small_loss), Material(loss=large_loss)
     diamond = Crisp(1e12)

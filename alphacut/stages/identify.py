@@ -61,8 +61,10 @@ def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]
             floors=section.floors,
         )
     except RefusedError as error:
-        is_own = error.key in type(section).model_fields
-        key = f"identify.{error.key}" if is_own else error.key
+        # The reader names arguments, which are keys of the section, or places in the file.
+        key = error.key
+        if key in type(section).model_fields:
+            key = f"identify.{key}"
         raise RefusedError(key, error.value, error.allowed, error.cure) from None
     inputs = structure.inputs(section.learn, "identify.learn")
     options = {"held_out": section.held_out, "alpha": alpha}

@@ -90,6 +90,7 @@ def stage(
     Raises:
         OSError: A file of the image cannot be read.
     """
+    # The cell has the names of files alone: their digests make the stage new if a file changes.
     digests = [file_digest(file) for file in files_of(cell.image)]
     inputs = [cell, alpha, average, digests]
     compute = partial(compute_cuts, cell, alpha, average, device)

@@ -82,6 +82,7 @@ def _computed(
         if draw is not None:
             draw(fitted, folder / "figures", section)
         if section.image is not None:
+            # 17 digits give each number back exactly, so that the file can take the image's place.
             rows = np.column_stack([particles[0].centres, particles[0].radii])
             columns = {"header": "x [m],y [m],r [m]", "delimiter": ",", "comments": ""}
             np.savetxt(folder / "circles.csv", rows, fmt="%.17g", **columns)

@@ -133,6 +133,7 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
     plane: dict[str, dict[str, Ends]] = {}
     for definition, suffix in SUFFIXES.items():
         along_axes = {name: known[name + suffix] for name in NAMES if name + suffix in known}
+        # Constants that the model of the cell does not give are left out, not shown as unknown.
         if along_axes:
             plane[definition] = in_units_of_results(along_axes)
     return ModulusResult(
@@ -180,6 +181,8 @@ def solved(
         CampaignError: Samples failed. The others are kept if there is a store.
         RefusedError: The model cannot solve the cell, or a library is missing.
     """
+    # Loss factors are fuzzy inputs as well, but no coordinates of samples: each sample bounds the
+    # loss of the cell over their α-cuts.
     losses = dict(zip(problem.cell.loss_names, problem.cell.losses, strict=True))
     return fuzzy_stiffness(
         problem.model(),
@@ -211,8 +214,9 @@ def identity(problem: CellProblem) -> Document:
         "inputs": {name: repr(x) for name, x in problem.numbers.items()},
         "theta": repr(getattr(problem.nominal_radius, "distribution", problem.nominal_radius)),
         "stiffness": repr(cell.model_dump(include={"inclusion_modulus", "phases"})),
-        # Loss factors are computed from all samples together, on all levels.
+        # With losses each sample has bounds of the loss factors on all levels.
         "losses": repr((cell.losses, modulus.alpha)) if cell.losses else "",
+        # Other source or libraries may give other digits: their samples are not mixed.
         "source": source_digest(("stochastic", "rve")),
         "versions": versions(),
     }
@@ -251,6 +255,7 @@ def stage(problem: CellProblem) -> Stage[ModulusResult]:
 
 def require_levels(alpha: tuple[float, ...], key: str) -> None:
     """Refuse levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
+    # A fuzzy number needs its support and its core; the highest level alone is a crisp number.
     complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
     require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
@@ -271,6 +276,7 @@ def fuzzy_modulus(data: xarray.Dataset) -> FuzzyNumber:
     Raises:
         RefusedError: It is not positive, or its levels neither go from 0 to 1 nor are 1 alone.
     """
+    # Samples of an image with pores may have a lower bound of 0, which no structure can have.
     minimum = float(data["E"].min())
     require(minimum > 0, "modulus", value=f"{minimum / GPA:.3g} GPa", allowed="a modulus above 0")
     require_levels(tuple(map(float, data["alpha"].values)), "modulus.alpha")

@@ -40,6 +40,7 @@ def stage(
         the lowest level falls if the input is fixed at its nominal value.
     """
     compute = partial(_fractions_of_widths, campaign, structure, task, peaks)
+    # Peaks are inputs of this stage too: searches begin there, so that they decide on digits.
     of_cell = campaign and [identity(campaign), campaign.inputs, campaign.modulus.alpha]
     of_structure = structure and [structure.model, structure.numbers, task, peaks]
     inputs = [of_cell, of_structure]
@@ -58,7 +59,14 @@ def _fractions_of_widths(
 
     A fraction is that by which the width of a result on the lowest α-level falls if one input is
     fixed at its nominal value. Results that depend on a single fuzzy input have no row, and only
-    frames with floors have rows of peaks. The arguments are those of `stage`.
+    frames with floors have rows of peaks.
+
+    Args:
+        campaign: The cell, for E and ν; None without one.
+        structure: The structure, for its peaks; None without one.
+        task: Fuzzy inputs, duration and time step of its response; None without a structure.
+        peaks: Peaks by output, at whose inputs searches begin.
+        _: Surroundings of the stage, which are not used.
 
     Raises:
         CampaignError: Samples of the cell failed.
@@ -72,6 +80,7 @@ def _fractions_of_widths(
             table[name] = dict(zip(shares.names, fractions, strict=True))
     if structure is None or task is None:
         return StageResult(table)
+    # An input such as "m" stands for m1 … mn: they are fixed together, as the case names them.
     if structure.model.floors and len(task.fuzzy) > 1:
         table |= sensitivity(
             structure.model,
@@ -98,6 +107,7 @@ def cell_shares(campaign: CellProblem) -> WidthFractions:
     Raises:
         CampaignError: Samples failed.
     """
+    # Each input takes a campaign of its own, with the others fuzzy.
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
     problem = replace(campaign, modulus=modulus)
     alpha = modulus.alpha[:1]

@@ -102,6 +102,7 @@ class Stage(Generic[T]):
     @cached_property
     def key(self) -> str:
         """Digest of name, inputs, source and libraries."""
+        # The name is part of it: stages of the same inputs have files of their own.
         return fingerprint([self.name, self.inputs], self.packages)
 
     @on_one_blas_thread
@@ -216,6 +217,7 @@ class StageStore:
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
         # A stage alone may use all workers itself, and further files need this process.
+        # The bar moves by the work of stages, which is more even than by their number.
         total = sum(stage.work for stage in stale)
         done = 0.0
         if executor is None or self.folder is None or len(stale) == 1:
@@ -225,6 +227,7 @@ class StageStore:
                 done += stage.work
             return results
         stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
+        # Results are written as they come, so that an interrupted run keeps the finished ones.
         for future in as_completed(stage_of_future):
             stage = stage_of_future[future]
             with _naming_dead_workers(stage.name), TemporaryDirectory() as scratch:
@@ -243,6 +246,7 @@ class StageStore:
         key = stage.key
         if folder is None or self.fresh:
             return None
+        # The key has all that the result depends on: files that were made from it are up to date.
         numbers_file = f"{stage.name}.json"
         arrays_file = f"{stage.name}.nc"
         files = folder.made_from(key)
@@ -261,7 +265,9 @@ class StageStore:
             return None
         self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
-        data = folder.dataset(arrays_file) if arrays_file in files else None
+        data = None
+        if arrays_file in files:
+            data = folder.dataset(arrays_file)
         return StageResult(numbers, data, files, key)
 
     def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
@@ -285,7 +291,10 @@ class StageStore:
             # Files of others under these names are refused before hours of work, not after them.
             for ending in (".json", ".nc"):
                 folder.require_free(f"{stage.name}{ending}")
-            samples = self._sample_store(folder) if stage.has_samples else None
+            samples = None
+            if stage.has_samples:
+                samples = self._sample_store(folder)
+            # Other files go to a temporary folder first: a stage that fails leaves no half result.
             context = StageContext(Path(temporary), samples, self.workers, tick)
             return self._write(stage, stage.run(context), Path(temporary))
 
@@ -340,12 +349,16 @@ class StageStore:
         if computed.data is not None:
             with whole_file(files / f"{stage.name}.nc") as partial:
                 computed.data.to_netcdf(partial)
-        before = self.folder.files[name].source if name in self.folder.files else ""
+        # Files that an earlier result had beyond those of this one are removed with it.
+        before = ""
+        if name in self.folder.files:
+            before = self.folder.files[name].source
         self.folder.put_files(key, files, before)
         return replace(computed, files=self.folder.made_from(key), fingerprint=key)
 
     def put_text(self, name: str, text: str) -> None:
         """Write a text file of the run itself, such as summary.json."""
+        # Under MPI several ranks writing one file would damage it.
         if self.folder is not None and rank() == 0:
             self.folder.put_text(name, text)
 

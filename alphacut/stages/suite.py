@@ -59,7 +59,7 @@ def suite_records(
 
 def linear_model(structure: Structure) -> LinearSystem:
     """Return the model of a structure that records move, since `suite_records` refuses others."""
-    assert structure.linear is not None
+    assert structure.linear is not None  # also of a frame that yields, whose stiffness is initial
     return structure.linear
 
 
@@ -70,6 +70,7 @@ def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
 
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
     """Return the stage that computes the peaks of a structure under a record."""
+    # The duration of a record tells how much work it is, compared with the others.
     inputs = [structure.model, structure.numbers, record, task]
     compute = partial(_peaks, structure, task, record)
     packages = ("fuzzy", "frame")
@@ -187,6 +188,7 @@ def incremental_stage(
     def compute(context: StageContext) -> StageResult[Increments]:
         return StageResult(increments_of(analysis, limits, context.tick))
 
+    # The analysis has the frame, the record and the cuts of the inputs, so that it stands for them.
     inputs = [analysis, list(limits.values())]
     packages = ("fuzzy", "frame")
     work = analysis.duration

@@ -109,6 +109,7 @@ class Results:
         structure = self.structure
         if structure is None or structure.linear is None or not structure.floor_masses:
             return None
+        # Heights are shown as references of drifts: those of drifts that nobody observes are not.
         omega = frequencies(structure.linear)
         observed = set(structure.outputs)
         heights = {x: height.nominal for x, height in structure.heights.items() if x in observed}
@@ -127,6 +128,7 @@ class Results:
             Lower end of the support, nominal value and upper end of "zeta", or of "zeta1", "zeta2"
             … of each mode. Empty where the case states the damping itself.
         """
+        # Ratios that the case states are inputs, which a table of results need not repeat.
         if self.structure is None or not self.content.has_material_damping:
             return {}
         return {
@@ -168,8 +170,8 @@ class Parts:
             TypeError: A name in `further` is no field, or a field without a default is missing.
         """
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
-        parts: dict[str, Any] = {
-            **{name: x.numbers for name, x in results.single.items()},
+        parts: dict[str, Any] = {name: x.numbers for name, x in results.single.items()}
+        parts |= {
             "structure": results.frame_result,
             "damping": results.damping,
             "envelopes": {
@@ -179,10 +181,12 @@ class Parts:
             "records": results.suite,
             "update": results.learned,
         }
-        return cls(**{**parts, **results.answers, **further})
+        # Answers are fields under the keys of their questions.
+        return cls(**(parts | results.answers | further))
 
     def parts(self) -> Document:
         """Return all parts by name but those that the run lacks, as a JSON document."""
+        # Empty texts and numbers of zero are results; None and empty tables are missing stages.
         values = {x.name: getattr(self, x.name) for x in fields(self)}
         is_there = {name: value is not None and value != {} for name, value in values.items()}
         return {name: to_document(x) for name, x in values.items() if is_there[name]}
@@ -191,7 +195,8 @@ class Parts:
     def encloses(self) -> str:
         """Name of the set of inputs around which the peaks are those of a box; empty without."""
         peaks = [peak for study in self.envelopes.values() for peak in study.peak.values()]
-        peaks += [*self.records.peak.values()] if self.records else []
+        if self.records is not None:
+            peaks.extend(self.records.peak.values())
         return next((peak.encloses for peak in peaks if peak.encloses), "")
 
     @property
@@ -222,7 +227,7 @@ class Parts:
 
         found: dict[str, ShownUnit] = {}
         for output, unit in units.items():
-            if unit == "m/s^2":
+            if unit == "m/s^2":  # engineers state accelerations in g
                 found[output] = ShownUnit("g", 1 / STANDARD_GRAVITY)
             else:
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
@@ -279,6 +284,7 @@ class Summary(Parts):
         try:
             return from_document(cls, json.loads(content))
         except (ValueError, RecursionError) as error:
+            # Both readers begin their messages with what is wrong, such as the name of the key.
             keys = str(error).partition(":")[0] or "no JSON object"
             what = f"damaged ({SUMMARY}: {keys})"
             raise RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN) from None
