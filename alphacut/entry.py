@@ -79,6 +79,7 @@ def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, di
     for name, file in commands.items():
         command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
         about = f"{command.about[:1].upper()}{command.about[1:]}."
+        # No abbreviations of options: one that is unique today need not be so with the next option.
         of_command = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
@@ -103,7 +104,9 @@ def main(
         program: The program's name, for messages.
         names: File in `alphacut.commands` of each command, by the command's name.
     """
-    words = sys.argv[1:] if arguments is None else arguments
+    words = arguments
+    if words is None:
+        words = sys.argv[1:]
     with interrupt_on_stop_signals() as signals:
         try:
             with show_log(DEBUG in words):

@@ -253,8 +253,8 @@ def modes_document(modes: NominalModes) -> dict[str, object]:
     """Return the natural modes of a structure as a JSON document, by rising frequency.
 
     "periods_s", "damping_ratios" and "effective_masses_kg" are lists with an entry for each mode;
-    "moved_mass_kg" is the mass that moves with the ground. Only the lowest frequencies can be zero:
-    the period of such a mode is above 1e300 s, since JSON has no infinity.
+    "moved_mass_kg" is the mass that moves with the ground. A frequency of zero, which no structure
+    of a case has, would give a period above 1e300 s, since JSON has no infinity.
     """
     return {
         "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),
@@ -457,7 +457,7 @@ def _entries(value: object) -> dict[str, object]:
         return {f".{name}": entry for name, entry in value.items()}
     if type(value) is not tuple:  # a named tuple is one value
         return {"": value}
-    if len(value) == 1:
+    if len(value) == 1:  # one entry, which holds for all floors
         return {"": value[0]}
     return {f"[{number}]": entry for number, entry in enumerate(value, start=1)}
 
@@ -473,6 +473,7 @@ def _words_and_kind(entry: object) -> Iterator[tuple[str, str]]:
         The text, in SI units with prefixes or in GPa, and the kind in a word or two.
     """
     match entry:
+        # Types are told apart by their own classes, since keys may take several of them.
         case (FuzzyNumber() as force, str(si)):
             yield _numbers(force, si), _kind_of(force) + _mark_of_size(force, si)
         case ForceHistory(History(frequency=omega)) if omega:  # in rad/s; 0 of other histories
@@ -492,6 +493,7 @@ def _mark_of_size(number: FuzzyNumber, si: str) -> str:
     """Return `UNUSUAL` if a quantity, in the SI unit `si`, is 0 nowhere and of an unusual size."""
     smallest, largest = QUANTITIES[si].usual
     sizes = [abs(end) for end in number.support]
+    # A support that begins at 0, as of a velocity at rest, has no order of size to judge.
     is_usual = min(sizes) == 0 or (smallest <= min(sizes) and max(sizes) <= largest)
     if is_usual:
         return ""
@@ -542,9 +544,11 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
         peaks = json.loads(folder.content(f"{name}.json"))["result"]["peak"].values()
         nature = str(data.attrs["nature"])
         n_motions = 0
-        if "motion_inputs" in data:  # which guaranteed envelopes alone store
+        # Responses are stored where the bounds of the envelope, or wider ones beside them, are
+        # guaranteed.
+        if "motion_inputs" in data:
             points, motions = stored_motions(data)
-            lower, upper = np.moveaxis(data["cut"].values, -1, 0)
+            lower, upper = np.moveaxis(data["cut"].values, -1, 0)  # of shape (levels, inputs)
             Trial(envelope_of(data), lower, upper).require_agreement(points, motions)
             n_motions = len(points)
             verdict = f"{n_motions} exact motions {agreement(nature == Nature.GUARANTEED)}"

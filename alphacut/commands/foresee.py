@@ -166,18 +166,32 @@ def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.
     def tick(done: float) -> None:
         """Raise InterruptedWorkError with the time of the whole stage, as soon as it is known.
 
-        Called with the completed fraction; the first call above 0 is the end of the setup.
+        Of the outer function it uses `start`, the time when the stage began; `power`; and, if
+        `has_setup`, the list `setup_end`, to which the first call with progress adds its seconds
+        since the start and its progress.
+
+        Args:
+            done: Completed fraction of the stage, rising from 0 to 1.
+
+        Raises:
+            InterruptedWorkError: The stage has worked for two seconds since its start or the end of
+                its setup. The argument is the time that all of it would take, in s.
         """
         seconds = perf_counter() - start
         if not done:
             return
         if has_setup and not setup_end:
             setup_end.append((seconds, done))
-        first_seconds, first_done = setup_end[0] if has_setup else (0.0, 0.0)
+        first_seconds = 0.0
+        first_done = 0.0
+        if has_setup:
+            first_seconds, first_done = setup_end[0]
         if seconds - first_seconds > LONG_ENOUGH and done > first_done:
             fraction = ((done - first_done) / (1 - first_done)) ** power
             raise InterruptedWorkError(first_seconds + (seconds - first_seconds) / fraction)
 
+    # An exception is the only way out of a computation of somebody else's code. The stage has no
+    # folder, so that nothing half done is left.
     try:
         stage.compute(StageContext(tick=tick))
     except InterruptedWorkError as interrupted:
@@ -216,6 +230,7 @@ def _particles(
         pieces = "packings"
         fewer = packing.model_copy(update={"packings": fewest})
         part = section.model_copy(update={"packing": fewer})
+    # The time of the fit, which all packings share, is counted with each: too much by little.
     start = perf_counter()
     numbers = microstructure.stage(part, spheres=spheres).compute(StageContext()).numbers
     seconds = (perf_counter() - start) * number / fewest
@@ -273,6 +288,8 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
         solved.append(found)
         return float(part.image.values.size / study.image.values.size)
 
+    # From fewer than three parts nothing is extrapolated, and the time of an image is about
+    # proportional to its pixels: three are timed however long they take.
     found = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
     if content.has_stated_modulus and not content.has_material_damping:
         return found, Material()
@@ -293,14 +310,17 @@ def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
     values = study.image.values
     window = []
     for length in values.shape:
+        # In d dimensions a part x of the pixels has sides of x^(1/d).
         size = max(min(length, 4), round(length * fraction ** (1 / values.ndim)))
         first = (length - size) // 2
         window.append(slice(first, first + size))
     place = tuple(window)
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
-        least, greatest = study.phase_ranges(level)
-        return least[place], greatest[place]
+        """Return the lowest and the highest phase of each pixel of the window at a level."""
+        # A threshold that is fitted to the image is fitted to all of it, as in the run.
+        lowest, highest = study.phase_ranges(level)
+        return lowest[place], highest[place]
 
     image = GreyImage(values[place], study.image.lengths)
     return replace(study, image=image, phase_ranges=phase_ranges)
@@ -328,6 +348,7 @@ def _motion(
         start = perf_counter()
         _, structure = identify.identify_inputs(content.identify, structure, section.alpha)
         yield Foreseen("identify", 1, "campaigns", perf_counter() - start)
+    # Questions and suites are about the response of [envelope] itself, whatever the studies are.
     (own_task,) = envelope.tasks(section, ())
     if content.records is not None:
         yield from _records(content, structure, own_task)
@@ -352,7 +373,8 @@ def _structure(content: Content, material: Material | None) -> Structure:
     Raises:
         RefusedError: There is no such structure.
     """
-    structure = content.structure_of(*(material or possible_materials(content)[0]))
+    known = material or possible_materials(content)[0]
+    structure = content.structure_of(known.modulus, known.loss)
     # Envelopes of crisp structures take much less time, so that a stand-in must be fuzzy. How wide
     # it is matters less: a tenth is as much as cases usually have.
     if "modulus" not in content.stages or content.modulus.alpha == (1.0,):
@@ -367,10 +389,18 @@ def _structure(content: Content, material: Material | None) -> Structure:
 
 
 def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]:
-    """Return a task of about a fraction of the duration of a motion, and the fraction it is.
+    """Return a task of about a fraction of the duration of a response, and the fraction it is.
 
-    Of very long motions it is a smaller one, since a part of them would take long as well.
+    Args:
+        task: The response, with its duration and time step.
+        fraction: Fraction of the duration, in (0, 1].
+
+    Returns:
+        The task with a duration of eight steps at least, if it has as many, and its part of the
+        whole. Of a response of more than 16,000 steps it is the fraction of these, since parts of
+        all of it would take long as well.
     """
+    # In fewer than eight steps nothing moves, and the cost of starting hides that of steps.
     steps = round(task.duration / task.section.step)
     count = min(steps, max(8, round(fraction * min(steps, MOST_TIMED_STEPS))))
     return replace(task, duration=count * task.section.step), count / steps
@@ -415,8 +445,11 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
     """
     assert content.records is not None
     records = suite.suite_records(content.records, task.section, structure)
-    limited = tuple(dict.fromkeys((*structure.outputs, *content.limited_outputs)))
+    # As in the run: all outputs have peaks, and those that questions limit need not be outputs.
+    limited = tuple(dict.fromkeys(structure.outputs + content.limited_outputs))
     task = replace(task, limited=limited)
+    # Structures that yield take longer the stronger the record is; the median record by duration is
+    # a compromise that costs one computation.
     durations = [record.duration for record in records]
     typical = records[int(np.argsort(durations)[len(records) // 2])]
     start = perf_counter()
@@ -450,12 +483,14 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
         yield Foreseen("probability", 1, "campaigns", begun_seconds(stage))
     if (section := content.questions.get("tolerances")) is not None:
         assert content.tolerances is not None
+        # The largest scale is the widest box, whose envelope takes longest.
         inputs = scale_supports(structure.inputs(task.fuzzy), content.tolerances.most)
         names = [limit.output for limit in section.limits_of(structure)]
         model = structure.model.with_outputs(names)
         method = Auto(PEAK_ERROR, peaks=True)
 
         def run(fraction: float) -> float:
+            """Compute the envelope over about a fraction of the duration; return the fraction."""
             part, done = shortened(task, fraction)
             times: dict[str, Any] = {"duration": part.duration, "step": part.section.step}
             frame_envelope(model, inputs, method, **times, alpha=[0.0], progress=False)

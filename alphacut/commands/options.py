@@ -53,6 +53,7 @@ class Parser(argparse.ArgumentParser):
 
     def refuse(self, word: str) -> NoReturn:
         """Raise the problem of a word that is no option of this command."""
+        # Short forms are left out: a suggestion by likeness means nothing for one letter.
         names = [name for name in self._option_string_actions if name.startswith("--")]
         key = f"{self.prog.removeprefix('alphacut ')}: option"
         raise RefusedError(key, word, ", ".join(names), suggestion(word, names))
@@ -72,6 +73,7 @@ def split_petsc(arguments: Sequence[str]) -> CommandLine:
     value, unless this begins as an option, such as "-x" or "--json", or ends in ".toml", as a case
     does; then, and at the end, the value is empty. Negative numbers such as "-1" are values.
     """
+    # argparse cannot know PETSc's options, of which there are thousands, nor which take a value.
     line = CommandLine([], {})
     option = ""  # whose value may follow
     for word in arguments:
@@ -98,6 +100,7 @@ def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) 
     Raises:
         RefusedError: Naming the first option.
     """
+    # An option that nothing reads would look as if it acted.
     has_prisms = content is not None and (
         content.mesh_cell is not None
         or (content.particle_cell is not None and content.modulus.method == "prism")

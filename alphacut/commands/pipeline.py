@@ -56,6 +56,7 @@ from alphacut.stochastic import FittedRadiusMap
 
 def read_case(options: argparse.Namespace) -> Case:
     """Return the case file that the options name, with the changes of ``--set``."""
+    # Whether options of PETSc have a use is known when the case says how its cell is solved.
     case = load(options.case, options.set)
     require_petsc(options.petsc, case.content)
     return case
@@ -153,6 +154,7 @@ class Pipeline:
             results.microstructure = self.compute_microstructure()
             numbers = results.microstructure.numbers["radius"]
             radius = RadiusMapSection.model_validate(numbers)
+            # Later stages read the computed map as if the case had stated it.
             results.content = self.content.model_copy(update={"radius": radius})
         if "modulus" in stages:
             self.compute_modulus()
@@ -163,7 +165,11 @@ class Pipeline:
         return results
 
     def _kinds_of_stages(self) -> list[str]:
-        """Return the first word of the name of each stage of the run, for the progress."""
+        """Return the kind of each stage of the run: the first word of its name, for the progress.
+
+        A kind stands once for each of its stages: "envelope" for each study, "record" and, where
+        columns yield and fragility is asked for, "incremental" for each record.
+        """
         content = self.content
         kinds: list[str] = [stage for stage in content.stages if stage != "envelope"]
         if "envelope" in content.stages and content.records is not None:
@@ -181,11 +187,18 @@ class Pipeline:
         return kinds
 
     def compute_microstructure(self) -> StageResult[Document]:
-        """Return the result of stage microstructure: the radius map of the particles."""
+        """Return the result of stage microstructure, the radius map, and keep it in the store.
+
+        Raises:
+            RefusedError: The case has no section [microstructure], or a file is not read.
+            FailedError: Particles still overlap after all steps of the packing, or no map fits.
+        """
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
-        draw = _draw_microstructure if self.figures else None
+        draw = None
+        if self.figures:
+            draw = _draw_microstructure
         stage = microstructure.stage(section, spheres=self.content.has_spheres, draw=draw)
         return self.store.take(stage)
 
@@ -207,7 +220,8 @@ class Pipeline:
             stage = image.stage(image_cell, section.alpha, section.average, self.device)
             results.image = self.store.take(stage)
             return
-        self.campaign.require_mesh()  # once, not by each sample
+        # The mesh file is checked here once, with a message for a user, and not by each sample.
+        self.campaign.require_mesh()
         results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
         cell.require_tolerance(numbers.error, section.tolerance)
@@ -231,6 +245,8 @@ class Pipeline:
         content = self.content
         section = self.content.envelope
         assert section is not None  # of stage envelope
+        # α-cuts of the material become fuzzy numbers of the structure. Without a stage the case has
+        # stated them.
         material = results.modulus or results.image
         structure = content.structure
         if material is not None:
@@ -302,7 +318,7 @@ class Pipeline:
             for warning in record.warnings:
                 say(f"warning: {warning}")
         # All outputs have peaks in the results, and those that questions limit need not be outputs.
-        limited = tuple(dict.fromkeys((*structure.outputs, *self.content.limited_outputs)))
+        limited = tuple(dict.fromkeys(structure.outputs + self.content.limited_outputs))
         task = replace(task, limited=limited)
         longest_first = sorted(records, key=lambda record: -record.duration)
         stages = [suite.stage(structure, task, record) for record in longest_first]
@@ -336,6 +352,7 @@ class Pipeline:
             RefusedError: An input or an output does not fit the structure.
             FailedError: A response could not be computed.
         """
+        # A study with the inputs and the duration of [envelope] has been computed with these peaks.
         for study in self.results.tasks:
             if study.has_response_of(task.section):
                 return self.results.envelopes[study.name].numbers.peak
@@ -361,6 +378,7 @@ class Pipeline:
             cells = self.campaign
         task = None
         peaks = dict[str, Peak]()
+        # One study is enough: with more inputs it tells more, and each input takes searches.
         if results.tasks:
             task = max(results.tasks, key=lambda task: (len(task.fuzzy), task.duration))
             peaks = results.envelopes[task.name].numbers.peak
@@ -437,6 +455,7 @@ def _require_motion(content: Content) -> None:
     """
     if content.structure is None or content.envelope is None:
         return
+    # A wrong stand-in must not refuse a right case: one extreme that works is enough.
     errors: list[RefusedError | FailedError] = []
     for material in possible_materials(content):
         try:

@@ -78,6 +78,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     start = time.perf_counter()
     names = list[str]()
     has_figures = not options.no_figures
+    # The lock on the folder is held until the summary is written, so that all files are of one run.
     with open_results(options, folder) as (case, store):
         with pool(store.workers) as executor:
             results = Pipeline(
@@ -146,6 +147,7 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
             into the folder.
         OSError: A file cannot be written.
     """
+    # With two folders the page compares them; `compare` refuses more.
     if len(options.folder) > 1:
         return compare(options, out)
     folder = ResultsFolder.read(Path(options.folder[0]))

@@ -59,6 +59,7 @@ def identified_inputs(result: LearnedInputs) -> Figure:
     """
     alpha = result.alpha
     prior = np.array([result.prior[name] for name in result.inputs], float)  # (inputs, 2)
+    # Inputs have different units and sizes: ratios to the middle share one axis.
     middle = prior.mean(axis=1, keepdims=True)
     before: Look = {"height": 0.7, "color": GREY, "alpha": 0.45, "label": "before"}
     bars = [(prior / middle, before)]
@@ -157,6 +158,8 @@ def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: boo
     if in_steps:
         band["step"] = "post"
         line["drawstyle"] = "steps-post"
+    # Cuts are nested, so that higher levels are drawn over lower ones. On the highest level crisp
+    # inputs leave a band of no width: it is drawn as lines.
     levels = zip(bands.lower[:-1], bands.upper[:-1], style.colours(alpha)[:-1], strict=True)
     for low, high, shade in levels:
         axes.fill_between(x, low, high, color=shade, **band)
@@ -248,6 +251,7 @@ def draw_incremental(answer: Fragility) -> Figure:
         answer: Fragility of a frame that yields, with the peaks under each record at rising
             intensity.
     """
+    # Limits of the same peak share its panel, for they share its curves.
     demands = answer.limits_by_demand
     size = WIDTH, 0.6 + 1.9 * len(demands)
     figure, panels = plt.subplots(len(demands), sharex=True, squeeze=False, figsize=size)

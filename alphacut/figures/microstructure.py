@@ -54,6 +54,8 @@ def draw_pbox(fitted: FittedRadiusMap) -> Figure:
     Args:
         fitted: The radius map, and the sample that it was fitted to.
     """
+    # Both distributions differ by a per cent or so, which is the width of a line above: the lower
+    # panel shows it.
     size = (6.4, 5.6)
     ratios = (3, 1.4)
     figure, (axes, residual_axes) = plt.subplots(

@@ -70,6 +70,7 @@ def save(figure: Figure, stem: Path) -> list[Path]:
 
 def colours(alpha: Array) -> list[Colour]:
     """Return a colour for each α-level: the higher the darker, distinct in grey print as well."""
+    # The ends of the colour map are left out: one is as light as paper, one as dark as lines.
     return [colormaps["YlGnBu"](0.25 + 0.65 * float(level)) for level in alpha]
 
 

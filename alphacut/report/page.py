@@ -106,6 +106,7 @@ def render_template(template: str, **content: object) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # only reports need it
 
     loader = FileSystemLoader(Path(__file__).parent)
+    # StrictUndefined raises for a name that is misspelt in the template, which would else be "".
     templates = Environment(
         autoescape=True,
         loader=loader,
@@ -140,6 +141,7 @@ def plot(
     """
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
+    # The inputs are the same for all peaks, and so is the set that their box encloses.
     encloses = next((peak.encloses for peak in study.peak.values()), "")
     box = ""
     if encloses:
@@ -195,6 +197,7 @@ class Figures:
             Caption and content; None if the run has no such figure, it was taken before, or its
             file is missing or damaged, of which a warning is printed.
         """
+        # Sections of the page take the figures that they know; the rest follows at its end.
         path = self.paths.pop(name, None)
         if path is None:
             return None
@@ -223,6 +226,7 @@ def caption(name: str, captions: Mapping[str, str]) -> str:
     """
     number = ""
     rest = name
+    # Files are named by `alphacut.figures`: what they show is read off their names.
     if match := re.fullmatch(r"fig(\d+)-(.+)", name):
         number = f"Fig. {match[1]}: "
         rest = match[2]

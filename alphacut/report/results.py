@@ -88,6 +88,7 @@ def run_text(parts: Parts) -> str:
         sentences.append(f"{what}: {answer} ({guarantee})")
     sentences.extend(drivers(parts))
 
+    # Readers who do not know α-cuts are told once, before the first number.
     text = ""
     if shown:
         text = f"{MEANING}\n"
@@ -129,6 +130,7 @@ def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
     """
     low, high = (float(end[level]) for end in infinite_if_unknown(cuts))
     if nature is Nature.GUARANTEED:
+        # A declared error belongs to a guaranteed bound: without it the number shown would be none.
         # The lower end falls to 0 at most, unless it was negative before.
         low = max(low - error, min(low, 0.0))
         high += error
@@ -163,6 +165,8 @@ def material(parts: Parts, *, every_constant: bool = False) -> Table:
         rows.extend(_constants(part, every_constant=every_constant))
     if found:
         lowest_level, highest_level = found[0].alpha[[0, -1]]
+    # Loss factors are those of samples and of first order: damping ratios, which follow from them,
+    # claim no more than to be attained.
     for name, (low, nominal, high) in parts.damping.items():
         value = range_text(nominal, nominal, Nature.ATTAINED)
         ends = range_text(low, high, Nature.ATTAINED)
@@ -202,6 +206,8 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
         if part.particles == "mesh":
             error_words = "not declared"
         constants["ν"] = part.nu_cuts
+        # E is that of an isotropic solid with the moduli of the plane. E_T is the modulus across
+        # fibres whose ends are free, which a designer needs beside it.
         for name, cuts in part.fibres.items():
             if every_constant or name == "E_T_GPa":
                 constants[constant_label(name)] = cuts
@@ -255,6 +261,7 @@ def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
         head: Title of each column.
         rows: Text of each column, for each row. Without rows the table has no columns either.
     """
+    # "none" says that a guaranteed range leaves out no error: a column of it says nothing more.
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     filled_rows = [tuple(row[k] for k in columns) for row in rows]
     return Table(tuple(head[k] for k in columns), filled_rows)
@@ -262,6 +269,7 @@ def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
 
 def guaranteed_of(image: ImageResult) -> str:
     """Return a sentence on what the bounds of an image or volume are guaranteed of."""
+    # Segmentation is not part of the claim: a wrong threshold gives right bounds of a wrong image.
     if _is_plane(image):
         what = "image as segmented, repeated periodically, in plane strain"
     else:
@@ -327,6 +335,7 @@ def peak_table(parts: Parts) -> Table:
         studies["records"] = parts.records
     if not studies:
         return Table((), [])
+    # All studies of a case have the same levels.
     alpha = next(iter(studies.values())).alpha
     levels = _shown_levels(studies.values(), alpha)
 
@@ -358,6 +367,7 @@ def peak_table(parts: Parts) -> Table:
                     # Further limits of the same peak do not repeat what is said of it.
                     cells = [""] * len(cells)
     titles = [f"α = {alpha[level]:g}" for level in levels]
+    # At α = 1 triangular numbers have one value, the nominal one, and so has each peak.
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
     head = ["peak of"]
@@ -461,6 +471,7 @@ def display_units(
     if frame is None:
         return
     height = frame.heights_m.get(output_of(name))
+    # Codes limit drifts by the height of a storey, and state base shears over the weight.
     if height is not None:
         yield ShownUnit("  % of storey", 100 / height)
     if is_force:
@@ -489,6 +500,7 @@ def natures(parts: Parts) -> Iterator[str]:
     for peaks in peaks_of_studies:
         for output, peak in peaks.items():
             outputs.setdefault(peak.nature, {})[output] = None
+    # With a single guarantee the names of the outputs tell nothing.
     groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
     if len(groups) == 1:
         groups = [f"all {nature}" for nature in outputs]
@@ -527,13 +539,14 @@ def smaller_steps(parts: Parts) -> Iterator[str]:
         for name, peak in study.peak.items():
             if not peak.is_widened_by_step:
                 continue
-            # What responses add between nodes falls with the square of the step: half a step
+            # Between nodes h apart a curve q leaves its chord by h²/8 max |q''| at most.
+            # What responses add between nodes so falls with the square of the step: half a step
             # leaves a quarter of it.
             saved = 0.75 * peak.between_nodes
             if peak.nature is not Nature.GUARANTEED:
                 what = "an error of"
                 value = float(peak.error[0]) - saved
-            elif peak.is_least:
+            elif peak.is_least:  # the bound of a smallest value is a lower one, and rises
                 what = "at least"
                 value = float(peak.far_end[0]) + saved
             else:
@@ -557,6 +570,7 @@ def answers(parts: Parts) -> list[Row]:
     for answer in parts.answers:
         answer_rows = answer.table().rows
         if isinstance(answer, Tolerances):
+            # The console has no room for a row of each input; page and CSV file have all.
             scale = answer_rows[0]
             count = len(answer_rows) - 1  # one row for each input
             place = "table on the page and in tolerances.csv"
@@ -575,11 +589,13 @@ def drivers(parts: Parts) -> Iterator[str]:
     Args:
         parts: Numbers of the results, with these fractions by result and input in `shares`.
     """
+    # The last output of a case is in general that of the top floor, which moves most.
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
     if "E" in parts.shares:
         yield _driver_sentence("E", parts.shares["E"], count=3)
     for name in peaks[-1:]:
         what = name.replace("the peak", "the reached peak")
+        # Inside a box around a set nothing is known to be reached: the search was in the box.
         if parts.encloses:
             what = f"{name}, as tried in the box around {parts.encloses},"
         yield _driver_sentence(what, parts.shares[name], count=2)
@@ -607,6 +623,7 @@ def comparison(first: Parts, second: Parts) -> Table:
         texts and where the first value is zero. Without a common quantity there is no row.
     """
     rows: list[Row] = []
+    # Runs are compared by the names of quantities, whatever their cases have besides.
     second_values = {entry.what: entry.value for entry in _compared_entries(second)}
     for what, unit, value in _compared_entries(first):
         if what not in second_values:
@@ -638,6 +655,7 @@ def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
     for result in (parts.modulus, parts.image):
         if result is None:
             continue
+        # In SI units, as all entries; without a bound an end is infinite and not compared.
         low, high = (1e9 * float(end[0]) for end in infinite_if_unknown(result.E_GPa))
         if math.isfinite(high):
             yield ComparedEntry("greatest E", gigapascal, high)

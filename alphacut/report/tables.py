@@ -67,6 +67,7 @@ def tables(parts: Parts) -> dict[str, Table]:
 
     Answers are given in their own words.
     """
+    # Answers know what their numbers mean, and say it better than a frame of numbers.
     texts = {name: shown(frame) for name, frame in frames(parts).items()}
     return texts | {answer.key: answer.table() for answer in parts.answers}
 
@@ -75,7 +76,8 @@ def radius_map(numbers: Document) -> pd.DataFrame:
     """Return the minimum, nominal value and maximum of the parameters a1 … a4 of a radius map."""
     rows = []
     for name in ("a1", "a2", "a3", "a4"):
-        corners = np.atleast_1d(numbers[name])  # of a triangular number, or one value
+        # A triangular number has three corners; a crisp one is a single value, and all three.
+        corners = np.atleast_1d(numbers[name])
         rows.append((name, corners[0], corners[len(corners) // 2], corners[-1]))
     head = ["parameter of the radius map", "minimum", "nominal", "maximum"]
     return pd.DataFrame(rows, columns=head)
@@ -127,6 +129,7 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
                 "greatest peak": peak.upper,
                 "error": peak.error,
                 "nature": str(peak.nature),
+                # Unknown values are infinite inside, and empty cells in a file.
                 "peak reached": np.where(np.isfinite(peak.reached), peak.reached, np.nan),
                 "gap, share": peak.gaps,
             }
@@ -178,6 +181,8 @@ def shown(frame: pd.DataFrame) -> Table:
     Args:
         frame: Numbers and texts; a missing number is NaN and becomes an empty text.
     """
+    # Numbers are rounded for the eye; a rounded bound must stay a bound, so that these columns are
+    # rounded in their own directions before the others.
     filled = frame.dropna(axis=1, how="all")
     for low, high, guarantee in (
         ("E from [GPa]", "E to [GPa]", "nature of E"),
@@ -240,6 +245,7 @@ def write_csv(found: Mapping[str, pd.DataFrame], folder: Path) -> list[Path]:
         OSError: A file cannot be written.
     """
     for name, frame in found.items():
+        # Lines end with "\n" on every system, so that equal results give equal files.
         texts = frame.select_dtypes("object").map(_csv_cell)
         content = frame.assign(**texts).to_csv(index=False, lineterminator="\n")
         write_text(folder / f"{name}.csv", content, follow_links=False)
