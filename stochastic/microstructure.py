@@ -177,6 +177,7 @@ class FittedRadiusMap:
         """The slopes "a2" and "a4" of the map as fuzzy numbers."""
         inputs: dict[str, FuzzyNumber] = {}
         for name, ends in self.triangles.items():
+            # A triangle without width is no fuzzy number but the value itself.
             is_fuzzy = ends.lower < ends.upper
             inputs[name] = Triangular(*ends) if is_fuzzy else Crisp(ends.nominal)
         return inputs

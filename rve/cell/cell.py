@@ -170,6 +170,7 @@ class Cell:
 
     def fraction(self, theta: Array) -> Array:
         """Area fraction of the particle at θ of any shape."""
+        # Outlines of all radii are similar, so that areas grow with r².
         return np.asarray(area(self.outline) / AREA * self.radius_map(theta) ** 2)
 
     def fractions(self, theta: Array) -> Array:

@@ -431,9 +431,16 @@ def write(
             gmsh.model.addPhysicalGroup(3, [volume], name=name)
         gmsh.write(str(path))
         for name, values in (fields or {}).items():
-            view, elements = gmsh.view.add(name), np.arange(1, len(values) + 1)
-            data = view, 0, model, "ElementNodeData", elements, values.ravel()
-            gmsh.view.addHomogeneousModelData(*data, numComponents=values.shape[-1])
+            view = gmsh.view.add(name)
+            gmsh.view.addHomogeneousModelData(
+                view,
+                step=0,
+                modelName=model,
+                dataType="ElementNodeData",
+                tags=np.arange(1, len(values) + 1),
+                data=values.ravel(),
+                numComponents=values.shape[-1],
+            )
             # Else each view would bring the whole mesh into the file once more.
             gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
             gmsh.view.write(view, str(path), append=True)

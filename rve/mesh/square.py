@@ -98,7 +98,7 @@ def triangles(
         gradings.append(bend_grading(outline, radius, refinement))
 
     def min_size(x: float, y: float) -> float:
-        return size * min(1.0, *(grading(x, y) for grading in gradings))
+        return size * min(1.0, min(grading(x, y) for grading in gradings))
 
     sizes = min_size if gradings else None
     generate = partial(gmsh_triangles, size, radius, outline, sizes)
@@ -271,7 +271,7 @@ def _spline_steps(outline: Outline) -> int:
         outline: Distance of the edge over the radius, as a function of the polar angle in radians.
     """
     points, radii = bend_radii(outline)
-    largest_ratio = float((np.hypot(*points.T) / radii).max())
+    largest_ratio = float((np.hypot(points[:, 0], points[:, 1]) / radii).max())
     return int(np.clip(4 * np.ceil(largest_ratio), 16, 128))
 
 

@@ -121,5 +121,5 @@ def slice_weights() -> Array:
 
 def vertices_and_midpoints() -> Array:
     """Return the 15 nodes of the reference prism, shape (15, 3)."""
-    vertices, midpoints, *_ = _points_by_entity()
+    vertices, midpoints, _, _ = _points_by_entity()  # faces and the interior have none
     return np.concatenate(vertices + midpoints)

@@ -12,9 +12,6 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.rve.mesh.file import write
 
-FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf"}
-"""Endings of names with the format that they mean."""
-
 
 @dataclass(frozen=True)
 class CellFields:
@@ -57,9 +54,10 @@ class CellFields:
             OSError: The file cannot be written.
         """
         path = Path(path)
-        kind = FORMATS.get(path.suffix)
+        formats = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf"}
+        kind = formats.get(path.suffix)
         if kind is None:
-            raise RefusedError("file", str(path), f"names that end in {', '.join(FORMATS)}")
+            raise RefusedError("file", str(path), f"names that end in {', '.join(formats)}")
         if kind == "gmsh":
             return self._write_gmsh(path)
         import meshio

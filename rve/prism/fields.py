@@ -73,7 +73,7 @@ def fields_of_solution(
             has not three components.
     """
     names = problem.grid.names
-    require(set(stress) == set(names), "stress of phases", [*stress], ", ".join(names))
+    require(set(stress) == set(names), "stress of phases", list(stress), ", ".join(names))
     for name, expression in stress.items():
         shape = expression.ufl_shape
         require(shape == (3,), f"shape of the stress of {name}", shape, "(3,): σ11, σ22, σ12")
@@ -139,7 +139,7 @@ def nodal_fields(
     eps11, eps22, gamma12 = np.moveaxis(loads, -1, 0)
     tensors = np.array([[eps11, gamma12 / 2], [gamma12 / 2, eps22]])  # (2, 2, loads)
     uniform = np.einsum("nj,ijl->nil", positions[problem.node, :2], tensors)
-    displacement = np.empty((grid.nodes, *uniform.shape[1:]))
+    displacement = np.empty((grid.nodes, 2, len(loads)))
     displacement[problem.node] = fluctuation + uniform
 
     # Each node has one point for each phase that meets there, since stresses jump between phases.
@@ -147,7 +147,7 @@ def nodal_fields(
     points, cells = np.unique(point_keys, return_inverse=True)
     cells = cells.reshape(point_keys.shape)
     node = points % grid.nodes
-    mean_stress = np.zeros((len(points), *stress.shape[2:]))
+    mean_stress = np.zeros((len(points), 3, len(loads)))
     np.add.at(mean_stress, cells, stress)
     mean_stress /= np.bincount(cells.ravel())[:, np.newaxis, np.newaxis]
     return CellFields(

@@ -116,7 +116,8 @@ class _NamedModel(NamedPhasesModel):
 
         Args:
             law: Distribution of the random number θ.
-            phases: Materials by name, as for `solve`.
+            phases: Materials by the name of their physical group, or of a level set "matrix" and
+                "inclusion".
 
         Returns:
             Total displacements, in halves of the cell's side, and stresses in Pa for each load.

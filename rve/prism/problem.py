@@ -98,7 +98,7 @@ class SliceStrains:
             np.add.at(self.strain[phase], number, of_triangles)
             np.add.at(self.fractions[phase], number, weights.sum(axis=1))
             theta_weights = self.weights[number, np.newaxis] * weights
-            all_points = points.reshape(-1, *points.shape[2:])
+            all_points = points.reshape(-1, 3, points.shape[-1])
             self.products[phase] += strain_products(all_points, theta_weights.reshape(1, -1))[0]
 
     def combined(self, coefficients: Array) -> SliceStrains:
@@ -303,7 +303,8 @@ class PrismProblem:
         require_valid_elements(self.grid, self.areas, self.comm)
         if isinstance(radius_map, LevelSet):
             inside = self._sign_of(radius_map, positions) < 0  # eq. 14
-            self._phases = np.array([~inside, inside]).reshape(2, *self.areas.shape)
+            shape = 2, len(inside), SLICES_PER_LAYER, POINTS_PER_SLICE
+            self._phases = np.array([~inside, inside]).reshape(shape)
 
     def _sign_of(self, level_set: LevelSet, positions: Array) -> Array:
         """Return a level set's function at the points of this rank's prisms, shape (prisms, 18).

@@ -322,6 +322,7 @@ class SlicesModel(CellModel):
         rule = gauss_rule(radius_map.distribution, points=self.points)
         # The smallest and the largest radius are solved too, for the error in θ.
         extremes = [fine_radii.min(), fine_radii.max()]
+        # Maps that are constant or not monotone have the same radius at several nodes.
         radii = np.unique(_rounded(np.concatenate([radius_map(rule.nodes), extremes])))
         by_radius = [
             solve_slice(radius, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline)

@@ -169,7 +169,7 @@ def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array)
     """
     parts = np.array([phase.stiffness_parts for phase in phases])
     energies = np.einsum("pxij,piaja->pxa", parts, products)
-    moduli = np.full((*energies.shape[:-1], 3), np.nan)
+    moduli = np.full((len(phases), 2, 3), np.nan)
     # The loads give C11 + C12, C33 and C11 − C12 in this order. The energy of (s, s, 0) is
     # 2 s² (C11 + C12), and |load|² is 2 s²; so for the other two, as (2 s)² C33 and 4 s².
     columns = [0, 2, 1][: len(loads)]

@@ -219,8 +219,11 @@ class LayerPattern:
         # A level is the upper end of the layer below it and the lower end of the layer above it.
         lower = [self._lower_hats.entries(layer) for layer in blocks]
         upper = [self._upper_hats.entries(layer) for layer in blocks]
+        # Nothing is below the first level, and nothing above the last one.
         nothing: Array = np.zeros(lower[0].shape)
-        for from_below, from_above in zip([nothing, *upper], [*lower, nothing], strict=True):
+        upper.insert(0, nothing)
+        lower.append(nothing)
+        for from_below, from_above in zip(upper, lower, strict=True):
             yield self._lower_hats.matrix(from_below + from_above)
         for layer in blocks:
             yield self._bubbles.matrix(self._bubbles.entries(layer))

@@ -391,7 +391,7 @@ def least_pbox(
     h2, h4 = fit.mean_shapes
     result = linprog(
         [-h2, h2, -h4, h4],  # the area
-        A_ub=np.concatenate([contains, *is_monotone]),
+        A_ub=np.concatenate([contains, is_monotone.reshape(-1, 4)]),
         b_ub=np.append(bounds, base_slopes),
         bounds=limits,
     )

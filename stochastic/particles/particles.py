@@ -188,9 +188,10 @@ class Pairs:
         return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
     def joined(self, other: Pairs) -> Pairs:
-        """Return the pairs of both, grouped by the first disc i again.
+        """Return the pairs of both, grouped by their first disc again.
 
-        Those of `self` come before those of `other` with the same i.
+        A pair is a disc, another disc or an image of it, and the vector between the centres. Those
+        of `self` come before those of `other` with the same first disc.
         """
         both = Pairs(
             first=np.concatenate([self.first, other.first]),
