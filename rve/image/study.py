@@ -305,11 +305,11 @@ def image_study(
         segmentation.require_certain()
 
     def phase_ranges(level: AlphaLevel) -> tuple[Ints, Ints]:
-        """Return the lowest and the highest phase of each pixel at an α-level.
+        """Return the lowest and the highest phase of each pixel at an α-level, two integer arrays.
 
-        At the level None (nominal values) and with fuzzy thresholds the pixels are compared with
-        the thresholds' cuts; else a picture's noise and light leave phases open. Two integer arrays
-        of the image's shape.
+        The grey values are compared with the α-cuts of the thresholds, at the level None with their
+        nominal values. Only at a level, and with thresholds that are not fuzzy, does the picture's
+        noise and uneven light leave phases open in their place, as its segmentation says.
         """
         # A fuzzy threshold says all that is not known, noise and light included.
         if segmentation is not None and level is not None and not is_fuzzy:

@@ -31,6 +31,7 @@ def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
         s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa; not 0.
         s12: Mean homogenised σ12 under ε12 = 0.01, in Pa.
     """
+    # σ11 is (C11 + C12) ε11, and σ12 is C33 · 2 ε12. C11 − C12 is not known, nor used.
     moduli = np.array([s11, np.nan, s12 / 2]) / STRAIN
     young, poisson = plane_constants(moduli, AXES)
     return float(young), float(poisson)

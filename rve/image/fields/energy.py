@@ -196,7 +196,9 @@ def modes_by_matrices(
 ) -> Iterator[SlabModes]:
     """Yield the modes of fields plus uniform fields by the element's matrix, in slabs of the grid.
 
-    This is the reference of the compiled kernels for voxels, and takes arrays of NumPy or CuPy.
+    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
+    Legendre polynomials that are orthonormal on a cell. This is the reference of the compiled
+    kernels for voxels, and takes arrays of NumPy or CuPy.
 
     Args:
         element: Element of displacements, with modes of the strain, or of stresses.
@@ -208,8 +210,8 @@ def modes_by_matrices(
 
     Yields:
         SlabModes for each slice of the first axis of the grid: `slab`, that slice; `modes`, shape
-        (modes, fields, cells of the slab); and a matrix A and magnitudes b of local unknowns with
-        which modes are off by at most A b + 2⁻⁵³ |modes|.
+        (modes, fields, cells of the slab); and a matrix A, `amplification`, and magnitudes b of
+        local unknowns, `local`, with which modes are off by at most A b + 2⁻⁵³ |modes|.
     """
     xp = namespace(fields)
     matrix = xp.asarray(element.modes)
@@ -234,6 +236,9 @@ def _modes_by_rows(
 ) -> Iterator[SlabModes]:
     """Yield the modes of fields of voxels plus uniform fields, by compiled kernels.
 
+    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
+    Legendre polynomials that are orthonormal on a cell.
+
     Args:
         element: Element of displacements of voxels, with modes of the strain, or of stresses.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a voxel, z, y, x).
@@ -243,8 +248,9 @@ def _modes_by_rows(
 
     Yields:
         SlabModes for some rows of a layer, so that few modes are in memory: `slab`, the index (z,
-        rows); `modes`, shape (modes, fields, voxels); and a matrix A and magnitudes b of the
-        unknowns of a voxel with which modes are off by at most A b + 2⁻⁵³ |modes|.
+        rows); `modes`, shape (modes, fields, voxels); and a matrix A, `amplification`, and
+        magnitudes b of the unknowns of a voxel, `local`, with which modes are off by at most A b +
+        2⁻⁵³ |modes|.
     """
     nz, ny, nx = fields.shape[2:]
     n_rows = max(1, SLAB_CELLS // (len(fields) * nx))
@@ -463,8 +469,10 @@ def _solve_beside_pores(
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:
     """Return a lower bound of the mean energy of any fields with given mean modes, shape (loads,).
 
-    By the inequality of Cauchy and Schwarz the mean of c m² is at least the harmonic mean of c
-    times the square of the mean of m.
+    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
+    Legendre polynomials that are orthonormal on a cell, so that the energy is a mean of
+    coefficients times squared modes. By the inequality of Cauchy and Schwarz the mean of c m² is at
+    least the harmonic mean of c times the square of the mean of m.
 
     Args:
         element: Element, which tells the modes of the trace from those of the deviator.

@@ -122,8 +122,9 @@ class Operator:
         """Return minus the nodal forces of uniform fields: the load of their fluctuations.
 
         Args:
-            mean_modes: Modes of the uniform fields, the rows of the trace first, shape (modes,
-                fields).
+            mean_modes: Modes of the uniform fields, shape (modes, fields): coefficients of the
+                trace, and then of the parts of the deviator, in polynomials that are orthonormal on
+                a cell.
 
         Returns:
             New array of shape (fields, unknowns of a cell, *grid), in the library of the

@@ -35,14 +35,16 @@ def apply_by_rows(
 ) -> Array:
     """Return the nodal forces of fields of voxels plus uniform fields, by compiled kernels.
 
-    Forces are the derivatives by the unknowns of half the energy.
+    Forces are the derivatives by the unknowns of half the energy trace·tr² + deviator·2 dev:dev.
 
     Args:
         element: Element of displacements or of stresses of a voxel.
         trace: Coefficient of the squared trace in each voxel, shape (z, y, x).
-        deviator: Coefficient of the squared deviator (2 dev:dev), of the same shape.
+        deviator: Coefficient of the squared deviator, of the same shape.
         fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
-        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields): coefficients
+            of the trace, and then of the parts of the deviator, in polynomials that are orthonormal
+            on a voxel.
 
     Returns:
         New array in the shape of `fields`.
@@ -61,6 +63,9 @@ def apply_by_rows(
 def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int) -> Array:
     """Return the strain or stress modes of fields in some rows of a layer of voxels.
 
+    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
+    Legendre polynomials that are orthonormal on a voxel.
+
     Args:
         element: Element of displacements or of stresses of a voxel.
         fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
@@ -69,8 +74,8 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
         last: One past the last row, greater than `first`.
 
     Returns:
-        Modes, those of the trace first, shape (modes, fields, voxels of the rows). Each is off by
-        at most `ROUNDINGS` = 32 rounding units of the sum of the magnitudes of its terms.
+        Modes, shape (modes, fields, voxels of the rows). Each is off by at most `ROUNDINGS` = 32
+        rounding units of the sum of the magnitudes of its terms.
     """
     components = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
     tables, terms, groups, factors = element.products

@@ -299,8 +299,10 @@ class PorePotentials:
             nodes: Nodes of the closed pores, at least one, with pores numbered from 0 without gaps.
 
         Returns:
-            The affine space of the unknowns at these nodes, with matrices from mean stresses and
-            from the J parameters of each pore.
+            The affine space of the unknowns at these K nodes of P pores: the `index` of the nodes
+            in an array of fields; `particular`, the matrix from mean stresses, shape (unknowns × K,
+            components); `gauge`, that from the J parameters of each pore, shape (unknowns × K, P ×
+            J); and `inverse`, the pseudo-inverses of the pores' Gram matrices, shape (P, J, J).
         """
         polynomials = _polynomials(element)
         n_gauge = len(polynomials.gauge)

@@ -44,15 +44,20 @@ class Reference:
     def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
         """Return the constant material of a preconditioner, between the extremes of a grid.
 
-        With c of `element.trace_in_deviator`, the largest with ∫ deviator² ≥ c ∫ trace² for a
-        fluctuation, the two combinations that bound the spectrum are the coefficient s of the
-        deviator and b + c s with the coefficient b of the trace. The geometric means of their
-        extremes in the grid make the spectrum narrow.
+        With the largest c of ∫ deviator² ≥ c ∫ trace² for a fluctuation, the two combinations that
+        bound the spectrum are the coefficient s of the squared deviator and b + c s with the
+        coefficient b of the squared trace. The geometric means of their extremes in the grid make
+        the spectrum narrow.
 
         Args:
-            element: Element of displacements or of stresses.
-            trace: Coefficient of the squared trace in each cell, not negative, of the grid's shape.
-            deviator: Coefficient of the squared deviator in each cell, positive, of the same shape.
+            element: Element of displacements or of stresses, which knows c.
+            trace: Coefficient b of the squared trace in each cell, not negative, of the grid's
+                shape.
+            deviator: Coefficient s of the squared deviator in each cell, positive, of the same
+                shape.
+
+        Returns:
+            The material's coefficients b and s, and c.
         """
         c = element.trace_in_deviator
         min_deviator = float(deviator.min())
@@ -126,8 +131,10 @@ class FourierPreconditioner:
             xp: Module of the library of the arrays that the inverse is applied to.
 
         Returns:
-            Real blocks by wave number, in double precision for pixels and in single precision for
-            voxels.
+            Real blocks of the inverse by wave number, shape (unknowns, unknowns, *waves), and the
+            phases of the unknowns that make them real, shape (unknowns, *waves); in double
+            precision for pixels, in single precision for voxels, where blocks are scaled by a power
+            of two.
         """
         waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
         waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
