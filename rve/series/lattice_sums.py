@@ -39,9 +39,10 @@ class LatticeSums:
     def natanzon_period(self) -> float:
         """Constant g in the jump Q(z + P) − Q(z) = conj(P) ℘(z) + g P of Natanzon's function Q.
 
-        Q is Σ_P conj(P) [(z − P)^-2 − P^-2 − 2 z P^-3] over the images P ≠ 0, ℘ Weierstrass'
+        Q is Σ_P conj(P) [(z − P)^-2 − P^-2 − 2 z P^-3] over the images P = 2p ≠ 0, ℘ Weierstrass'
         function, and P in the jump any period. The constant follows at z = −1 with P = 2, since Q
-        is odd and ℘ is even: 2 Q(1) = 2 ℘(1) + 2 g.
+        is odd and ℘ is even: 2 Q(1) = 2 ℘(1) + 2 g. Both are power series in z, with the sums Σ
+        p^-n of `self.plain` and Σ conj(p) p^-n of `self.conjugate`.
         """
         n = np.arange(2, len(self.plain))
         half = 0.5**n

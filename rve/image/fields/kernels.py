@@ -208,7 +208,7 @@ def _fill_modes(
         first: First row along y.
         last: One past the last row.
         modes: Overwritten; shape (6 components × n modes along z × n along y × n along x, fields,
-            voxels of the rows).
+            voxels of the rows), the voxels along x within those along y.
     """
     n = tables.shape[-1]
     nx = fields.shape[-1]
