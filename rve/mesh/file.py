@@ -69,6 +69,9 @@ def mesh_content(path: Path | str) -> bytes:
     reads no file at all. Sections $Comments before $MeshFormat are left out; what follows
     $MeshFormat is not looked at.
 
+    Args:
+        path: The file, text or binary; its name may have any ending.
+
     Raises:
         RefusedError: The file does not exist, is a pipe or a device, is too large for the free
             memory, is empty, or begins with neither $MeshFormat nor $Comments.
@@ -220,12 +223,6 @@ def _quarters() -> Array:
     return np.array([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]])
 
 
-UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
-"""Order of a prism's nodes that puts its upper triangle first."""
-MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
-"""Order of a prism's nodes that exchanges two vertices of its triangles."""
-
-
 def orient(prisms: Prisms) -> Prisms:
     """Reorder the nodes of prisms so that the first triangle is the lower one, counterclockwise.
 
@@ -239,15 +236,19 @@ def orient(prisms: Prisms) -> Prisms:
     Returns:
         New prisms with reordered `cells`; points, phases and names are those of `prisms`.
     """
+    # Orders of a prism's nodes in which the upper triangle comes first, and in which the second and
+    # the third vertex of both triangles are exchanged.
+    upside_down = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
+    mirrored = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
     cells = prisms.cells.copy()
     points = prisms.points
     is_falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
-    cells[is_falling] = cells[is_falling][:, UPSIDE_DOWN]
+    cells[is_falling] = cells[is_falling][:, upside_down]
     first = points[cells[:, 0], :2]
     a = points[cells[:, 1], :2] - first
     b = points[cells[:, 2], :2] - first
     is_clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
-    cells[is_clockwise] = cells[is_clockwise][:, MIRRORED]
+    cells[is_clockwise] = cells[is_clockwise][:, mirrored]
     return replace(prisms, cells=cells)
 
 

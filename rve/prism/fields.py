@@ -54,7 +54,7 @@ def solved_fields(
 def fields_of_solution(
     problem: PrismProblem, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], load: Array
 ) -> CellFields:
-    """Return displacements and stresses at the nodes, for a solution of a law of the user.
+    """Return displacements and stresses at the nodes, for a solution of a material law of the user.
 
     Args:
         problem: The cell that it was solved on, on one rank.
@@ -65,8 +65,8 @@ def fields_of_solution(
         load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
 
     Returns:
-        Total displacements, and stresses as means over the prisms of one phase that meet in a node,
-        for the one load.
+        Total displacements in halves of the cell's side, and stresses in Pa as means over the
+        prisms of one phase that meet in a node, for the one load.
 
     Raises:
         RefusedError: The names in `stress` are not exactly those of the phases, or an expression

@@ -108,9 +108,16 @@ class PrismModel(CellModel):
     def with_resolution(cls, resolution: Resolution) -> Self:
         """Return prisms with the mesh size, layers and solver that a resolution asks for.
 
-        A third load is solved if the resolution asks for the whole stiffness. Its `tolerance` and
-        `energies` are not used: prisms have no error that is known before, and always give
-        energies. `modulus_range` stays None.
+        Args:
+            resolution: How finely to solve. A third load is solved if it asks for the whole
+                stiffness. Its `tolerance` and `energies` are not used: prisms have no error that is
+                known before, and always give energies.
+
+        Returns:
+            A model without a `modulus_range`, which shares no solutions among samples.
+
+        Raises:
+            RefusedError: A value of the resolution is not allowed.
         """
         return cls(
             resolution.mesh_size,
@@ -251,6 +258,10 @@ class PrismModel(CellModel):
 
         The object is cached: a later call with a map of the same reference radius moves the mesh of
         the object that was returned before.
+
+        Args:
+            radius_map: Radius r(θ) of the particle, in halves of the cell's side, with the
+                distribution of θ.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.

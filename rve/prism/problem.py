@@ -274,8 +274,10 @@ class PrismProblem:
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the interface r(θ) of a map, or mark the particles of a level set.
 
-        It sets `map`, `density` and `areas`, and the phases of a level set (eq. 13, 14). After an
-        error the object must be moved again before use.
+        It sets `map`, `density` (that of θ at the quadrature points) and `areas` (weights of these
+        points in their slice). For a level set z it also sets the phase of each quadrature point,
+        which is in the inclusion where z < 0 (eq. 14). After an error the object must be moved
+        again before use.
 
         Args:
             radius_map: Radius of the particle over θ with the distribution of θ, or a level set

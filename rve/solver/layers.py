@@ -297,8 +297,14 @@ def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
 def _periodicity(numbering: LevelNumbering) -> sp.csr_matrix:
     """Return the matrix of ones from the pairs of unknowns of a layer to the nodes of its prisms.
 
-    Rows are the nodes of the level below, the vertices of the mid-level and the nodes of the level
-    above; a node that is held has no entry. Columns are the pairs of unknowns in the same order.
+    Args:
+        numbering: Numbers of the pairs of unknowns of a plane, the same for periodic partners and
+            −1 where a node is held, and the sizes of a level and of a mid-level.
+
+    Returns:
+        Sparse matrix. Rows are the nodes of the level below, the vertices of the mid-level and the
+        nodes of the level above; a node that is held has no entry. Columns are the pairs of
+        unknowns in the same order.
     """
     planar = numbering.planar
     vertices = planar[: numbering.grid.plane.vertices]
@@ -319,8 +325,12 @@ def _rows(pattern: sp.bsr_matrix) -> Ints:
 def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
     """Return the CSR pattern of a matrix of blocks of 2 × 2.
 
-    Its values are no entries but places: where each entry stands in the array of all blocks, of
-    shape (blocks, 2, 2), read in the order of C.
+    Args:
+        pattern: Matrix of blocks; its values are not used.
+
+    Returns:
+        Matrix whose values are no entries but places: where each entry stands in the array of all
+        blocks, of shape (blocks, 2, 2), read in the order of C.
     """
     places = np.arange(pattern.data.size).reshape(-1, 2, 2)
     blocks = sp.bsr_matrix((places, pattern.indices, pattern.indptr), pattern.shape)

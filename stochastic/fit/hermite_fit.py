@@ -182,13 +182,16 @@ class HermiteFit:
         return float(weights @ h[1]), float(-weights @ h[3])
 
     def _nearest_monotone(self, best: Array) -> Array:
-        """Return the slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
+        """Return the slopes a2, a4 of the monotone map nearest to another map, shape (2,).
 
         The distance is the root of the mean square over θ. With the Gram matrix L Lᵀ of the
         functions that a2 and a4 multiply and x = Lᵀ (slopes − best), this is the shortest x with G
         x ≥ h, a row for each of 401 even ξ in [0, 1] at which dr/dξ must be at least 2e-5 (a3 −
         a1). It follows from a problem of non-negative least squares (least distance programming:
         Lawson, Hanson 1974, chapter 23).
+
+        Args:
+            best: Slopes a2, a4 of the other map, which need not be monotone, shape (2,).
         """
         from scipy.optimize import nnls
 

@@ -17,8 +17,6 @@ from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import (
-    MIRRORED,
-    UPSIDE_DOWN,
     orient,
     read_grid,
     read_prisms,
@@ -28,6 +26,7 @@ from alphacut.rve.mesh.file import (
 from alphacut.rve.mesh.msh import DamagedMeshError, parse_msh
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.prism_grid import Prisms
+from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 MESHES = Path(__file__).parents[3] / "meshes"
@@ -356,7 +355,11 @@ def test_prisms_of_any_orientation_are_set_upright():
     grid = extrude(size=0.6, radius=0.4, layers=2)
     points = grid.positions(HermiteMap(0.4, 0, 0.4, 0))
     right = Prisms(points, grid.cells, grid.phase, grid.names)
-    for order in (UPSIDE_DOWN, MIRRORED, [UPSIDE_DOWN[k] for k in MIRRORED]):
+    nodes = vertices_and_midpoints()
+    falling = nodes * [1, 1, -1] + [0, 0, 1]
+    mirrored = nodes[:, [1, 0, 2]]
+    for images in (falling, mirrored, falling[:, [1, 0, 2]]):
+        order = [int(np.argmin(np.abs(nodes - image).sum(axis=1))) for image in images]
         wrong = replace(right, cells=grid.cells[:, order])
         assert {tuple(row) for row in orient(wrong).cells} & {tuple(row) for row in grid.cells}
         volume = np.linalg.det(
