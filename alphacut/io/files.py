@@ -98,7 +98,12 @@ def say(message: str) -> None:
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Raise RefusedError for an option that names a file or folder where nothing can be written.
 
-    Options of output are --out, --json, --export, --csv and --tables; "-" is standard output.
+    Options of output are --out, --json, --export, --csv and --tables. They name a folder if their
+    metavar is FOLDER, else a file; "-" is standard output. Options that are not given pass.
+
+    Args:
+        parser: Parser of the command.
+        options: What it has read from the command line.
     """
     options_of_output = ("out", "json", "export", "csv", "tables")
     # It is found here before a computation of hours, whose result could not be written.

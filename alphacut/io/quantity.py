@@ -381,7 +381,8 @@ def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
     """Return a quantity in the SI unit `si` as a fuzzy number, whose kind the count of values says.
 
     One value is crisp, two are an interval, three a triangular number (lower end, value of
-    membership 1, upper end), four a trapezoidal one. A spread such as "20 t ± 5 %" is an interval.
+    membership 1, upper end), four a trapezoidal one. Values may be equal. A spread such as
+    "20 t ± 5 %" is an interval.
 
     Args:
         value: Text with a unit, such as "[75, 80, 85] GPa"; a bare number or a list of numbers

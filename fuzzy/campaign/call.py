@@ -53,7 +53,8 @@ class Values:
         by side there, in the order of the pairs (name, shape) of `layout`.
 
         Args:
-            name: Name of the whole output, such as "s11", not of one of its entries.
+            name: Name of the whole output, such as "s11", not of one of its entries. It must have
+                an entry.
 
         Raises:
             RefusedError: No output has this name.

@@ -93,10 +93,11 @@ def _processes(workers: int) -> Executor:
 
 
 def _end_with_parent(parent: int) -> None:
-    """Let this worker process end with the process that has started it, and no earlier.
+    """Let this worker process end when the process that has started it has ended.
 
-    SIGTERM ends it at once, and Ctrl-C and hang-ups are ignored from now on. A thread looks five
-    times a second whether the parent has ended, and then ends this process without cleaning up.
+    A thread looks five times a second whether the parent has ended, and then ends this process
+    without cleaning up. From now on Ctrl-C and hang-ups are ignored, and SIGTERM ends the process
+    at once.
 
     Args:
         parent: Process id of the parent.

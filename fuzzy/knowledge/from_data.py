@@ -137,7 +137,9 @@ def mean_cuts(data: Observations) -> Stepwise:
     fractions = np.arange(n + 1) / n
     partial_means = np.append(0.0, np.cumsum(data.values)) / n
     # An edge of the band moves the fraction `band` of the values, those farthest away, to a bound:
-    # the largest values to the lower bound, or the smallest values to the upper one.
+    # the largest values to the lower bound, or the smallest values to the upper one. What remains
+    # adds the integral of the sorted values over the other fractions, whose primitive is
+    # `partial_means`: the sum of the k smallest values over n at the fraction k/n.
     lower = low * band + np.interp(1 - band, fractions, partial_means)
     upper = high * band + partial_means[-1] - np.interp(band, fractions, partial_means)
     # Rounding must not lead out of the bounds, nor out of the cut at the next lower level.

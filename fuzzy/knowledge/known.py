@@ -122,6 +122,7 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
 
     # Of a pair (i, j) the output may not fall from i to j if no input steps against its sign: the
     # way from i to j then changes one input after another, each without letting the output fall.
+    # Entry (i, j) of the arrays below belongs to the pair.
     point_steps = points[rows][None] - points[rows][:, None]
     signed_steps = point_steps * np.where(signs, signs, 1)
     is_allowed_step = (signed_steps >= 0) & ((signs != 0) | (signed_steps == 0))

@@ -149,7 +149,7 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
     windows_by_level = {level: (low, high)}
     while low < high:
         # Remove the gap at an open end first, then the less probable gap of the two ends, then the
-        # gap at the end where less was removed.
+        # gap at the end where less was removed. Tuples are compared in this order, False first.
         is_low_closed = not open_ends[0] or low > 0
         is_high_closed = not open_ends[1] or high < n
         lowest = (is_low_closed, gaps.inside[low], gaps.below[low])

@@ -165,8 +165,10 @@ class _AutomaticSearch:
         """Return the outputs whose bounds are estimated, and not only attained, shape (outputs,).
 
         They are the monotone ones (`is_monotone`), which two corners of each cut bound, and those
-        whose search by descents (`linkage`) has met its stopping rule for both bounds in all cuts
-        and has shown no jumps or waves beside a trend (`is_rough`).
+        whose search by descents (`linkage`) is complete and has shown no jumps or waves beside a
+        trend (`is_rough`). A search is complete if, for the minimum and the maximum in all cuts,
+        the expected fraction of the cut in basins that were not seen is below 0.002, and the output
+        is smooth at the best optimum. Without a search only the monotone ones are returned.
         """
         linkage = self.linkage
         if linkage is None:

@@ -115,8 +115,8 @@ class Domain:
         """Check the fields, and replace them: levels by a tuple, plain numbers by `Crisp`.
 
         A claimed number (of measured values) has a level `decided`, below which its values do not
-        decide the cut. If all levels here lie above, it is replaced by a copy with the level 0,
-        whose cuts are the same at these levels and can be asked for at any other.
+        decide the cut. If no level here lies below it, the number is replaced by a copy with the
+        level 0, whose cuts are the same at these levels and can be asked for at any other.
 
         Raises:
             RefusedError: There is no input or level, the levels do not rise within [0, 1], an input
@@ -130,6 +130,7 @@ class Domain:
                 # The cut of the lowest level is the widest: if the values decide it, they decide
                 # all.
                 number.cut(alpha[0])  # raises where the values do not decide the cut
+                # Methods ask for the support as a length scale, also where no level is 0.
                 inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", inputs)
