@@ -107,6 +107,9 @@ def propagate(
     require(is_allowed, "executor", value=executor, allowed=allowed)
     # Samples of another model in the same store have another key. Without a store nothing can be
     # mixed up, so that an identity need not be given.
+    is_knowledge = knowledge is None or isinstance(knowledge, Knowledge)
+    allowed = "facts, as Knowledge(signs={'load': 1})"
+    require(is_knowledge, "knowledge", value=knowledge, allowed=allowed)
     model = b""
     if store is not None:
         model = model_key(identity or {})

@@ -254,7 +254,7 @@ class Bounds:
         """Return one output as a fuzzy number; between two levels the wider α-cut holds.
 
         Args:
-            output: Name of the output; its bounds must not be over time.
+            output: Name of the output.
 
         Returns:
             A fuzzy number with the α-cuts of the output. If inputs come from measured values, and
@@ -262,10 +262,12 @@ class Bounds:
             claim of the result, which holds from the lowest level on.
 
         Raises:
-            RefusedError: There is no such output, or the inputs carry no claim and the levels do
-                not run from 0 to 1.
+            RefusedError: There is no such output, its bounds are over time, or the inputs carry no
+                claim and the levels do not run from 0 to 1.
         """
         ends = self.bounds(output)
+        cure = "bounds() has the ends at each time"
+        require(self.time is None, output, "a range at each time", "one number", cure)
         # The cut of a lower level contains every cut up to the next one, so it is safe in between.
         steps = outer_steps(self.alpha, ends.lower, ends.upper, encloses=self.encloses)
         claim = self.claim.claim

@@ -37,7 +37,7 @@ class Values:
 
         `layout` has the pairs (name, shape) of the outputs in column order. An output E of shape ()
         is the column "E"; an output s of shape (2, 2) is the columns "s[0][0]", "s[0][1]",
-        "s[1][0]" and "s[1][1]", the last index running first. An output without entries has none.
+        "s[1][0]" and "s[1][1]", the last index running first.
         """
         names = []
         for name, shape in self.layout:
@@ -53,8 +53,7 @@ class Values:
         by side there, in the order of the pairs (name, shape) of `layout`.
 
         Args:
-            name: Name of the whole output, such as "s11", not of one of its entries. It must have
-                an entry.
+            name: Name of the whole output, such as "s11", not of one of its entries.
 
         Raises:
             RefusedError: No output has this name.
@@ -269,8 +268,8 @@ def _outcome(output: object) -> Outcome:
     Returns:
         `Sample` with the pairs (name, shape) of the outputs in their order, and all entries of all
         outputs in one array, shape (columns,). `Failure` with the type and the text of the error
-        if `output` is an exception, a value is not a finite real number, there is no number at
-        all, or two columns have one name. Nothing is raised.
+        if `output` is an exception, a value is not a finite real number, an output has no entry or
+        there is no output, or two columns have one name. Nothing is raised.
     """
     try:
         if isinstance(output, Exception):
@@ -295,12 +294,13 @@ def _finite_array(name: str, value: ArrayLike | None) -> Array:
 
     Raises:
         RefusedError: A value is complex, no number (a text, None, another object), not finite or
-            masked, or `value` has a unit.
+            masked, there is none, or `value` has a unit.
         ValueError: Nested lists have different lengths.
     """
     # A masked entry has no value, and an array with a unit loses it on conversion: both would pass
     # as plain numbers.
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
+    # `all` of a masked array without entries is masked, which counts as False below.
     is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()
     if not is_allowed:  # not by `require`: the text of an array takes longer than all else here

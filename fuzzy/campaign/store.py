@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import FailedError, require
+from alphacut.base.errors import FailedError, path_of, require
 from alphacut.base.kept_files import is_regular, read_regular
 from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 
@@ -88,7 +88,7 @@ class Store:
         path: Path of the file.
 
     Raises:
-        RefusedError: The file is not a store, or it cannot be created.
+        RefusedError: The path is none, the file is not a store, or it cannot be created.
         FailedError: SQLite cannot use the file.
 
     Example:
@@ -106,7 +106,7 @@ class Store:
     by which a store is known."""
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+        self.path = path_of("store", path)
         self._rows: dict[tuple[bytes, str], Row] = {}
         cure = "move it away, or name another path"
         try:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.base.errors import checked_number, require
+from alphacut.base.errors import checked_number, require, require_sequence
 from alphacut.fuzzy.sets.numbers import Stepwise
 
 Values = Sequence[float] | NDArray[np.float64]
@@ -51,19 +51,23 @@ class Observations:
                 bound. Values on a bound are allowed.
 
         Raises:
-            RefusedError: There is no value, one is not a finite number or lies outside the bounds,
-                or the lower bound is not below the upper one.
+            RefusedError: The values are no list, tuple or array, there is none, one is not a finite
+                number or lies outside the bounds; or the bounds are not two, or the lower one is
+                not below the upper one.
         """
+        allowed = "(lower, upper) with lower < upper, None for none"
         # Without a bound the end is infinite, so that no comparison below needs a special case.
         low = -np.inf
         high = np.inf
         if bounds is not None:
+            require_sequence("bounds", bounds, allowed)
+            require(len(bounds) == 2, "bounds", value=bounds, allowed=allowed)
             if bounds[0] is not None:
                 low = checked_number("lower bound", bounds[0])
             if bounds[1] is not None:
                 high = checked_number("upper bound", bounds[1])
-        allowed = "(lower, upper) with lower < upper, None for none"
         require(low < high, "bounds", value=bounds, allowed=allowed)
+        require_sequence("values", values, "a list of one or more numbers")
         require(len(values) > 0, "values", value=list(values), allowed="one or more")
         within = f"values within the bounds [{low:g}, {high:g}]"
         for number, value in enumerate(values, 1):

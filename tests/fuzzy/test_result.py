@@ -69,6 +69,12 @@ def test_attained_bounds_lie_inside_proved_ones_but_for_the_error_of_the_scheme(
         replace(proved, inner=Ends(found.lower, found.upper + 2 * 16e-9))
 
 
+def test_a_range_at_each_time_is_no_number():
+    assert bounds().number("y").cut(0) == (1, 16)
+    with pytest.raises(RefusedError, match="y is a range at each time"):
+        bounds(time=np.array([0.0, 1.0])).number("y")
+
+
 def test_text_and_dataset_say_nature_error_and_unit():
     for time in (None, np.array([0.0, 1.0])):
         found = bounds(time=time, units=("mm",), evaluations=12)

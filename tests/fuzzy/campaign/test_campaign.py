@@ -47,6 +47,24 @@ def run(function=model, method=None, **options):
     return propagate(function, INPUTS, method or General(), progress=False, **options)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"alpha": 5}, "alpha is int; allowed: a list of levels"),
+        ({"knowledge": {"a": 1}}, "knowledge is .*; allowed: facts"),
+        ({"store": 3, "identity": {"version": 1}}, "store is 3; allowed: the path"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(options, message):
+    with pytest.raises(RefusedError, match=message):
+        run(**options)
+
+
+def test_an_output_without_entries_is_refused():
+    with pytest.raises(FailedError, match=r"output none is \[\]"):
+        run(lambda a, b: {"y": a, "none": []}, Reduced(), alpha=[1.0])
+
+
 def test_shared_calls_and_arrays_give_the_same_with_fewer_calls():
     calls.clear()
     one, together = run(), run(grouped, shared=("a",))

@@ -81,3 +81,15 @@ def test_the_mean_by_student_and_within_bounds():
 def test_truth_values_pairs_and_numbers_beyond_floats_are_no_measurements(values):
     with pytest.raises(RefusedError, match="value 1"):
         from_data(values, "next value")
+
+
+@pytest.mark.parametrize("values", [5, None, {1.0, 2.0}, iter([1.0, 2.0])])
+def test_what_has_no_order_is_no_list_of_measurements(values):
+    with pytest.raises(RefusedError, match=r"values is .*; allowed: a list"):
+        from_data(values, "next value")
+
+
+@pytest.mark.parametrize("bounds", [5, (1,), (0, 3, 9), (3, 0)])
+def test_bounds_are_two(bounds):
+    with pytest.raises(RefusedError, match=r"bounds is .*; allowed: \(lower, upper\)"):
+        from_data([1.0, 2.0], "median", bounds=bounds)
