@@ -266,6 +266,7 @@ class Bounds:
                 claim and the levels do not run from 0 to 1.
         """
         ends = self.bounds(output)
+        # The extremes over time would make a number, but of another quantity than the output.
         cure = "bounds() has the ends at each time"
         require(self.time is None, output, "a range at each time", "one number", cure)
         # The cut of a lower level contains every cut up to the next one, so it is safe in between.
