@@ -97,7 +97,12 @@ def main(
     program: str = "alphacut",
     names: Mapping[str, str] = COMMANDS,
 ) -> int:
-    """Run one command; return its exit status of `STATUSES`, every error as one line.
+    """Run one command of the command line, and return its exit status.
+
+    Every error becomes one line on standard error: status 2 for bad input, 3 for failed samples of
+    a campaign, 128 and the signal's number for an interruption, 1 for any other failure, and 0 for
+    success or a reader of the output that has gone. An error of the program itself shows its
+    traceback.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
@@ -170,7 +175,7 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
             frame: Frame that it interrupted, for the handler.
         """
         nonlocal last_time
-        received.append(number)
+        received.append(number)  # all of them: the first one tells the exit status
         now = time.monotonic()
         if now - last_time >= 1.0:
             last_time = now
@@ -189,9 +194,10 @@ def interrupt_on_stop_signals() -> Iterator[list[int]]:
 
 @contextmanager
 def show_log(is_on: bool) -> Iterator[None]:
-    """Show the log of the block, with the traceback of its error, on standard error if `is_on`.
+    """Show the log of the block on standard error if `is_on`, with the traceback of its error.
 
-    The logger "alphacut" is as before after the block. Errors leave the block unchanged.
+    After the block the logger "alphacut" has the level NOTSET and no handler of this function.
+    Errors of the block leave it.
     """
     logger = logging.getLogger("alphacut")
     handler = logging.StreamHandler()
@@ -244,9 +250,13 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
 
 
 def _end_with_message(message: str, status: int) -> int:
-    """Print why a command ended, abort other ranks under mpirun, and return `status`.
+    """Print why a command ended, abort the other processes under MPI, and return `status`.
 
-    Ranks that wait for this one in a collective operation would otherwise wait forever.
+    Processes that wait for this one in a collective operation would otherwise wait forever.
+
+    Args:
+        message: One line.
+        status: Exit status of the command.
     """
     say(message)
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:

@@ -175,6 +175,9 @@ class Content(CellContent):
 
         Loads are an accelerogram of the structure, a suite [records], or [[force]]. A case without
         a structure has nothing to refuse.
+
+        Raises:
+            RefusedError: Nothing moves the structure. The key is that of the initial displacements.
         """
         section = self.structure_section
         # Without loads a structure at rest stays at rest, and bounds of that look like results.

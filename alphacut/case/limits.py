@@ -138,8 +138,14 @@ class CaseLimit:
 
         In a frame with three floors "drift <= 1 %" becomes "drift1 <= 1 %", "drift2 <= 1 %" and
         "drift3 <= 1 %". If there are several, each has the original text as its `event`, by which
-        questions join them again. Other limits, and those of structures without floors, are
-        returned alone and unchanged.
+        questions join them again.
+
+        Args:
+            structure: The structure, for its number of floors.
+
+        Returns:
+            The limits from the ground up. A limit with a number or of the whole frame, and any
+            limit of a structure without floors, is returned alone and unchanged.
         """
         # Kinds of outputs that each storey or floor has are known with words, as "drift of storey";
         # those of the whole frame, such as the base shear, without.
@@ -288,6 +294,7 @@ class ProbabilitySection(QuestionSection):
     def require_answerable(self, structure: Structure) -> None:
         """Refuse limits and random inputs that the structure does not have."""
         super().require_answerable(structure)
+        # A modulus that stage modulus computes is still crisp here, and may be random in the run.
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
@@ -322,5 +329,6 @@ class FragilitySection(QuestionSection):
         super().require_answerable(structure)
         with _naming("fragility.limits"):
             require_fragile(structure.model, self.limits_of(structure))
+        # Peaks of elastic columns are proportional to the record: no intensities are tried.
         is_used = yields(structure.model) or not self.has_key("most")
         require(is_used, "fragility.most", self.most, "beside columns that yield")

@@ -224,13 +224,26 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
 
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Return a unit of accelerations as it was given, or refuse it."""
+    # The unit is converted with the file, so that messages can show it as it was given.
     is_unit = acceleration_factor(str(value)) is not None
     require(is_unit, "", value, f"a unit of {ACCELERATION_UNITS}")
     return str(value)
 
 
 def _parse_scale(value: object, _: ValidationInfo) -> Scale:
-    """Return the scale that a factor such as 1.2 or a text such as "PGA = 0.3 g" states."""
+    """Return the scale of all records that a factor such as 1.2 or "PGA = 0.3 g" states.
+
+    Args:
+        value: A number, by which records are multiplied; or "PGA = VALUE" or "Sa(T1) = VALUE", the
+            intensity measure to which each record is scaled, an acceleration.
+        _: Context of the validation, which is not used.
+
+    Returns:
+        Scale: The factor with the measure "", or the value in m/s² with its measure.
+
+    Raises:
+        RefusedError: The value is not positive, no such quantity, or of another measure.
+    """
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = [part.strip() for part in str(value).partition("=")]
     try:

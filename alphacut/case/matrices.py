@@ -75,7 +75,11 @@ def _require_shape(name: str, array: Array, n: int) -> None:
 
 
 def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
-    """Return the quantity that a parameter of the matrices has in SI, in whatever unit it stands.
+    """Return the quantity that a parameter of the matrices has in SI units, whatever its dimension.
+
+    Args:
+        value: A number, or a text such as "30 GPa ± 5 %".
+        info: Context of the validation, which is not used.
 
     Raises:
         RefusedError: The value is no quantity.

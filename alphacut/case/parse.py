@@ -73,8 +73,13 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
 def _parse_toml(path: Path, text: str) -> dict[str, object]:
     """Return the top table of a TOML text.
 
+    Args:
+        path: File of the text, for messages.
+        text: The text.
+
     Raises:
-        BadInput: The text is not TOML; it names the file and the line.
+        BadInput: The text is not TOML. It names the file and the line, if the error has one, and
+            what to do where the mistake is a usual one.
     """
     # tomllib calls itself for nested brackets, of which a text may have more than the stack holds:
     # that is RecursionError, and means bad input here.
@@ -134,7 +139,16 @@ def _without_indices(key: str) -> str:
 
 
 def _sibling_names(model: type[Section], key: str) -> list[str]:
-    """Return the names of all keys of the section that a key stands in."""
+    """Return the names of all keys of the section that a key stands in, in their order.
+
+    Args:
+        model: Class of the whole content.
+        key: Full name, such as "study[2].fuzy"; the numbers of array entries do not matter, and the
+            key itself need not be known. A name without a dot belongs to the top table.
+
+    Returns:
+        Names without the section; none if there is no such section.
+    """
     section, _, _ = _without_indices(key).rpartition(".")
     siblings: dict[str, None] = {}
     for full_name, _, _ in _walk_keys("", model):
@@ -204,7 +218,10 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
 def _full_key(location: tuple[int | str, ...]) -> str:
     """Return the full name of a key from its place in Pydantic's errors.
 
-    Entries are counted from 1, and the tags of unions, such as <image>, are left out.
+    Args:
+        location: Names and indices from the outside in, such as ("study", 0, "<tag>", "fuzzy").
+            Indices become numbers from 1, and the tags of unions, which begin with "<", are left
+            out: this is "study[1].fuzzy".
     """
     key = ""
     for part in location:
@@ -280,6 +297,7 @@ def _parse_value(text: str) -> object:
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (RecursionError, ValueError):
+        # Quotes around a text would need quotes of the shell around them: it is taken without.
         pass
     # Quantities with brackets or quotes in them are no lists of words: "[75, 80] GPa" stays a text.
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):

@@ -153,18 +153,35 @@ class Structure:
             members = self.model.group(name)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
+            # The model does not know the name, or knows a group of which the case has no numbers.
             cure = suggestion(name, self.numbers)
             raise RefusedError(key, name, ", ".join(self.numbers), cure) from None
         require(bool(fuzzy), key, name, "inputs that are fuzzy", cure=f"{name} is one number")
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
-        """Return the fuzzy parameters that names stand for; raises as `fuzzy_members`."""
+        """Return the fuzzy parameters that names stand for, in SI units.
+
+        Args:
+            names: Names of the case; "m" stands for m1 … mn of a frame.
+            key: Key that has them, for messages.
+
+        Raises:
+            RefusedError: A name is no parameter, or none of those that it stands for is fuzzy.
+        """
         members = [member for name in names for member in self.fuzzy_members(name, key)]
         return {member: self.numbers[member] for member in members}
 
     def require_quantities(self, key: str, names: Sequence[str]) -> None:
-        """Refuse outputs that the model cannot have, though it need not observe them."""
+        """Refuse outputs that the model cannot have; it need not observe those that it can.
+
+        Args:
+            key: Key of the case that names the outputs, for messages.
+            names: The outputs. If there are none, nothing is refused.
+
+        Raises:
+            RefusedError: With the first output that the model cannot have.
+        """
         for name in names:
             try:
                 self.model.require_quantity(name)
@@ -174,7 +191,17 @@ class Structure:
 
 
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
-    """Return the record of a file that the case names; warn of what is unusual in it."""
+    """Return the ground acceleration record of a file that the case names.
+
+    What is unusual in the record is told by a Python warning, each time it is read.
+
+    Args:
+        value: Name of the file, relative to the folder of the case.
+        info: Context of the validation, with this folder.
+
+    Raises:
+        RefusedError: The file is missing, or no record can be read from it.
+    """
     path = case_file(value, info)
     ground = read_record(path)
     # What is unusual need not be wrong: it is told, and the record is taken as it is.
@@ -196,6 +223,7 @@ def damping_ratios_by_name(
     """
     if isinstance(ratios, MaterialDamping):
         ratios = (damping_from_loss(loss or LOSS_STAND_IN, joints=ratios.joints),)
+    # A single ratio is that of all modes: "zeta1" would be that of the first one alone.
     if len(ratios) == 1:
         return {"zeta": ratios[0]}
     return {f"zeta{mode}": ratio for mode, ratio in enumerate(ratios, start=1)}
@@ -347,8 +375,10 @@ class Frame(StructureSection):
         """Yield a sentence for each storey whose weight should not be left out.
 
         Args:
-            coefficients: Weight over stiffness and height of each storey, shape (floors,). From 1
-                on the storey buckles, so that a weight in the case would be no cure.
+            coefficients: Weight over stiffness and height of each storey, shape (floors,), the
+                largest that the inputs allow. From 1 on the storey buckles: then, and if all are
+                below 1e-5, a unit is doubted. Those between 0.1 and 1 are told one by one; smaller
+                ones need no word.
         """
         lightest = 1e-5  # buildings have coefficients above 1e-4
         largest = coefficients.max()

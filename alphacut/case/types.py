@@ -123,7 +123,11 @@ class Quantity:
 
     @property
     def allowed(self) -> str:
-        """The allowed values in words."""
+        """Return the allowed values in words, such as 'a length above 0, as "2 m"'.
+
+        The words are the dimension or "whole number", then each finite bound of the range in SI
+        units, and an example with a unit if there is one.
+        """
         dimension = QUANTITIES[self.si]
         words = dimension.name
         if self.is_integer:
@@ -174,7 +178,15 @@ class Quantity:
         return self.above < value < self.below and self.minimum <= value <= self.maximum
 
     def _cure_of_percentage(self, value: object) -> str:
-        """Return what to write for a ratio that is too large, but would fit as a percentage."""
+        """Return what to write for a ratio that is too large, but would fit as a percentage.
+
+        Args:
+            value: The refused value, of any type.
+
+        Returns:
+            For a number without a unit whose hundredth part is positive and in the range: 'write "5
+            %" or 0.05'. Empty for all others, for quantities with a unit and for whole numbers.
+        """
         if self.si or self.is_integer or not is_number(value):
             return ""
         # 5 for 5 % is the usual slip: it is named where the hundredth part would be allowed.

@@ -84,7 +84,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     require_tolerance(result.error, content.modulus.tolerance)
     references = problem.references()
     if result.has_isotropic_constants:
-        young = result.modulus / GPA
+        young = result.modulus / GPA  # of one sample, so that it is both bounds
         require_bounds((young, young), references, problem.cell.particles)
     document = document_of(result)
     document["references"] = references

@@ -106,6 +106,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         out.write(text)
         out.flush()
     else:
+        # Nobody reads the text then: warnings go to standard error, as those of other commands.
         for line in text.splitlines():
             if line.startswith("warning: "):
                 say(line)
@@ -237,7 +238,14 @@ def foreseen_stages(content: Content, petsc: Mapping[str, str]) -> tuple[list[Fo
 
 
 def foreseen_text(foreseen: Sequence[Foreseen]) -> str:
-    """Return a table of what stages of a run will take, with the sum; empty without stages."""
+    """Return a text table of what the stages of a run will take.
+
+    Args:
+        foreseen: Name of each stage, number and kind of its pieces, and its time in s.
+
+    Returns:
+        Lines that end with a newline: the table and the sum of the times. Empty without stages.
+    """
     if not foreseen:
         return ""
     rows = [
@@ -452,7 +460,13 @@ def _kind_of(number: FuzzyNumber) -> str:
 
 
 def _entries(value: object) -> dict[str, object]:
-    """Return the values of a key by what follows the key in a row: an index, a name or nothing."""
+    """Return the values of a key by what follows the key in a row of the table.
+
+    Args:
+        value: Value of the key. The entries of a dictionary follow as ".name", those of a tuple as
+            "[1]", "[2]" …; a tuple with one entry, and any other value, follow the bare key as "".
+            An empty tuple or dictionary has no rows.
+    """
     if isinstance(value, dict):
         return {f".{name}": entry for name, entry in value.items()}
     if type(value) is not tuple:  # a named tuple is one value
@@ -490,7 +504,13 @@ def _words_and_kind(entry: object) -> Iterator[tuple[str, str]]:
 
 
 def _mark_of_size(number: FuzzyNumber, si: str) -> str:
-    """Return `UNUSUAL` if a quantity, in the SI unit `si`, is 0 nowhere and of an unusual size."""
+    """Return a mark, ", unusual", for a quantity that structures seldom have; else "".
+
+    Args:
+        number: The quantity. The magnitudes of both ends of its support must lie in the usual range
+            of its dimension, unless one of them is zero.
+        si: SI unit of its dimension, a key of the table of units.
+    """
     smallest, largest = QUANTITIES[si].usual
     sizes = [abs(end) for end in number.support]
     # A support that begins at 0, as of a velocity at rest, has no order of size to judge.
@@ -567,10 +587,12 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
 
     Args:
         data: Dataset of an envelope file, in SI units, with the axes alpha, time, output and
-            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2).
+            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2). "proved_lower"
+            and "proved_upper", guaranteed bounds beside wider ones, "inner_lower" and
+            "inner_upper", attained ones, and the errors need not be there.
 
     Returns:
-        The envelope. Its fuzzy inputs are only known as intervals, their supports or lowest cuts.
+        The envelope. Its fuzzy inputs are only known as intervals: their cuts on the lowest level.
 
     Raises:
         KeyError: The dataset is no envelope.

@@ -110,7 +110,10 @@ def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) 
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of every command on a case: CASE, ``--set``, ``--json``, ``--quiet``."""
+    """Add the arguments of every command on a case to a parser, in place.
+
+    They are CASE as `case`, ``--set`` as the list `set`, ``--json`` and ``--quiet``.
+    """
     parser.add_argument("case", metavar="CASE", help="case file, for example cases/paper.toml")
     parser.add_argument(
         "--set",
@@ -123,7 +126,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json`` and ``--quiet``."""
+    """Add ``--json FILE`` and ``--quiet`` to a parser, in place; `json` is None by default."""
     parser.add_argument(
         "--json",
         metavar="FILE",
@@ -147,6 +150,15 @@ def write_answer(
 
     With ``--json -`` the JSON document alone is written to `out`. With ``--json FILE`` it goes to
     that file, and the text to `out` unless the command is to be quiet.
+
+    Args:
+        options: Of the command line: `json`, a file, "-" or None, and `quiet`.
+        document: The result; arrays in it are allowed.
+        out: Takes what is written to standard output.
+        text: The result in words, with line ends.
+
+    Raises:
+        OSError: The file cannot be written.
     """
     if options.json == "-":
         out.write(as_json(document))

@@ -493,7 +493,15 @@ def _require_motion_of(content: Content, section: EnvelopeSection, structure: St
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Yield a warning if the structure's record goes on after the end of all motions."""
+    """Yield a warning if the accelerogram of a structure goes on after the end of all responses.
+
+    Nothing is said without [envelope], of a structure without an accelerogram, and of one that is
+    not linear.
+
+    Args:
+        content: The case, for the durations of [envelope] and its studies.
+        structure: Its structure.
+    """
     linear = structure.linear
     if linear is None or linear.ground is None or content.envelope is None:
         return

@@ -118,7 +118,11 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a report."""
+    """Add the options of a report to a parser, in place.
+
+    They are `folder`, a list of one or more, the files and folders `out`, `csv` and `tables`, which
+    are None by default, `json` and `quiet`.
+    """
     parser.add_argument(
         "folder", metavar="FOLDER", nargs="+", help="results of a run; of two to compare them"
     )

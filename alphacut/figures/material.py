@@ -105,8 +105,9 @@ def draw_plane(axes: Axes, dataset: xarray.Dataset, across: str) -> None:
 
     Args:
         axes: Axes that are drawn on.
-        dataset: "phase" and "is_open" over (y, x), or (z, y, x) of a volume, and the attribute
-            "lengths", the sides of a pixel or voxel in m in this order.
+        dataset: "phase", the index of the phase, and "is_open" over (y, x), or (z, y, x) of a
+            volume; and the attributes "phases", their names, and "lengths", the sides of a pixel or
+            voxel in m in the order of the axes.
         across: Axis that the plane of a volume is perpendicular to, "x", "y" or "z"; empty for an
             image.
     """

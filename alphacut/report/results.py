@@ -229,7 +229,8 @@ def _loss_rows(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
     """Yield the rows of the loss factors of a cell or an image; none without losses of phases.
 
     Args:
-        part: α-cuts of the loss factors of E, G and K.
+        part: α-cuts of the loss factors by "E", "G" and "K"; of an image there may be other
+            constants. Those of an image are guaranteed to first order, at nominal moduli.
         every_constant: Whether all are shown, instead of that of E alone.
     """
     if isinstance(part, ImageResult):
@@ -268,7 +269,7 @@ def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
 
 
 def guaranteed_of(image: ImageResult) -> str:
-    """Return a sentence on what the bounds of an image or volume are guaranteed of."""
+    """Return a sentence, without its full stop, on what the bounds of an image hold for."""
     # Segmentation is not part of the claim: a wrong threshold gives right bounds of a wrong image.
     if _is_plane(image):
         what = "image as segmented, repeated periodically, in plane strain"
@@ -602,7 +603,13 @@ def drivers(parts: Parts) -> Iterator[str]:
 
 
 def _driver_sentence(what: str, fractions: Mapping[str, float], *, count: int) -> str:
-    """Return a sentence on the `count` inputs with the largest fractions of a result's width."""
+    """Return a sentence, without its full stop, on the inputs that widen a result most.
+
+    Args:
+        what: The result, in words.
+        fractions: Fraction by which its width falls if an input is fixed, by input; not empty.
+        count: Number of inputs that are named at most, the largest fraction first.
+    """
     ranked = sorted(fractions.items(), key=lambda entry: -entry[1])[:count]
     largest, fraction = ranked[0]
     sentence = f"Fixing {largest} narrows {what} by {percent_text(fraction, 0)}"

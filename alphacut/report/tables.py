@@ -63,9 +63,13 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
 
 
 def tables(parts: Parts) -> dict[str, Table]:
-    """Return tables of texts of all results: numbers rounded as their guarantee allows.
+    """Return all results as tables of texts, by the names of their CSV files.
 
-    Answers are given in their own words.
+    Numbers have six significant digits; bounds are rounded in the direction that keeps their
+    guarantee. Answers to questions have tables of their own.
+
+    Args:
+        parts: Numbers of the results.
     """
     # Answers know what their numbers mean, and say it better than a frame of numbers.
     texts = {name: shown(frame) for name, frame in frames(parts).items()}
@@ -73,7 +77,18 @@ def tables(parts: Parts) -> dict[str, Table]:
 
 
 def radius_map(numbers: Document) -> pd.DataFrame:
-    """Return the minimum, nominal value and maximum of the parameters a1 … a4 of a radius map."""
+    """Return the parameters a1 … a4 of a radius map, a row for each.
+
+    Args:
+        numbers: Results of stage microstructure. Each parameter is a number, or the three corners
+            of a triangular one.
+
+    Returns:
+        Columns of the name, minimum, nominal value and maximum; of a number all three are equal.
+
+    Raises:
+        KeyError: A parameter is missing.
+    """
     rows = []
     for name in ("a1", "a2", "a3", "a4"):
         # A triangular number has three corners; a crisp one is a single value, and all three.
@@ -202,7 +217,13 @@ def shown(frame: pd.DataFrame) -> Table:
 
 
 def _text(value: object) -> str:
-    """Return a number with six significant digits, "" for NaN and None, and a text as it is."""
+    """Return a cell of a table: a number with six significant digits, and a text as it is.
+
+    None and NaN become an empty text, and hyphens of numbers minus signs.
+
+    Raises:
+        ValueError: The value is neither a text nor a number.
+    """
     if value is None or isinstance(value, str):
         return value or ""
     number = float(value)  # type: ignore[arg-type]
@@ -224,6 +245,7 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
         OSError: A file cannot be written.
     """
     found = frames(parts)
+    # The summary has the extremes of envelopes alone; their courses over time are in datasets.
     for name, study in parts.envelopes.items():
         data = results.dataset(f"envelope_{name}.nc")
         for output in study.min:
@@ -284,6 +306,9 @@ def latex(table: Table) -> str:
     Special characters of LaTeX in the texts are escaped, and signs that its fonts do not have, such
     as Greek letters and ≤, become commands. The first column is aligned to the left, others to the
     right.
+
+    Args:
+        table: Titles of the columns, and rows of as many texts.
     """
     frame = pd.DataFrame(table.rows, columns=table.head)
     columns = "l" + "r" * (len(table.head) - 1)

@@ -210,4 +210,5 @@ def require_tolerances(section: TolerancesSection, response: Response) -> None:
     try:
         require_admissible_scale(response.structure.model, response.inputs, section.most)
     except RefusedError as error:
+        # The analysis speaks of its own argument; the user wrote a key of the case.
         raise RefusedError("tolerances.most", error.value, error.allowed, error.cure) from None

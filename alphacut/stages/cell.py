@@ -167,7 +167,8 @@ class CellProblem:
         """Return the model of a cell with one particle, at the resolution that the case states.
 
         Args:
-            cell: Shape of the particle and phases.
+            cell: Shape of the particle and phases. `modulus.method` must be "auto" or a model that
+                can solve it, which the case has been checked for.
             estimate: Whether it declares errors.
             parallel: Whether all MPI ranks work on one cell together.
 
@@ -187,6 +188,7 @@ class CellProblem:
             mesh_size=self.mesh.size,
             layers=self.mesh.layers,
             outline=cell.outline or circle,
+            # The average along the axes takes C11 + C12 and C33: C11 − C12 need not be solved for.
             whole_stiffness=self.average != AXES,
             energies=bool(cell.losses),
             petsc=self.petsc,

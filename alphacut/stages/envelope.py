@@ -258,12 +258,13 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
 def tasks(
     section: EnvelopeSection, studies: Sequence[Study], limited: tuple[str, ...] = ()
 ) -> tuple[EnvelopeTask, ...]:
-    """Return the tasks of the studies of a case, or the one of [envelope], named "all".
+    """Return the task of each study of a case; without studies that of [envelope], named "all".
 
     Args:
-        section: What holds for all studies.
-        studies: The studies.
-        limited: Peaks that questions limit; they go to the tasks with the response of [envelope].
+        section: What holds for all studies, and the response that questions are asked about.
+        studies: Names of the fuzzy inputs, duration and drawn outputs of each study.
+        limited: Names of the peaks that questions limit. They go to the tasks with the inputs and
+            the duration of [envelope] alone.
     """
     found = [EnvelopeTask(x.name, x.fuzzy, x.duration, section, x.figures) for x in studies]
     if not found:

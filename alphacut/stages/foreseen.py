@@ -66,7 +66,15 @@ def foreseen_material(content: Content) -> Material | None:
 
 
 def foreseen_structure(content: Content) -> Structure | None:
-    """Return the structure at the cell's nominal values; None where these, or it, are not known."""
+    """Return the structure of a case at the nominal values of its cell, as far as it is known.
+
+    Returns:
+        None if the case has no structure, or takes its material from a cell that no fast model
+        solves.
+
+    Raises:
+        RefusedError: The cell cannot be solved, or the values make no structure.
+    """
     if content.structure is None:
         return None
     material = foreseen_material(content)

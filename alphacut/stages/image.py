@@ -100,10 +100,18 @@ def stage(
 def study_of(cell: ImageCell) -> ImageStudy:
     """Return the study of the image that a case names.
 
+    Args:
+        cell: File, sides of a pixel in m, thresholds or labels, and E, ν and loss factor of each
+            phase.
+
+    Returns:
+        The grey image, and its phases on each α-level.
+
     Raises:
         RefusedError: The image is not read, or the phases do not fit it.
     """
     image = GreyImage(read_grid(cell.image, cell.sides), cell.lengths)
+    # Either all phases have a loss factor or none has.
     losses = cell.losses or (None,) * len(cell.pairs)
     phases = [
         ImagePhase(young, poisson, loss)
@@ -137,19 +145,25 @@ def compute_cuts(
 def image_result(found: FuzzyImageStiffness) -> ImageResult:
     """Return the numbers of a fuzzy stiffness in the units of results: moduli in GPa.
 
-    The whole stiffness matrices, and the bounds of ν and of the shear modulus, are those of the
-    highest level alone. `plane` has the constants along the axes under "along the axes" for a
-    volume, "plane strain" for an image; the matrices are 6×6 or 3×3 in Voigt's notation. Bounds
-    that pores or rigid phases leave unknown are 0 or infinite, as in `found`.
+    Args:
+        found: Bounds on α-levels, in Pa. Those that pores or rigid phases leave unknown are 0 or
+            infinite, and stay so.
+
+    Returns:
+        The cuts of E on all levels. The whole stiffness matrices in Voigt's notation, 6×6 of a
+        volume or 3×3 of an image, and the bounds of ν and of the shear modulus are those of the
+        highest level alone. `plane` has the cuts of the constants along the axes under "along the
+        axes" for a volume, "plane strain" for an image.
     """
     # On the highest level the phases are crisp or nearly so: there matrices are close bounds, while
     # below they would tell the width of the inputs rather than the stiffness.
     top = found.cuts[-1]
-    average = AVERAGES[found.average]
-    definition = PLANE_STRAIN
-    if len(found.lengths) == 3:  # pixels of an image have two sides, voxels of a volume three
+    if len(found.lengths) == 3:  # voxels of a volume have three sides, pixels of an image two
         average = HILL
         definition = SPACE
+    else:
+        average = AVERAGES[found.average]
+        definition = PLANE_STRAIN
     along_axes = in_units_of_results(found.constants)
     references = References()
     if found.references is not None:

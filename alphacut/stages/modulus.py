@@ -197,11 +197,17 @@ def solved(
 
 
 def identity(problem: CellProblem) -> Document:
-    """Return everything but the fuzzy inputs that a sample depends on: the key of its store.
+    """Return what all samples of a campaign have in common: the key of their store.
 
-    A stored sample is taken if its inputs and this document are equal. Plan, α-levels and the
-    supports of inputs are left out, so that a campaign with other ones finds the samples that it
-    shares.
+    A stored sample is taken if this document and its own inputs are equal. Plan and α-levels are
+    left out, so that a campaign with other ones finds the samples that both share. Parameters stand
+    in it as they are in the case, since those that are crisp keep their value in each sample.
+
+    Args:
+        problem: The cell.
+
+    Raises:
+        OSError: The mesh file of the cell cannot be read.
     """
     cell = problem.cell
     modulus = problem.modulus
@@ -244,7 +250,18 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
 
 
 def stage(problem: CellProblem) -> Stage[ModulusResult]:
-    """Return the stage that computes the α-cuts of a cell by samples."""
+    """Return the stage that computes the α-cuts of a cell's constants by samples.
+
+    It stores its samples, and its result is kept under the name "modulus". The result is up to date
+    while the cell, its fuzzy inputs, the plan, the levels, and the source of the models are the
+    same.
+
+    Args:
+        problem: The cell.
+
+    Raises:
+        OSError: The mesh file of the cell cannot be read.
+    """
     plan = problem.modulus.plan
     alpha = problem.modulus.alpha
     inputs = [identity(problem), problem.inputs, problem.stated_fraction, plan, alpha]

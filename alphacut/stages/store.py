@@ -237,10 +237,17 @@ class StageStore:
         return results
 
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
-        """Return the result in the files of a stage.
+        """Return the result of a stage from its files, if they are up to date.
 
-        None where these are missing, changed, or made from something else; the stage's name is
-        added to `up_to_date` otherwise.
+        The name of the stage is then added to `up_to_date`. A damaged file is told by a warning.
+
+        Args:
+            stage: The stage, whose key has all that its result depends on.
+
+        Returns:
+            None if the run computes everything anew or keeps no files; if the files are missing,
+            changed, or made from something else; or if another version of the program has written
+            them.
         """
         folder = self.folder
         key = stage.key

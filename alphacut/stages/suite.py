@@ -69,7 +69,15 @@ def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
 
 
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:
-    """Return the stage that computes the peaks of a structure under a record."""
+    """Return the stage that computes the peaks of a structure under one record.
+
+    Its name is "record_NAME" with the name of the record.
+
+    Args:
+        structure: The structure with its fuzzy parameters.
+        task: Names of the fuzzy inputs and of the peaks, time step and α-levels.
+        record: The scaled record.
+    """
     # The duration of a record tells how much work it is, compared with the others.
     inputs = [structure.model, structure.numbers, record, task]
     compute = partial(_peaks, structure, task, record)

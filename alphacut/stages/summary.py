@@ -274,7 +274,7 @@ class Summary(Parts):
 
     @classmethod
     def read(cls, folder: ResultsFolder) -> Self:
-        """Return the summary in a folder of results.
+        """Return the summary in a folder of results, from its file summary.json.
 
         Raises:
             RefusedError: The file is missing, changed, no JSON, or of another version of this
