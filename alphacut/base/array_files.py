@@ -150,7 +150,7 @@ class ArrayArchive:
         place = f"{self.path.name}:{name}"
         is_known = member.compress_type in (ZIP_STORED, ZIP_DEFLATED)
         require(is_known, place, f"compressed by method {member.compress_type}", "deflate or none")
-        most = DEFLATE_RATIO * member.compress_size
+        most = DEFLATE_RATIO * member.compress_size  # 1032 bytes for one, by the format
         if member.compress_type == ZIP_STORED:
             most = member.compress_size
         value = f"of {member.file_size} bytes out of {member.compress_size}"

@@ -37,8 +37,8 @@ class ShownUnit(NamedTuple):
     def text(self, value: float, *, digits: int = 4) -> str:
         """Return a value in SI as a text in this unit, such as ``40.00 mm`` of 0.04.
 
-        The value is multiplied by the field `factor`, 1000 for mm, and followed by `label`. NaN is
-        the text "nan".
+        The value is multiplied by the field `factor`, 1000 for mm, and followed by `label`. A
+        negative one has the minus of typography, and NaN is the text "nan".
 
         Args:
             value: The value in the SI unit.
@@ -57,7 +57,7 @@ def engineering(value: float, si: str, *, digits: int = 4) -> str:
     A prefix from n to G is taken for m, m/s, m/s^2, N, N*m, N/m, Pa, s, rad, W and J, if the
     magnitude is from 1e-12 to 1e12. Otherwise the unit is kept, and the number has no zeros at its
     end and an exponent where it is large or small, such as ``1.5e+13 Pa`` or ``0 N``. NaN and
-    infinities are written as nan and inf.
+    infinities are written as nan and inf, and minus as in typography.
 
     Args:
         value: The value, in the unit `si`.

@@ -59,6 +59,8 @@ def opened_picture(path: Path) -> Iterator[Image]:
         coding = str(picture.format)
         if picture.format == "TIFF":
             coding = str(picture.info.get("compression"))
+        # The largest number of bytes for which a byte of the file can stand is known of most
+        # codings. JPEG and WebP may write any number of equal pixels in a few bytes.
         most = MAX_PIXELS
         if coding in MAX_BYTES_PER_BYTE:
             most = 8.0 * MAX_BYTES_PER_BYTE[coding] * size  # a pixel has at least one bit

@@ -121,8 +121,9 @@ class Campaign:
 
         Raises:
             SpentError: New points exceed the budget; none of them is evaluated.
-            CampaignError: Samples failed. It is raised after all others have been evaluated, which
-                are in the store, if there is one, but not among the samples.
+            CampaignError: Samples failed, or have other outputs than the first one. It is raised
+                after all others have been evaluated, which are in the store, if there is one, but
+                not among the samples.
             RefusedError: The knowledge about the model names an output that it does not have.
             FailedError: The store cannot be written, or a worker process died.
         """
@@ -214,7 +215,9 @@ def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
         points: Points that are not among the samples of the campaign, shape (n, inputs).
 
     Returns:
-        For each row of the points a `Sample`, or a `Failure` with the text of the error.
+        For each row of the points a `Sample` (names, shapes and values of the outputs), or a
+        `Failure` with the text of the error, also where outputs are named or shaped unlike those of
+        the first sample.
 
     Raises:
         RefusedError: The campaign's knowledge names an output that the first sample does not have.
