@@ -174,11 +174,12 @@ def missing(error: ImportError) -> str:
     extra, as pip install '.[cell]'. Others are named alone.
 
     Args:
-        error: The exception of the import; its name may be that of a module of the library.
+        error: The exception of the import. Its name may be that of a module of the library, or
+            None where a library has raised the error itself.
     """
     of_cell = "dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py"
     extras = {"skimage": "particles", **dict.fromkeys(of_cell, "cell")}
-    library = (error.name or "").partition(".")[0]
+    library = (error.name or "what is missing").partition(".")[0]
     cure = f"install {library}"
     if library in extras:
         cure = f"pip install '.[{extras[library]}]'"

@@ -29,6 +29,7 @@ def test_a_missing_package_is_named_with_its_cure_here(monkeypatch):
     error = ImportError("No module named 'skimage'", name="skimage.measure")
     monkeypatch.setenv("ALPHACUT_INSIDE", "1")
     assert missing(error) == f"{error}; pip install '.[particles]'"
+    assert missing(ImportError("no backend")) == "no backend; install what is missing"
     monkeypatch.delenv("ALPHACUT_INSIDE")
     assert missing(error).endswith(", or run inside ./enter")
 
