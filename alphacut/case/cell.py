@@ -85,7 +85,7 @@ class CellContent(Section, defer_build=True):
         return None
 
     @property
-    def random_cell(
+    def radius_and_cell(
         self,
     ) -> tuple[RadiusMapSection | ThetaSection | FractionMap, RoundCell | MeshedCell]:
         """Return where the random size of the particles comes from, and the cell with its phases.

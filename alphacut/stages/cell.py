@@ -72,7 +72,7 @@ class CellProblem:
     def of(cls, content: CellContent, petsc: Mapping[str, str] | None = None) -> Self:
         """Return the cell of a case."""
         # The stated fraction goes along to be compared with that of a computed radius map.
-        radius, cell = content.random_cell
+        radius, cell = content.radius_and_cell
         stated = content.stated_fraction
         return cls(radius, cell, content.mesh, content.modulus, stated, petsc or {})
 

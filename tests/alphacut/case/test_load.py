@@ -147,7 +147,7 @@ def fraction_case(particles, fraction):
     ("particles", "factor", "power"), [("spheres", np.pi / 6, 3), ("cylinders", np.pi / 4, 2)]
 )
 def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, factor, power):
-    radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).random_cell
+    radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).radius_and_cell
     radii = radius(np.linspace(-3, 3, 5))
     assert factor * radii**power == pytest.approx(np.full(5, 0.3), rel=1e-14)
 
@@ -158,7 +158,7 @@ def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, facto
      ("ellipses(4, 0)", 0.19, 0.2)],
 )  # fmt: skip
 def test_a_fraction_ends_where_particles_touch(tmp_path, particles, least, most):
-    assert read(tmp_path, fraction_case(particles, least)).random_cell
+    assert read(tmp_path, fraction_case(particles, least)).radius_and_cell
     found = problems(tmp_path, fraction_case(particles, most))
     assert "cell.fraction" in [problem.key for problem in found]
 
