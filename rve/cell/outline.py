@@ -148,5 +148,6 @@ def bend_radii(outline: Outline) -> tuple[Array, Array]:
     first = (after - before) / (2 * step)
     second = (after - 2 * points + before) / step**2
     # On a straight part x'' vanishes where φ runs evenly; the bend radius is then huge, not 1/0.
-    second_norm = np.maximum(np.hypot(second[:, 0], second[:, 1]), 1e-12)
+    length = np.hypot(second[:, 0], second[:, 1])
+    second_norm = np.maximum(length, 1e-12)
     return points, np.asarray((first**2).sum(axis=1) / second_norm)

@@ -51,7 +51,7 @@ class CellFields:
 
         Raises:
             RefusedError: The name has none of these endings.
-            OSError: The file cannot be written.
+            OSError: A file of VTK or XDMF cannot be written; Gmsh raises an Exception of its own.
         """
         path = Path(path)
         formats = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf"}

@@ -30,9 +30,10 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
         far: Twice the distance of this point from the neighbour's centre, positive, shape (m,).
     """
     psi = psi - 2 * np.pi * np.round(psi / (2 * np.pi))
+    tanh = np.sqrt(near / far) * np.tan(psi / 2)
     # The largest number below 1 keeps the anomaly finite where the wall is at infinity.
-    tanh = np.clip(np.sqrt(near / far) * np.tan(psi / 2), -1 + 2**-53, 1 - 2**-53)
-    return np.asarray(2 * np.arctanh(tanh))
+    largest = 1 - 2**-53
+    return np.asarray(2 * np.arctanh(np.clip(tanh, -largest, largest)))
 
 
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
