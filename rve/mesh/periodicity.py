@@ -28,8 +28,8 @@ def unknowns(points: Array) -> Ints:
 
     Returns:
         Number of each node's unknown, shape (n,), from 0 without gaps. Nodes with the same
-        coordinate on two opposite sides have the same number. The corners, where the field is held,
-        have −1.
+        coordinate on two opposite sides have the same number. The corners, where the field is held
+        at zero, have −1.
 
     Raises:
         MeshError: A node on a side has no partner within 1e-8 on the opposite side.

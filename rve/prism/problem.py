@@ -75,7 +75,7 @@ class SliceStrains:
         )
 
     def add(self, strain: Array, areas: Array, slices: Ints) -> None:
-        """Add the integrals over some triangles of the slices.
+        """Add the integrals over some triangles of the slices, the plane cells at fixed θ.
 
         `strain`, `fractions` and `products` are changed in place.
 

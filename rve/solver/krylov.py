@@ -127,7 +127,8 @@ def krylov_solver(
 ) -> PETSc.KSP:
     """Return PETSc's Krylov solver of a reduced stiffness, set up for solving.
 
-    Its preconditioner is factorised. All ranks of the matrix must call.
+    Reduced means that periodic partners share unknowns and one corner is held at zero. The
+    preconditioner is factorised. All ranks of the matrix must call.
 
     Args:
         matrix: Symmetric positive definite matrix or operator, with the two displacements of each

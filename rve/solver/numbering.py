@@ -159,7 +159,7 @@ class LevelNumbering:
 
     @cached_property
     def pairs(self) -> Ints:
-        """Number of each node's pair of unknowns, −1 where it is held, shape (nodes,).
+        """Number of each node's pair of unknowns, −1 where it is held at 0, shape (nodes,).
 
         The pair p stands for the unknowns 2 p and 2 p + 1, the two displacements. Nodes are those
         of the grid: of all levels, and then the vertices of all mid-levels.
@@ -174,15 +174,16 @@ class LevelNumbering:
     def split(self, fields: NDArray[Number]) -> tuple[NDArray[Number], NDArray[Number]]:
         """Return the coefficients of hat and of bubble functions of θ as views of one array.
 
-        Hat functions are piecewise linear, one at each level; bubble functions are quadratic, one
-        in each layer, at the vertices of the triangles alone.
+        Hat functions are piecewise linear, one at each level of θ; bubble functions are quadratic,
+        one in each layer between two levels, at the vertices of the triangles alone.
 
         Args:
-            fields: Coefficients of the hats of all levels, then of the bubbles of all mid-levels,
-                shape (…, size).
+            fields: Coefficients of the hats of all levels, then of the bubbles of all layers, shape
+                (…, size).
 
         Returns:
-            Hats, shape (…, layers + 1, level_size), and bubbles, shape (…, layers, mid_level_size).
+            Hats, shape (…, layers + 1, unknowns of a level), and bubbles, shape (…, layers,
+            unknowns of the vertices of a level).
         """
         layers = self.grid.layers
         first_bubble = (layers + 1) * self.level_size

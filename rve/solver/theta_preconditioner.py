@@ -181,7 +181,8 @@ class ThetaPreconditioner:
     ) -> ThetaPreconditioner:
         """Factorise the blocks of this rank's levels, then of its mid-levels; return this object.
 
-        Factors of an earlier call are replaced; its symbolic factors are kept.
+        A mid-level is half-way between two levels of θ. Factors of an earlier call are replaced;
+        its symbolic factors are kept.
 
         Args:
             distribution: Distribution of the random number θ.
@@ -226,6 +227,9 @@ class ThetaPreconditioner:
 
     def _solve(self, hat_loads: Array, bubble_loads: Array) -> Fields:
         """Solve the systems of all levels and mid-levels, of which each rank solves its own.
+
+        The systems are those of the preconditioner's diagonal blocks, one for each level of θ and
+        one half-way between any two of them.
 
         Args:
             hat_loads: Right-hand sides of the hats, shape (loads, levels, unknowns of a plane).
@@ -312,8 +316,9 @@ class PlaneSolver:
 def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.csr_matrix]:
     """Yield the diagonal blocks of a stiffness in hat and bubble functions of θ, for this rank.
 
-    First come the blocks of the hats at this rank's levels, then those of the bubbles at its
-    mid-levels. A block is Tᵀ K T for the nodal values T of one function at all nodes of a plane.
+    First come the blocks of the hats at this rank's levels of θ, then those of the bubbles at its
+    mid-levels, each half-way between two levels. A block is Tᵀ K T for the nodal values T of one
+    function at all nodes of a plane.
     All ranks must take their first block together.
 
     Args:
