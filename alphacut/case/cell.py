@@ -190,6 +190,7 @@ class CellContent(Section, defer_build=True):
             require(method in methods, "modulus.method", method, allowed)
 
     def _require_section(self, stage: str, key: str) -> None:
+        # An empty section is there: its keys have defaults, or are told as missing.
         is_there = getattr(self, key) is not None
         require(is_there, key, None, f"[{key}], which stage {stage} needs")
 

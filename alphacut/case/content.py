@@ -202,6 +202,9 @@ class Content(CellContent):
         sections [probability], [tolerances], [identify] and [[study]], which ask about one
         response, while a suite has one response for each record.
 
+        Args:
+            records: The section; the case has it.
+
         Raises:
             RefusedError: With the key that does not fit.
         """

@@ -55,7 +55,7 @@ class CaseLimit:
     @property
     def peak(self) -> str:
         """Name of the limited peak, such as "max q3"."""
-        return f"{self.side} {self.output}".strip()
+        return f"{self.side} {self.output}".strip()  # of a magnitude the side is empty
 
     def limit(self, structure: Structure, key: str) -> Limit:
         """Return the limit in the SI unit of its output, as `alphacut.frame` takes it.
@@ -231,6 +231,10 @@ class QuestionSection(Section):
 
     def limits_of(self, structure: Structure) -> tuple[Limit, ...]:
         """Return the limits of this question in SI units, in the order of the case.
+
+        Args:
+            structure: The structure. It gives units, heights of storeys and the weight, and says
+                which outputs it can have; it need not observe them.
 
         Raises:
             RefusedError: The structure cannot have an output; a unit, height or weight does not

@@ -42,13 +42,20 @@ def with_structures(content: type[C], *, built: bool) -> type[C]:
 def _whole_case(
     content: type[CellContent], structures: tuple[tuple[str, str], ...], *, built: bool
 ) -> type[CellContent]:
-    """Return the class of `with_structures`, which is created once for each set of arguments.
+    """Return a class of cases with a field for the section of each kind of structure.
+
+    The class is created once for each set of arguments. Its name and docstring are those of
+    `content`.
 
     Args:
         content: Class of cases without sections of structures.
         structures: Pairs of the name of a section, such as "frame", and of the place "module:Class"
             of its class.
-        built: Whether the fields take sections of these classes, or any value.
+        built: Whether the fields take sections of these classes, or any value. Each may be left
+            out, and is None then.
+
+    Raises:
+        ImportError: A class is to be built and its module cannot be imported.
     """
     fields: dict[str, Any] = {}
     for name, place in structures:

@@ -46,11 +46,12 @@ class Section(BaseModel):
 
     @classmethod
     def described_fields(cls) -> dict[str, FieldInfo]:
-        """Return the fields by key, each with a description of what the key is.
+        """Return the fields of the section by key, each with a description of what the key is.
 
-        The description stands in the field, or in the line below the key in its class. Pydantic
-        would read these lines of all classes as they are defined (`use_attribute_docstrings`), for
-        which each command would wait .04 s. Here a message or a page that needs them has them read.
+        The description stands in the field, or in the line below the key in its class; it is added
+        to the field in place. Pydantic would read these lines of all classes as they are defined
+        (`use_attribute_docstrings`), for which each command would wait 0.04 s. Here only a message
+        or a page that needs them has them read. A key without such a line has None.
         """
         for section in cls.__mro__:
             for key, line in _lines_below_keys(section).items():
@@ -147,6 +148,9 @@ class Quantity:
 
     def parse(self, value: object) -> FuzzyNumber | float | int:
         """Return the quantity in SI that a value of the case states, such as "80 GPa ± 5 %".
+
+        Args:
+            value: Text with a unit; a number or a list of numbers where no unit is needed.
 
         Returns:
             A fuzzy number if `fuzzy` is set, an int if `is_integer` is, else a float.
@@ -301,7 +305,11 @@ Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 
 
 def _stiffness(rows: list[list[object]]) -> VoigtPhase:
-    """Return the phase with a stiffness of three rows of three moduli, in Voigt's notation.
+    """Return the phase with a plane-strain stiffness that three rows of three moduli state.
+
+    Args:
+        rows: Moduli as texts with units, such as "90 GPa", in the order 11, 22, 12 of Voigt's
+            notation, whose third strain is 2 ε12.
 
     Raises:
         RefusedError: There are other rows, a unit is wrong, or the stiffness is not symmetric and

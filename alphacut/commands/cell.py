@@ -212,9 +212,12 @@ def _stresses(values: ArrayLike) -> Document:
 def declared_errors(result: HomogenisedStiffness) -> Document | None:
     """Return the declared absolute errors of E, ν and the mean stresses.
 
+    Args:
+        result: Homogenised stiffness of a cell with one fibre or sphere, or of an own mesh, with
+            relative errors of its moduli, if the model declares some.
+
     Returns:
-        "E_GPa" and "stress_GPa" with s11 and s12 in GPa, and "nu"; None if the model declares no
-        errors.
+        "E_GPa" and "stress_GPa" with s11 and s12 in GPa, and "nu"; None if no errors are declared.
     """
     if not result.errors:
         return None
@@ -236,8 +239,10 @@ def summary(document: Document, convention: str) -> str:
     """Return the result of a cell as a text table, each number with its declared error.
 
     Args:
-        document: The document of `document_of`, and the "references" of the cell, whose
-            "hashin_shtrikman_E_GPa" is shown if it is there.
+        document: Result of the cell: the numbers of the table's rows and their errors, moduli in
+            GPa; the "method", the number of "unknowns" and the "iterations"; "declared_error", None
+            without any; and in "references" the bounds "hashin_shtrikman_E_GPa", which are shown if
+            they are there.
         convention: Average of the stiffness that E and ν belong to, in words.
 
     Returns:
@@ -274,12 +279,16 @@ def table_rows(document: Document) -> Iterator[Row]:
     """Yield the rows of a cell's table.
 
     Args:
-        document: The document of `document_of`.
+        document: Result of the cell, moduli and stresses in GPa: "E_GPa" and "nu" or None;
+            "stress_GPa" with the mean stresses s11 and s12; "declared_error" with errors by the
+            same keys, or None; "fibres" and "plane" with "value" and "error" of constants, which
+            may be empty; and the matrices "stiffness_GPa" and "stiffness_error_GPa", shape (3, 3),
+            or None.
 
     Yields:
         Label, text and declared error in the unit of the label: of E, ν and the mean stresses; of
-        the constants of fibres; and, if the cell has a plane stiffness, of its entries C11, C12,
-        C16, C22, C26 and C66 and of the constants along x and y.
+        the constants of fibres; and, if "plane" is not empty, of the entries C11, C12, C16, C22,
+        C26 and C66 of the stiffness and of the constants along x and y.
     """
     errors = document["declared_error"] or {"stress_GPa": {}}
     for key, digits in (("E_GPa", "#.8g"), ("nu", ".6f")):

@@ -258,11 +258,15 @@ def foreseen_text(foreseen: Sequence[Foreseen]) -> str:
 
 
 def modes_document(modes: NominalModes) -> dict[str, object]:
-    """Return the natural modes of a structure as a JSON document, by rising frequency.
+    """Return the natural modes of a structure as a JSON document.
 
-    "periods_s", "damping_ratios" and "effective_masses_kg" are lists with an entry for each mode;
-    "moved_mass_kg" is the mass that moves with the ground. A frequency of zero, which no structure
-    of a case has, would give a period above 1e300 s, since JSON has no infinity.
+    Args:
+        modes: Undamped modes by rising frequency. A frequency of zero, which no structure of a case
+            has, would give a period above 1e300 s, since JSON has no infinity.
+
+    Returns:
+        "periods_s", "damping_ratios" and "effective_masses_kg", lists with an entry for each mode;
+        and "moved_mass_kg", the mass that moves with the ground.
     """
     return {
         "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),

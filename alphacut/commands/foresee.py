@@ -244,6 +244,9 @@ def sample_count(problem: CellProblem) -> int:
     The plan is run with a function that returns 1 for all outputs. Plans that add samples where
     results ask for it add none then.
 
+    Args:
+        problem: The cell, with its fuzzy inputs, plan and α-levels.
+
     Raises:
         RefusedError: The model of the cell needs a library that is missing, or the plan does not
             fit.
@@ -410,6 +413,10 @@ def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
     """Return about how many seconds the envelope of a study takes.
 
     A Graph Follower is begun and interrupted; other methods are timed on short durations.
+
+    Args:
+        structure: The structure with its fuzzy parameters.
+        task: The study: method, names of the fuzzy inputs, duration, time step and levels.
 
     Raises:
         RefusedError: An input or an output does not fit the structure.

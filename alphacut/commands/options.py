@@ -69,9 +69,15 @@ class CommandLine(NamedTuple):
 def split_petsc(arguments: Sequence[str]) -> CommandLine:
     """Return the words of a command line and the options of PETSc among them.
 
-    An option of PETSc begins with "-rve_"; its name is kept without this. The word after it is its
-    value, unless this begins as an option, such as "-x" or "--json", or ends in ".toml", as a case
-    does; then, and at the end, the value is empty. Negative numbers such as "-1" are values.
+    Args:
+        arguments: Words of the command line. An option of PETSc begins with "-rve_". The word after
+            it is its value, unless this begins as an option, such as "-x" or "--json", or ends in
+            ".toml", as a case does. Negative numbers such as "-1" are values.
+
+    Returns:
+        All other words in their order; and the values of the options by their names without
+        "-rve_". An option without a value has "", and of one that is given twice the last value
+        counts.
     """
     # argparse cannot know PETSc's options, of which there are thousands, nor which take a value.
     line = CommandLine([], {})

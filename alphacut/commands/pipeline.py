@@ -274,6 +274,12 @@ class Pipeline:
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
         """Compute the envelopes of all studies into `results`, and check their errors.
 
+        A warning is printed if the accelerogram goes on after all responses.
+
+        Args:
+            structure: The structure with its fuzzy parameters.
+            section: Section [envelope], which holds for all studies.
+
         Raises:
             RefusedError: An input or an output does not fit the structure.
             FailedError: A response could not be computed, or an error exceeds the tolerance of the

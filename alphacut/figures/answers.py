@@ -128,10 +128,16 @@ def draw_decision(answer: Decision) -> Figure:
 
 
 def peak_over_limit(limit: LimitDecision) -> Ends:
-    """Return the smallest and the largest peak over the limit on each level, shape (A,) each.
+    """Return the smallest and the largest peak over the limit on each level.
 
-    Of a limit of zero the peaks are 1 less the margin over the largest margin, so that their bars
-    have about the length of those of other limits.
+    Args:
+        limit: Limit and margins, limit less peak, in the unit of the output. The largest peak is
+            infinite where none is excluded.
+
+    Returns:
+        Ratios of shape (levels,) each, by the magnitude of the limit. Of a limit of zero they are 1
+        less the margin over the largest finite margin, so that their bars have about the length of
+        those of other limits.
     """
     size = abs(limit.limit)
     if size == 0.0:
@@ -288,7 +294,8 @@ def draw_demands(axes: Axes, answer: Fragility, names: Sequence[str]) -> None:
         for level, shade in enumerate(style.colours(answer.alpha)):
             band: Look = {"color": shade, "lw": 0, "alpha": 0.7}
             filled = axes.fill_between(increment.measure, low[level], high[level], **band)
-            filled.set_gid(f"{style.HOVER}{record}")  # for the pointer in SVG, see `style.save`
+            # In the SVG file the name of the record is shown where a pointer rests on the band.
+            filled.set_gid(f"{style.HOVER}{record}")
         (line,) = axes.plot(increment.measure, high[-1], color=INK, lw=0.7)
         line.set_gid(f"{style.HOVER}{record}")
 

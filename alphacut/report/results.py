@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from textwrap import wrap
 from typing import Literal, NamedTuple
 
@@ -76,8 +77,7 @@ def run_text(parts: Parts) -> str:
     sentences: list[str] = []
     if parts.image is not None:
         sentences.append(guaranteed_of(parts.image))
-    sentences.extend(natures(parts))
-    sentences.extend(smaller_steps(parts))
+    sentences.extend(chain(natures(parts), smaller_steps(parts)))
     if parts.modulus is not None and parts.modulus.solver:
         sentences.append(f"Cells: {parts.modulus.solver}")
     if parts.update is not None and parts.update.is_refuted:
@@ -111,10 +111,7 @@ def key_tables(parts: Parts) -> list[Table]:
 
 def key_sentences(parts: Parts) -> list[str]:
     """Return the sentences below the tables: on guarantees, smaller steps and main inputs."""
-    sentences = list(natures(parts))
-    sentences.extend(smaller_steps(parts))
-    sentences.extend(drivers(parts))
-    return sentences
+    return list(chain(natures(parts), smaller_steps(parts), drivers(parts)))
 
 
 def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
@@ -361,27 +358,27 @@ def peak_table(parts: Parts) -> Table:
                     limit_text = ""
                     if not math.isnan(limit):
                         limit_text = engineering(limit * factor, "")
-                    row = [label + suffix]
-                    row += cells
-                    row += [limit_text, verdict]
-                    rows.append(row)
+                    rows.append([label + suffix, *cells, limit_text, verdict])
                     # Further limits of the same peak do not repeat what is said of it.
                     cells = [""] * len(cells)
     titles = [f"α = {alpha[level]:g}" for level in levels]
     # At α = 1 triangular numbers have one value, the nominal one, and so has each peak.
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
-    head = ["peak of"]
-    head += titles
-    head += ["± error", "reached", "gap", "record", "limit", "exceeded"]
+    head = ["peak of", *titles, "± error", "reached", "gap", "record", "limit", "exceeded"]
     return without_empty_columns(head, rows)
 
 
 def _shown_levels(studies: Iterable[EnvelopeResult | SuitePeaks], alpha: Array) -> list[int]:
     """Return the indices of the α-levels whose cuts a table of peaks shows, the highest first.
 
-    They are the highest and the lowest level. If no peak of the studies is guaranteed, the table
-    has no gaps, and room for the level nearest to 1/2. Each level stands once.
+    Args:
+        studies: Peaks of the studies and of the suite.
+        alpha: Their rising levels, shape (levels,).
+
+    Returns:
+        The highest and the lowest level; between them, if no peak is guaranteed and the table has
+        no gaps, the level nearest to 1/2. Each index stands once, so that a single level gives one.
     """
     levels = [len(alpha) - 1, 0]
     peaks = [peak for study in studies for peak in study.peak.values()]
@@ -430,8 +427,7 @@ def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
         reached = rounded(factor * float(peak.reached[0]), side, Nature.ATTAINED)
         reached_text = number_text(reached)
         gap_text = f"{peak.gaps[0]:.1%}"
-    cells += [reached_text, gap_text]
-    return cells
+    return [*cells, reached_text, gap_text]
 
 
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:

@@ -118,7 +118,7 @@ class CellProblem:
     @property
     def nominal(self) -> Cell:
         """The cell with one particle at the nominal values of its inputs."""
-        assert isinstance(self.cell, RoundCell)
+        assert isinstance(self.cell, RoundCell)  # a mesh from a file may have any number of phases
         matrix, inclusion = self.cell.nominal_phases
         radius = cast("RadiusMap", self.nominal_radius)
         return Cell(matrix, inclusion, radius, self.cell.outline or circle)
@@ -294,7 +294,12 @@ class CellProblem:
 def key_and_unit(name: str) -> tuple[str, float]:
     """Return the key of an elastic constant in results, and its unit in SI.
 
-    They are E_x_GPa and 1e9 of E_x, nu_xy and 1 of nu_xy.
+    Args:
+        name: Name of the constant, such as "E_x" or "nu_xy".
+
+    Returns:
+        "E_x_GPa" and 1e9 for a modulus E_x; "nu_xy" and 1 for a Poisson's ratio, which begins with
+        "nu".
     """
     # Poisson's ratios are the only constants without a unit.
     if name.startswith("nu"):

@@ -93,6 +93,12 @@ class EnvelopeTask:
     def tolerance(self, structure: Structure) -> Tolerance:
         """Return the error of the envelope that the case allows, or a thousandth of each peak.
 
+        Args:
+            structure: The structure, for the units of its outputs.
+
+        Returns:
+            Tolerance: Value in m or N with this unit; or a fraction of each peak with the unit "".
+
         Raises:
             RefusedError: It is in the unit of no output.
         """
@@ -163,14 +169,19 @@ class EnvelopeTask:
         """Return the bounds of the peaks over time, by name.
 
         All outputs of the envelope have the peak of their magnitude, such as "q3". Those that
-        questions limit may also be "max q3" or "min q3", the largest and the smallest value. If a
-        limited peak is not guaranteed within `PEAK_ERROR`, it is bounded again by a proof for these
-        peaks alone, and the tighter of both bounds is returned.
+        questions limit may also be "max q3" or "min q3", the largest and the smallest value. A
+        limited peak whose guaranteed bound is more than half a per cent from an attained value is
+        bounded again by a proof for such peaks alone, and the tighter of both bounds is returned.
 
         Args:
             structure: The structure with its fuzzy parameters.
             envelope: Its envelope.
-            progress: Called with the completed fraction of the second proof.
+            progress: Called with the completed fraction of the second proof; never if there is
+                none.
+
+        Raises:
+            RefusedError: A limited output is none that the structure can have.
+            FailedError: A response could not be computed.
         """
         # Limited outputs that are not observed have no envelope: their peaks come from the proof.
         outputs = [str(name) for name in envelope.outputs]
@@ -196,7 +207,9 @@ class EnvelopeTask:
         return StageResult(self.close_peaks(structure, context.tick))
 
     def arguments(self, structure: Structure) -> Document:
-        """Return the arguments of `frame.envelope` and `frame.require_envelope`, by name.
+        """Return the arguments by name with which `frame.envelope` computes the envelope.
+
+        They are also those of `frame.require_envelope`, which refuses what cannot be computed.
 
         Args:
             structure: The structure with its fuzzy parameters, which must have the inputs of the

@@ -84,9 +84,19 @@ def foreseen_structure(content: Content) -> Structure | None:
 
 
 def possible_materials(content: Content) -> tuple[Material, ...]:
-    """Return the foreseen material or, if it is not known, two extremes of what there can be.
+    """Return the materials that stand for what a stage will give the structure of a case.
 
-    What neither of the extremes admits is wrong whatever a stage will compute.
+    Args:
+        content: The case.
+
+    Returns:
+        The material at the nominal values of the cell, if a fast model finds it. Otherwise two
+        extremes: a stiff one with a small loss factor and a soft one with a large one, without the
+        modulus where the case states it. What neither of them admits is wrong whatever a stage will
+        compute.
+
+    Raises:
+        RefusedError: The cell cannot be solved.
     """
     # Refusals that depend on the material are those of a modulus that is too small or of a loss
     # factor that is too large, or the reverse: one of two extremes admits what any material does.

@@ -44,7 +44,12 @@ def require_learnable(section: Identify, structure: Structure, alpha: tuple[floa
 
 
 def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> dict[str, Any]:
-    """Return the arguments of `frame.identify` for a section, by name.
+    """Return the arguments by name with which `frame.identify` identifies the inputs of a section.
+
+    Args:
+        section: File of the measured modes, their scatter, and the inputs to be identified.
+        structure: The structure, whose fuzzy inputs are what is known before.
+        alpha: Rising α-levels.
 
     Raises:
         RefusedError: A level is not above 0, the file of the measured modes is not read, or an

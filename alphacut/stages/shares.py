@@ -101,6 +101,9 @@ def cell_shares(campaign: CellProblem) -> WidthFractions:
     width, on the lowest level. The cell is solved by the fastest model whatever the case uses,
     since ratios of widths need few digits.
 
+    Args:
+        campaign: The cell with its fuzzy inputs, of which there are two at least.
+
     Returns:
         The names of the inputs, and the fractions, shape (inputs, 2) for E and ν.
 

@@ -189,6 +189,7 @@ class StageStore:
 
     def take(self, stage: Stage[T]) -> StageResult[T]:
         """Return the result of a stage: from its files if these are up to date, else computed."""
+        # A single stage may use all processes itself, and leaves further files.
         return self.take_all([stage], None)[stage.name]
 
     def take_all(
@@ -372,10 +373,13 @@ class StageStore:
 
 @contextmanager
 def _naming_dead_workers(stage: str) -> Iterator[None]:
-    """Name the stage in whose block a worker process died.
+    """Turn the death of a worker process within the block into an error that names the stage.
+
+    Args:
+        stage: Name of the stage.
 
     Raises:
-        FailedError: A worker died.
+        FailedError: A worker died, for want of memory or by a crash in compiled code.
     """
     try:
         yield

@@ -183,7 +183,8 @@ def incremental_stage(
         section: The question, whose limits name the outputs.
         structure: The frame.
         name: Name of the record; that of the stage is "incremental_NAME".
-        analysis: The analysis of this record, of `analyses_of`.
+        analysis: The incremental dynamic analysis of the frame under this record, with its fuzzy
+            inputs and the same limits.
 
     Returns:
         Stage of the bounds of the peaks over the intensity, for each limit.
