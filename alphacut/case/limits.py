@@ -296,7 +296,16 @@ class ProbabilitySection(QuestionSection):
     """random draws at each fuzzy point"""
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuse limits and random inputs that the structure does not have."""
+        """Refuse limits and random inputs that the structure does not have.
+
+        Args:
+            structure: Structure of the case, in which a modulus that stage modulus computes is
+                crisp.
+
+        Raises:
+            RefusedError: A limit does not fit the structure, or a random input but E is unknown or
+                crisp.
+        """
         super().require_answerable(structure)
         # A modulus that stage modulus computes is still crisp here, and may be random in the run.
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
@@ -329,7 +338,16 @@ class FragilitySection(QuestionSection):
     structure would reach all limits under all records if it were elastic"""
 
     def require_answerable(self, structure: Structure) -> None:
-        """Refuse structures with forces or a start beside the record, and unfit limits."""
+        """Refuse a structure and limits of which no fragility can be computed.
+
+        Args:
+            structure: Structure of the case, which a suite of records moves.
+
+        Raises:
+            RefusedError: The structure has forces or does not start at rest; a limit does not fit
+                it or is none of a magnitude; or `most`, the largest intensity tried, is stated
+                though no columns yield.
+        """
         super().require_answerable(structure)
         with _naming("fragility.limits"):
             require_fragile(structure.model, self.limits_of(structure))

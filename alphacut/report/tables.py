@@ -222,7 +222,7 @@ def _text(value: object) -> str:
     None and NaN become an empty text, and hyphens of numbers minus signs.
 
     Raises:
-        ValueError: The value is neither a text nor a number.
+        TypeError, ValueError: The value is neither a text nor a number.
     """
     if value is None or isinstance(value, str):
         return value or ""

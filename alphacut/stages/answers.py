@@ -140,6 +140,7 @@ def tolerances_of(section: TolerancesSection, response: Response, tick: Progress
 
     Raises:
         RefusedError: A limit does not fit the structure, or an input is inadmissible at a scale.
+        FailedError: A response could not be computed, or no bounds are found.
     """
     # The known peaks hold for the lowest α-cut, which is the support only at α = 0.
     known_peaks = None

@@ -209,7 +209,7 @@ class CellProblem:
 
         Raises:
             RefusedError: The model needs a library that is not installed, or cannot solve the cell.
-            FailedError: A linear system was not solved.
+            FailedError: A linear system was not solved, or a series does not converge.
         """
         model: Any = self.model(**options)
         if isinstance(self.cell, MeshedCell):

@@ -41,7 +41,8 @@ def foreseen_material(content: Content) -> Material | None:
         yet to be computed.
 
     Raises:
-        RefusedError: The cell cannot be solved.
+        RefusedError: The cell does not fit the series.
+        FailedError: The series does not converge.
     """
     if content.has_stated_modulus and not content.has_material_damping:
         return Material()
@@ -73,7 +74,8 @@ def foreseen_structure(content: Content) -> Structure | None:
         solves.
 
     Raises:
-        RefusedError: The cell cannot be solved, or the values make no structure.
+        RefusedError: The cell does not fit the series, or the values make no structure.
+        FailedError: The series does not converge.
     """
     if content.structure is None:
         return None
@@ -96,7 +98,8 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
         compute.
 
     Raises:
-        RefusedError: The cell cannot be solved.
+        RefusedError: The cell does not fit the series.
+        FailedError: The series does not converge.
     """
     # Refusals that depend on the material are those of a modulus that is too small or of a loss
     # factor that is too large, or the reverse: one of two extremes admits what any material does.

@@ -31,7 +31,8 @@ def suite_records(
 ) -> tuple[ScaledRecord, ...]:
     """Return the records of a suite as they move the structure, in the order of the case.
 
-    Each is corrected by a baseline and scaled; its response ends five natural periods after it.
+    Each is corrected by a baseline and scaled; its response ends five natural
+    periods after it, but not later than the longest duration.
 
     Args:
         section: Recordings, baseline correction, and the scale or the intensity to be reached.
