@@ -348,7 +348,9 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     # At rest rounding alone moves a structure, and its peak is no measure of what is between nodes.
     # `reach` is the size of each output that the energy of the response allows, shape (outputs,).
     peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
-    widening = within_steps(at_nodes, between).max(axis=1) / peaks - 1
+    # Before a late force sets in, nothing moves and the energy is zero: nothing is widened then.
+    farthest = within_steps(at_nodes, between).max(axis=1)
+    widening = np.divide(farthest, peaks, out=np.ones_like(peaks), where=peaks > 0) - 1
     for name, fraction in zip(linear.outputs, widening, strict=True):
         if fraction <= WIDENING:
             continue

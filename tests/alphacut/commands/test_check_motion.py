@@ -79,3 +79,15 @@ def test_a_force_whose_times_are_in_milliseconds_is_doubted(tmp_path, capfd):
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     assert main(["check", str(tmp_path / "case.toml")]) == 0
     assert "ends before the second sample, at 250 s: are its times" in capfd.readouterr().out
+
+
+def test_nothing_is_said_of_a_step_before_anything_moves(tmp_path, capfd):
+    """The first 16,000 steps, which are timed, end before the force sets in."""
+    force = '[[force]]\nhistory = "step, from 20 s"\namplitude = {2 = "10 kN"}\n'
+    text = CASE.replace("GROUND", "").replace("YIELD", "") + force
+    text = text.replace('"4 s"', '"30 s"').replace('"0.01 s"', '"0.001 s"')
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml")]) == 0
+    seen = capfd.readouterr()
+    assert "nan" not in seen.out + seen.err
+    assert "total weight: 980.7 kN" in seen.out
