@@ -18,8 +18,14 @@ Coupling in a block. A block contributes a e(L) β with a = r X and β = N⁻¹ 
 diagonal of L gives Σ_j a_j β_j e(L_jj). Let V be the eigenvectors of L, with N^½ V orthogonal, and
 F = L off its diagonal. Then V⁻¹ (e(L) − e(diag L)) has the entries e[λ_i, L_jj] (V⁻¹ F)_ij with
 divided differences of e (Daleckii, Krein 1965). So the coupling is at most |a N^-½| Σ_j |β_j| |N^½
-F_j| sup |de/dλ|. It is also at most twice |a N^-½| |N^½ β| times the radius of the range of e. The
-eigenvalues λ_i lie in the discs of Gershgorin about L_jj.
+F_j| sup |de/dλ|. Let the range of e over the λ_i and L_jj have the midpoint m and the radius r.
+Then a (e(L) − m) β is at most |a N^-½| |N^½ β| r, and Σ_j a_j β_j (e(L_jj) − m) at most Σ_j |a_j
+β_j| r. With δ = ‖N − 1‖₂ < 1 the eigenvalues of N lie in [1 − δ, 1 + δ], so that
+
+    Σ_j |a_j β_j| ≤ |a| |β| ≤ √(1 + δ) |a N^-½| |N^½ β| / √(1 − δ),
+
+and the coupling is also at most 2 r √((1 + δ)/(1 − δ)) |a N^-½| |N^½ β|. The eigenvalues λ_i lie in
+the discs of Gershgorin about L_jj.
 """
 
 from __future__ import annotations
@@ -31,7 +37,9 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.intervening import (
     BlockParticipation,
@@ -422,7 +430,7 @@ def coupling_bounds(
 
     The block spans an invariant subspace K X = M X L; its oscillators are the diagonal entries of
     L, and F, the rest of L, couples them. The smaller of two bounds is taken: |F| times the slope
-    of responses by their eigenvalue, and twice the radius of the range of responses.
+    of responses by their eigenvalue, and a bound by twice the radius of the range of responses.
 
     Args:
         structure: The structure over the box, with m outputs.
@@ -436,7 +444,7 @@ def coupling_bounds(
         `ranges` of frequency and damping of the block's modes.
 
     Raises:
-        UnprovedError: One of the modes may not oscillate.
+        UnprovedError: One of the modes may not oscillate, or N = Xᵀ M X may be singular.
     """
     loads, time, sources = excitation
     factors = _coupling_factors(structure, participation)
@@ -470,9 +478,11 @@ def coupling_bounds(
             at_nodes[:, outputs] += np.minimum(
                 np.outer(slope, by_slope), 2 * np.outer(radius, by_range)
             )
-            # The coupling is the block's response less that of its oscillators. Each of the two is
-            # off a straight line by the interpolation error of e at most, hence the coupling by
-            # twice that; or by twice its own largest value within the step.
+            # The coupling is the block's response a e(L) β less that of its oscillators, Σ a_j β_j
+            # e(L_jj). With the interpolation error of e, its distance ℓ from a straight line, the
+            # first is off a line by |a N^-½| |N^½ β| ℓ at most and the second by Σ |a_j β_j| ℓ,
+            # hence the coupling by twice `by_range` ℓ; or by twice its own largest value within the
+            # step.
             max_force = loads[source].extremes[0] if source in loads else 0.0
             G, G_slope = _largest_within_steps(
                 response.largest, time, max_force=max_force, max_sigma=max_sigma, order=order
@@ -487,7 +497,8 @@ class _CouplingFactors(NamedTuple):
     """Factors of the bounds of the coupling in a block of p modes, for m outputs."""
 
     by_slope: Array  # bound of the coupling over sup |de/dλ|, (sources, m)
-    by_range: Array  # bound of |a N^-½| |N^½ β|, and of Σ |a_j β_j|, (sources, m)
+    # bound of |a N^-½| |N^½ β|, and of Σ |a_j β_j|, which may be larger, (sources, m)
+    by_range: Array
     off_diagonal: Array  # bound of |F|, L off its diagonal, (p, p)
 
 
@@ -503,17 +514,30 @@ def _coupling_factors(
 
     Returns:
         `by_slope`, a bound of the coupling over sup |de/dλ| of responses e, shape (sources, m);
-        `by_range`, a bound of |a N^-½| |N^½ β|, shape (sources, m); and `off_diagonal`, a bound of
-        |L| off its diagonal, with zeros on it, shape (p, p), transposed as the block holds L.
+        `by_range`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
+        `off_diagonal`, a bound of |L| off its diagonal, with zeros on it, shape (p, p), transposed
+        as the block holds L.
+
+    Raises:
+        UnprovedError: N may be singular in the box.
     """
     block = participation.block
     off_diagonal = block.eigenvalue_block.magnitude() * (1.0 - np.eye(len(block.modes)))
-    # N is the identity at the midpoint but for this bound of ‖N − 1‖₂, so |N^½ x| ≤ √norm |x|.
-    norm = 1 + float(np.linalg.norm(block.modal_mass.deviation(), 2))
+    p = len(block.modes)
+    # δ ≥ ‖N − 1‖₂ over the box. The norm of a matrix of magnitudes bounds that of the matrix; it is
+    # computed with an error of a few p roundings, for which 64 p are added.
+    mass_change = (block.modal_mass - np.eye(p)).magnitude()
+    delta = (1 + gamma(64 * p)) * float(np.linalg.norm(mass_change, 2))
+    if not delta < 1:
+        raise UnprovedError("modal masses of a block may be singular", "take narrower inputs")
     outputs = np.sqrt(participation.output_sums.magnitude()) * structure.output_factors.magnitude()
-    of_columns = np.sqrt(norm) * np.linalg.norm(off_diagonal, axis=1)
+    # |N^½ x| ≤ √(1 + δ) |x|
+    of_columns = np.sqrt(1 + delta) * np.linalg.norm(off_diagonal, axis=1)
     by_source = participation.source_participation.magnitude().T @ of_columns
-    of_sources = norm * np.sqrt(participation.source_sums.magnitude())
+    # Σ |a_j β_j| ≤ |a| |β| with |a| ≤ √(1 + δ) |a N^-½| and |β| ≤ |N^½ β| / √(1 − δ). The bound is
+    # not less than |a N^-½| |N^½ β| itself.
+    of_masses = (1 + gamma(8)) * np.sqrt((1 + delta) / (1 - delta))
+    of_sources = of_masses * np.sqrt(participation.source_sums.magnitude())
     return _CouplingFactors(
         by_slope=by_source[:, np.newaxis] * outputs,
         by_range=of_sources[:, np.newaxis] * outputs,

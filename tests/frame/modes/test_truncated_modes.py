@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.intervening import BlockParticipation, Excitation
-from alphacut.frame.modes.truncated_modes import coupling_bounds, inverse_form
+from alphacut.frame.modes.truncated_modes import (
+    _coupling_factors,
+    coupling_bounds,
+    inverse_form,
+)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -89,3 +94,54 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
     between = np.abs(coupled(middles) - (coupled(time[1:]) + coupled(time[:-1])) / 2)
     assert (between <= deviation[1:, 0] + 1e-12).all()
     assert (between[-10:] >= 0.8 * deviation[-10:, 0]).all()
+
+
+def block_with_modal_masses(masses, outputs, sources):
+    """A block of two modes with L = 1 and N = `masses`, read by a and set in motion by β.
+
+    N is 1 at the midpoint of the box, and as given at u = 1.
+    """
+    unit = TaylorModel.constant(np.eye(2), inputs=1)
+    modal_mass = TaylorModel((unit.parts[0], (masses - np.eye(2))[None]), np.zeros((2, 2)), 1)
+    block = Block(np.arange(2), unit, unit, unit, modal_mass)
+    participation = unit.like(sources[:, np.newaxis])
+    return BlockParticipation(
+        block,
+        output_modes=unit.like(outputs[:, np.newaxis]),
+        modal_forces=modal_mass @ participation,
+        source_participation=participation,
+    )
+
+
+@pytest.mark.parametrize("delta", [0.0, 0.1, 0.5, 0.8, 0.95])
+def test_products_of_shapes_and_sources_are_bounded_by_their_sums(delta):
+    """Σ |a_j β_j| reaches √((1 + δ)/(1 − δ)) times √(a N⁻¹ aᵀ β·N β) with δ = ‖N − 1‖₂.
+
+    a belongs to the largest eigenvalue of N, 1 + δ, and β to the smallest one, 1 − δ.
+    """
+    masses = np.array([[1.0, delta], [delta, 1.0]])
+    outputs = np.sqrt((1 + delta) / 2) * np.array([1.0, 1.0])
+    sources = np.array([1.0, -1.0]) / np.sqrt(2 * (1 - delta))
+    assert outputs @ np.linalg.solve(masses, outputs) == pytest.approx(1)
+    assert sources @ masses @ sources == pytest.approx(1)
+    of_block = block_with_modal_masses(masses, outputs, sources)
+    of_sums = SimpleNamespace(  # the sums at u = 1, and not bounds over the box
+        block=of_block.block,
+        source_participation=of_block.source_participation,
+        output_sums=TaylorModel.constant(np.ones(1), 1),
+        source_sums=TaylorModel.constant(np.ones(1), 1),
+    )
+    structure = SimpleNamespace(output_factors=TaylorModel.constant(np.ones(1), 1))
+    of_products = np.abs(outputs * sources).sum()
+    by_range = _coupling_factors(structure, of_sums).by_range[0, 0]
+    assert of_products <= by_range <= (1 + 1e-12) * of_products
+    # Σ |a_j β_j| is bounded with the sums of the whole box, too.
+    assert _coupling_factors(structure, of_block).by_range[0, 0] >= of_products
+
+
+def test_a_block_whose_modal_masses_may_be_singular_is_refused():
+    masses = np.array([[1.0, 1.0], [1.0, 1.0]])
+    of_block = block_with_modal_masses(masses, np.ones(2), np.ones(2))
+    structure = SimpleNamespace(output_factors=TaylorModel.constant(np.ones(1), 1))
+    with pytest.raises(UnprovedError, match="singular"):
+        _coupling_factors(structure, of_block)
