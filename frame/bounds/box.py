@@ -179,8 +179,7 @@ class Box:
     ) -> Array:
         """Return upper bounds of max |output| over time at one point, also between nodes, (m,).
 
-        Rounding is contained at the nodes. Between them, where the bound is the distance from a
-        straight line, that of the modes themselves is not.
+        Rounding is contained at the nodes; within time steps, the rounding of the modes is not.
 
         Args:
             unit: The point, shape (d,): coordinates in [−1, 1] of the d inputs of nonzero width.
@@ -194,15 +193,16 @@ class Box:
         """
         point = self.inputs(unit)
         at_point = replace(self, low=point, high=point)
-        magnitude = at_point._midpoint_magnitude(outputs)
+        magnitude = at_point._midpoint_magnitude(outputs)  # at the nodes, (m, T)
         peak = magnitude.max(axis=1)
         # Only steps whose bound exceeds the peak at nodes matter. They are divided: the distance
         # from a straight line falls with the square of the number of substeps.
         is_above = within_steps(magnitude, between_nodes.T) > peak[:, np.newaxis]
-        steps = np.flatnonzero(is_above.any(axis=0)) - 1
-        if len(steps):
+        first_nodes = np.flatnonzero(is_above.any(axis=0)) - 1  # column j: the step to node j
+        if len(first_nodes):
             substeps = 4
-            place = np.unique(substeps * steps[:, np.newaxis] + np.arange(substeps + 1))
+            # times of the divided steps, counted in substeps from the first node on
+            place = np.unique(substeps * first_nodes[:, np.newaxis] + np.arange(substeps + 1))
             time = np.interp(place / substeps, np.arange(len(self.time)), self.time)
             finer = replace(at_point, time=time)
             error = finer.midpoint_interpolation_error(outputs)

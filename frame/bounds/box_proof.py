@@ -186,8 +186,8 @@ class Hull:
             bounds: Results over the sub-box. For T time nodes, m outputs q and the sides −q, q:
                 `attained` of shape (T, m, 2) replaces smaller values together with the inputs
                 `attained_at`; `between_nodes` and `attained_error`, shape (T, m), raise the largest
-                ones so far; the upper ends of `least_peaks`, shape (m,), lower the smallest known
-                max |q| over time; and `facts` are merged by name.
+                ones so far, of all levels; the upper ends of `least_peaks`, shape (m,), lower the
+                smallest known max |q| over time, unless it is None; and `facts` are merged by name.
         """
         is_better = bounds.attained > self.attained[level]
         self.attained[level][is_better] = bounds.attained[is_better]

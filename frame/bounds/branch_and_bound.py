@@ -171,9 +171,10 @@ def examine_items(
             items of these sub-boxes, at least one.
 
     Returns:
-        For each item, in order: `code` (0: closed; 1 + i: bisect along input i; from 16 on: confine
-        to faces), `value` of side × output at the midpoint, and its guaranteed upper `bound` over
-        the sub-box.
+        For each item, in order: `code`, which is 0 where the item is closed, 1 + i where the
+        sub-box is to be bisected along input i, and 16 + Σ_i 3^i e_i where it is to be confined to
+        faces (e_i = 0: input i stays free, 1: its lower end, 2: its upper end); `value` of side ×
+        output at the midpoint; and its guaranteed upper `bound` over the sub-box.
     """
     geometry = frontier.geometry(piece.boxes)
     n = model.count
@@ -193,7 +194,8 @@ def examine_items(
         node=row_node,
         column=column,
     )
-    # Values and derivatives of λ and C of all parts at the midpoints, (q, B, n + parts n m)
+    # λ and C of all parts of the response at the midpoints, (q, B, n + parts n m): value, gradient
+    # and packed second derivatives, q = 1 + d + d (d + 1)/2
     jets = model.together.jets(geometry.midpoint).swapaxes(0, 1)
     eigenvalues = jets[..., :n]
     coefficients = jets[..., n:].reshape(*jets.shape[:2], -1, n, n_outputs)
@@ -378,7 +380,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
         Points, shape (2 T m, d), and values of side × output there, shape (2 T m,). They are
         attained by the model and thus lower bounds of the maxima, not guaranteed to be global.
     """
-    # Tuned: more samples find better optima in more time.
+    # 256 is tuned: more samples find better optima in more time. Chunks of 64 limit the memory.
     samples = chebyshev_points(len(lower), 256)
     unit = np.vstack([np.zeros((1, len(lower))), samples])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit

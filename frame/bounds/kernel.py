@@ -153,7 +153,7 @@ def stays_below(g: Array, H: Array, r: Array, allowed: float, work: Array, facto
     if not has_cholesky_factor(H, shift, r, factor):
         return False
     for _ in range(8):  # sweeps over the axes; few problems are decided later
-        tangent_bound = value
+        tangent_bound = value  # the largest value of the tangent plane at x over the box
         for i in range(d):
             tangent_bound += abs(slope[i]) * r[i] - slope[i] * x[i]
         if tangent_bound <= allowed:

@@ -54,8 +54,10 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
         output: Index of the output among those of `level`.
 
     Returns:
-        The bound, 0 or more, in the unit of the output, and inputs in unit coordinates, shape (d,),
-        that the bound of the lowest cell names: there the peak is expected to be small.
+        The bound, 0 or more, in the unit of the output; and a point of the box in unit coordinates,
+        shape (d,), at which the peak is expected to be small. Nothing is proved of this point, the
+        one at which the dual function of the cell with the lowest bound has its maximum over
+        inputs; it is 0 where no node gave a bound.
 
     Raises:
         UnprovedError: A number of the models exceeds the range of the dual function.
@@ -73,6 +75,7 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     )
 
     def bounded_cell(ends: Ints, number: int, parent_bound: float) -> PeakCell:
+        """Return a cell with its bound, or the bound of the cell it was halved from, if higher."""
         at = np.zeros(data.linear.shape[1])
         bound, node = _bound_cell(ends, data_of_sides, constants, effort, multipliers, at)
         return PeakCell(max(bound, parent_bound), number, ends, node, at)

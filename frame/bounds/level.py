@@ -100,7 +100,7 @@ def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[i
     its frequency response, or of the inverse duration where that is larger. More points make the
     interpolation error of the tables smaller, with the square of their distance, and the dual
     function slower in proportion to their number. So 9 to 81 points are taken along ω and 4 to 13
-    along q, as many as the most demanding mode asks for.
+    along q, as many as the most demanding mode asks for; these limits are tuned.
 
     Args:
         oscillators: Modes with their ranges of ω, in rad/s, and of q.
@@ -266,9 +266,11 @@ class LevelModels:
                 shape (sources, m).
 
         Yields:
-            For each source, and each derivative of the displacements that some output takes: κ for
-            each output at the points of the grid, 0 for outputs of other derivatives, and bounds of
-            the change of Re κ and Im κ over the box.
+            For each source, and each derivative of the displacements that some output takes, the
+            response with the grid's `sigma`, shape (Q, W); its `load`, None for an initial state;
+            its `order`; `coefficient`, κ for each output at the points of the grid, shape (m, Q,
+            W), 0 for outputs of other derivatives; and `coefficient_error`, bounds of the change of
+            Re κ and Im κ over the box, shape (2, m).
         """
         loads, _, sources = self.excitation
         orders = self.structure.derivative_orders

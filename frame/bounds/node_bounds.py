@@ -191,8 +191,9 @@ def bound_cell(
         node: Index of the time node.
         side: −1 or 1.
         data: Models and tables of the output; they are read only.
-        effort: Limits of the work: at most `steps` of the minimisation of the bound, `patience`
-            steps after which it expects less, and at most `ascents` steps of the ascent.
+        effort: Limits of the work: at most `steps` evaluations in the minimisation of the bound,
+            which takes shorter steps after `patience` of them without enough progress, and at most
+            `ascents` steps of the ascent.
         target: Value of the dual function at which its minimisation ends.
         cells: All cells; `ends` of this one must be set, and `mu` is where the minimisation begins.
         model_value: Largest value of side × output in the model that is known before.
@@ -402,6 +403,7 @@ def ascend(u: Array, node: int, side: float, data: DualFunctionData, steps: int)
     trial_slope = np.empty(d)
     point = u.copy()
     value = model_and_gradient(u, node, side, data, slope)
+    # The numbers of this ascent, such as the first step of at most 0.3 in each input, are tuned.
     length = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(steps):
         for i in range(d):

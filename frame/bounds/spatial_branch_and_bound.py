@@ -144,7 +144,8 @@ class Queue:
 
         A peak is the largest value over time of one side, −q or q, of an output q on one α-level.
         It is fathomed in a sub-box where its bound exceeds the largest attained value by no more
-        than the wanted gap. Afterwards `self.hull` holds the bounds over the whole box.
+        than the wanted gap, and abandoned where further bisections are not expected to bring its
+        bound so low. Afterwards `self.hull` holds the bounds over the whole box.
 
         Args:
             progress: Called with the completed fraction of the expected work, from 0 to 1.
@@ -233,6 +234,7 @@ class Queue:
         box.done = max(fraction, box.done)
         if progress is not None:
             waiting = sum(other.work for _, _, other in self.heap)
+            # Of a sub-box's work its own bounds take the fraction `OWN_WORK`, its halves the rest.
             in_batch = sum(x.work * (1 - OWN_WORK * x.done) for x in batch)
             progress(1 - waiting - in_batch)
 
@@ -347,7 +349,8 @@ class Queue:
             count = self.box_count[level]
             even_fall = (first_gap - self.gap) * count / max_boxes
             falls_slowly = gap > first_gap - numbers.MIN_GAP_PROGRESS * even_fall
-            # Remainders fall with a power of the widths of the inputs that the gap depends on.
+            # Remainders fall with a power of the widths of the inputs that the gap depends on. A
+            # wide gap is given up at once if not even twice the wanted one can be expected.
             bisections = halvings(bounds.gap_fractions, max_boxes)
             final_gap = gap * 2.0 ** (-numbers.GAP_POWER * bisections)
             is_out_of_reach = (gap > self.wide_gap) & (final_gap > 2 * self.gap)
@@ -387,7 +390,9 @@ class Queue:
         These are the peaks that are abandoned with a finite bound, or whose bound exceeds the
         largest attained value by no more than the wanted gap. Their bounds go into the hull. A
         level keeps all its peaks as long as one that is still open has a very wide gap. The
-        sub-box's `peaks`, and `is_wide` of the levels that have no wide gaps any more, are changed.
+        sub-box's `peaks`, and `is_wide` of the levels that have no wide gaps any more, are changed;
+        when a level loses its wide gaps, `min_peak_lower` of the sub-box, its lower bounds of the
+        smallest max |q| over time, go into the hull as well.
 
         Args:
             box: The sub-box.
@@ -407,8 +412,9 @@ class Queue:
         """Yield the smaller sub-boxes to which the proof has confined single peaks.
 
         These peaks leave `box`, in place, and the bounds over what was pruned go into the hull.
-        Where hardly anything was pruned, the halves of the smaller sub-box are yielded instead, and
-        where nothing was, the peak stays in `box`.
+        Where less was pruned than half the width of an input, summed over all inputs, the halves of
+        the smaller sub-box are yielded instead; where nothing was, the peak stays in `box`. So do
+        all peaks of a level with very wide gaps (`is_wide`).
 
         Args:
             box: The sub-box that has just been bounded.
