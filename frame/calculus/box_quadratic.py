@@ -47,8 +47,8 @@ def local_maximum(
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends of the boxes, shape (N, d).
         start: Where the ascents begin, inside the boxes, shape (N, d); x = 0 if None.
-        rounds: Largest number of rounds. An ascent ends earlier where a round gains next to
-            nothing.
+        rounds: Largest number of rounds. An ascent ends earlier where a round gains at most 1e-10
+            of the value, or 1e-16.
 
     Returns:
         Shape (N, d), a new array.

@@ -245,7 +245,11 @@ def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> d
         selected: Names of those to differentiate by; their order is that of the derivatives.
 
     Returns:
-        A jet of shape (S,) for each name. Its derivative by itself is 1 if it is selected.
+        A jet of shape (S,) for each name. Its derivative by itself is 1 if it is selected; all
+        others are 0.
+
+    Raises:
+        ValueError: A selected name is not among the names.
     """
     jets = Jet.constant(points, len(selected))
     for k, name in enumerate(selected):

@@ -193,7 +193,8 @@ def subspace_series(
         block: Indices of its modes from the lowest on, shape (p,). No other mode may have one of
             their eigenvalues at the midpoint.
         degree: Degree of the series.
-        centre: M and K as Taylor models of shape (n, n), diagonal at the midpoint.
+        centre: M and K as Taylor models of shape (n, n), diagonal at the midpoint; `has_mass`, 1 or
+            0, is the diagonal of M there.
         lower: The same series to a lower degree, which need not be made anew; not changed.
 
     Returns:
@@ -255,7 +256,8 @@ class SubspaceEquations(NamedTuple):
         with the residual R and F = L̃ off its diagonal. The bounds also say how fast the right
         sides change: where Z and D change by at most θ Y and θ E, these change by at most θ times
         the bounds. This takes twice the products of the unknowns, since |D Z − D′ Z′| ≤ |D − D′|
-        |Z| + |D′| |Z − Z′|.
+        |Z| + |D′| |Z − Z′|. The fields of this tuple are bounds, with the modes as rows, of |R|,
+        |X̃| and |M X̃|, shape (p, n), of |M| (n, n), and of |F| and |L̃_jj − L̃_ii|, shape (p, p).
 
         Args:
             Y: Bound of |Zᵀ|, shape (p, n).
@@ -392,6 +394,7 @@ def max_eigenvalue_decrease(matrix: TaylorModel, scale: Array, *, sign: float) -
     of_linear = min(_norm_of_magnitudes(linear), _norm_over_box(linear))
     of_quadratic = min(_norm_of_magnitudes(quadratic), _norm_of_terms(quadratic, is_square))
     of_remainder = float(np.linalg.norm(np.abs(weight) * low_order.remainder, 2))
+    # gamma(100 n) covers the rounding of norms and eigenvalues, since only sums below 1 are of use.
     return of_linear + of_quadratic + of_remainder + gamma(100 * len(scale))
 
 

@@ -121,6 +121,7 @@ def _decreases(centre: CentredMatrices, steepest_input: int) -> tuple[float, flo
         UnprovedError: One of both is not below 1. Its attribute `along` is `steepest_input`, as the
             input to bisect.
     """
+    # S M(0) S and S K(0) S are the identity, but for coordinates without mass
     mass_scale = centre.has_mass
     stiffness_scale = np.diag(centre.stiffness.value) ** -0.5
     mass = max(

@@ -133,8 +133,8 @@ class DampedModes:
 
         Args:
             structure: The structure as Taylor models over the box: N unknowns and S sources.
-            chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ > 0 by
-                rising |λ|.
+            chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ ≥ 0: the
+                oscillating ones first, each kind by rising |λ|.
 
         Returns:
             Polynomials of the eigenvalues λ (n,), of the displacements φ (S, n, N), scaled so that
@@ -268,8 +268,8 @@ def _eigen_series(structure: DampedStructure, chosen: Ints) -> tuple[TaylorModel
 
     Args:
         structure: M, D and K as Taylor models of N unknowns.
-        chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ > 0 by
-            rising |λ|.
+        chosen: Indices of the modes, shape (n,), among those at the midpoint with Im λ ≥ 0: the
+            oscillating ones first, each kind by rising |λ|.
 
     Raises:
         UnprovedError: One of the modes does not oscillate, or modes of equal eigenvalues are

@@ -188,10 +188,12 @@ def oscillators(
     order = structure.initial_state.order
 
     def over_all_inputs(model: TaylorModel) -> TaylorModel:
+        """Return a model of the block's inputs as one of all inputs, of their degree."""
         return model.truncated(order).embedded(found.used, inputs)
 
     factors = over_all_inputs(participation.participation)
     eigenvalue_block = over_all_inputs(participation.block.eigenvalue_block)
+    # Modes of a block may cross, so they must have one damping ratio: the same coefficients.
     ratios = structure.damping_ratios[modes]
     if any((part[:, 1:] != part[:, :-1]).any() for part in ratios.parts):
         raise UnprovedError(
@@ -285,6 +287,7 @@ def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> Ta
     """
     displacements = structure.initial_state[0]
     vectors = {
+        # the numbers of ι as a Taylor model of the same inputs
         "load": displacements * 0.0 + structure.ground_pattern,
         "velocity": structure.initial_state[1],
         "start": displacements,

@@ -189,7 +189,8 @@ def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
             numbers, or a Taylor model where they depend on inputs.
 
     Raises:
-        UnprovedError: Rows depend on inputs, or an output takes displacements and velocities.
+        UnprovedError: Rows depend on inputs, as only those of a frame's overturning moment do, or
+            an output takes displacements and velocities.
     """
     if not isinstance(assembly.rows, np.ndarray):
         cure = "take the method proof with few inputs, or leave the overturning moment out"

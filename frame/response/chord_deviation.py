@@ -132,8 +132,8 @@ class Response(NamedTuple):
         if self.sigma is not None:
             return np.asarray(self.line_deviation(np.array([first, last]))[1])
         assert self.load is not None
-        # shortly before the end the load differs by at most `missed` from its value before the
-        # jump, and so does the line
+        # A `sliver` before the end, too much to be taken for the end itself, the load differs from
+        # its value before the jump by at most the sliver times max|f′|; so does the line.
         sliver = 4 * SAME_TIME * self.load.step
         missed = 2 * sliver * self.load.extremes[1]
         deviation = load_deviation(self.load, np.array([first, last - sliver]))[1] + missed
@@ -230,7 +230,8 @@ class Response(NamedTuple):
                 value = x.real * G.real - x.imag * G.imag
                 low[:, o] = np.minimum(low[:, o], value.min(-1))
                 minus_high[:, o] = np.minimum(minus_high[:, o], -value.max(-1))
-        # Between the points of the grid G differs from bilinear interpolation by at most `missed`.
+        # Between the points of the grid G differs from bilinear interpolation by at most `missed`,
+        # in which the rounding of G, with that of the chord's ends, is counted twice.
         # κ G differs by what κ changes in a cell besides: at most the sum of its changes along the
         # sides, since κ is monotonic along both.
         real, imag, second, rounding = largest
@@ -781,6 +782,7 @@ def _pieces(load: History | None, time: Array, fastest: float) -> Pieces:
         edges_before = np.append(0, np.cumsum(divisions))
         times = np.interp(np.arange(divisions.sum() + 1), edges_before, times)
     d = np.diff(times)
+    # the load without its sine, at both ends of each segment: after a jump, and before one (−1)
     after = load.envelope(times)[:-1]
     before = load.envelope(times, -1.0)[1:]
     # f = g sin(Ω t + φ) with linear g differs from its chord by d²/8 max|f″|, and

@@ -318,10 +318,10 @@ def _respond_at_nodes(
         factors = _propagators(sigma[s], load.offsets)
         for node in range(0, max(len(load.interval) - 1, 1), length):
             # the node at which a window begins belongs to the one before, except at t = 0
-            start = (0, -1)
+            start = (0, -1)  # the integral begins at the beginning of interval 0
             first = 0
             if node > 0:
-                start = (load.interval[node], load.offset[node])
+                start = (load.interval[node], load.offset[node])  # it begins at this node
                 first = node + 1
             inside = slice(first, node + length + 1)
             nodes = load.interval[inside], load.offset[inside], load.time_rounding[inside]
@@ -336,7 +336,7 @@ def _respond_at_given(
 ) -> None:
     """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, rows of exponents at one node each.
 
-    The integrals begin at t = 0.
+    The integrals begin at t = 0, the beginning of interval 0, which the start (0, −1) stands for.
 
     Args:
         sigma: Exponents, shape (N, S).
@@ -541,7 +541,7 @@ def error_of_integrals(sigma: complex, h: float) -> float:
     size = abs(sigma) * h
     growth = sigma.real * h
     factor = 1.0
-    if size >= FROM_RECURRENCE:
+    if size >= FROM_RECURRENCE:  # below, `step_integrals` takes the power series
         # rounding of exp(z), whose phase is rounded by u |z|, and of sums, both divided by |z|
         factor = min(1.0, np.exp(min(growth, 0.0)) / 4 + 4 / size)
     return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * factor * np.exp(max(growth, 0.0))

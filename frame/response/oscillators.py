@@ -87,7 +87,8 @@ def grid_over(
     Args:
         omega: Lower and upper end of ω, in rad/s, positive.
         quotient: Lower and upper end of q.
-        points: Numbers of points along ω and along q, 2 or more each; one point is the lower end.
+        points: Numbers of points along ω and along q; 2 or more each cover the ranges, 1 gives the
+            lower end alone.
     """
     lowest_omega, highest_omega = omega
     if highest_omega <= lowest_omega * (1 + 1e-12):
@@ -308,8 +309,8 @@ def read_response(source: str, sigma: Array, G: Array) -> Array:
 
     Args:
         source: One of these names.
-        sigma: σ = −g + iω of S oscillators, shape (S,), ω > 0.
-        G: Complex, shape (..., S).
+        sigma: σ = −g + iω of the oscillators, ω > 0, of any shape S.
+        G: Complex, shape (…, *S).
 
     Returns:
         Real numbers of the shape of G.
@@ -483,7 +484,8 @@ def _tables_of_piece(
     """
     # A response changes over a distance in σ of about the decay or the inverse duration. Points
     # are .4 of it apart; tighter ones cost memory, wider ones are no better than the integral.
-    # More than 240 points along ω cost more than the tighter bound is worth.
+    # More than 240 points along ω, or 8 along q, cost more than the tighter bound is worth. All
+    # three numbers are tuned.
     slowest, fastest = omega
     decay = quotient[0] * slowest
     distance = 0.4 * (decay + 2 / max(float(time[-1]), 1e-300))
@@ -506,7 +508,8 @@ def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array
         error: Bound of the distance from that, shape (T,).
         factor: Positive factors, shape (Q, W), monotonic along Q and rising along W.
     """
-    # over strips between neighbouring ω, each over all Q: a bilinear function is largest at corners
+    # A bilinear function is largest at corners, so strips between neighbouring ω, each over all Q,
+    # are bounded by their edges; `low` and `high` become (T, W − 1).
     low = value.min(1) - error[:, None]
     high = value.max(1) + error[:, None]
     low = np.minimum(low[:, 1:], low[:, :-1])

@@ -60,7 +60,7 @@ class LoadHistory(NamedTuple):
         They are g sin θ, g cos θ, r sin θ and r cos θ: g rises by r within a substep, and θ = Ω (t
         − start) + phase is the angle of the sine, 90° where there is no sine. Time begins at the
         first sample. After the last sample g and r are zero, or g stays and r is zero if the last
-        sample is held.
+        sample is held. A history without samples, which cannot be held, gives zeros.
 
         Args:
             substeps: Number of equal substeps between two samples.
@@ -178,7 +178,7 @@ class _ScaledSystem:
         n = len(lower)
 
         def reduced(matrix: Array) -> Array:
-            """Return L⁻¹ A L⁻ᵀ."""
+            """Return L⁻¹ X L⁻ᵀ of a matrix X, shape (n, n)."""
             left = solve_triangular(lower, matrix, lower=True)
             return np.asarray(solve_triangular(lower, left.T, lower=True).T)
 

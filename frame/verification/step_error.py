@@ -38,8 +38,8 @@ def step_error(flow: UnitFlow) -> Array:
             outputs.
 
     Raises:
-        StepError: The error of an output exceeds ten times its peak, so that the scheme has left
-            the trajectory; or a step did not converge.
+        StepError: The error of an output exceeds ten times its peak, if this is not 0, so that the
+            scheme has left the trajectory; or a step did not converge.
         RefusedError: A trajectory does not exist, or is not finite.
     """
     if flow.flow.exact:
