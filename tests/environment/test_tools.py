@@ -56,6 +56,18 @@ def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
         read_grid(tmp_path / "a.tif", (1, 1))
 
 
+def test_a_bmp_whose_resolution_is_zero_has_square_pixels(tmp_path):
+    """Many programs leave the pixels per metre, bytes 38 to 45 of the file, at 0."""
+    from PIL import Image
+
+    values = np.arange(64, dtype=np.uint8).reshape(8, 8)
+    Image.fromarray(values).save(tmp_path / "a.bmp")
+    content = bytearray((tmp_path / "a.bmp").read_bytes())
+    content[38:46] = bytes(8)
+    (tmp_path / "a.bmp").write_bytes(content)
+    assert np.array_equal(read_grid(tmp_path / "a.bmp", (1, 1)), values[::-1])
+
+
 @pytest.mark.parametrize("kind", [np.uint32, np.int8])
 def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
     from PIL import Image
