@@ -112,13 +112,16 @@ class VoigtPhase:
                 than 1e-9 of the largest entry, or have an eigenvalue that is not positive; or the
                 loss factor is negative or not finite.
         """
-        matrix = np.asarray(self.rows, float)
+        allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
+        try:
+            matrix = np.asarray(self.rows, float)
+        except (ValueError, TypeError):  # of rows that differ in length, texts, complex numbers
+            raise RefusedError("stiffness of the phase", repr(self.rows), allowed) from None
         is_symmetric = matrix.shape == (3, 3) and np.isfinite(matrix).all()
         if is_symmetric:
             # Round-off of a matrix that was turned or inverted is far below 1e-9.
             is_symmetric = abs(matrix - matrix.T).max() <= 1e-9 * abs(matrix).max()
         if not is_symmetric or np.linalg.eigvalsh(matrix)[0] <= 0:
-            allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
             raise RefusedError("stiffness of the phase", matrix.tolist(), allowed)
         require_loss(self.loss)
         # The dataclass is frozen, so that it can be the key of a cache; tuples can be hashed.
@@ -272,7 +275,7 @@ def require_solve_arguments(
     if is_map and has_phases:
         return
     given = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
-    if inclusions in ([], ()):
+    if isinstance(inclusions, Sequence) and len(inclusions) == 0:
         given += " (empty)"
     raise RefusedError(
         "parts of the cell",

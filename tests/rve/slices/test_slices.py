@@ -168,6 +168,19 @@ def test_the_series_refuses_what_it_has_no_formula_for():
         VoigtPhase(((1.0, 2.0, 0.0), (2.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
+@pytest.mark.parametrize("rows", [[[1.0, 2.0], [2.0]], [["a"] * 3] * 3, [[1j] * 3] * 3])
+def test_a_stiffness_that_is_no_matrix_of_numbers_is_refused(rows):
+    with pytest.raises(RefusedError, match="symmetric positive definite"):
+        VoigtPhase(rows)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_phases_in_an_array_are_refused_by_the_name_of_their_type(count):
+    inclusions = np.array([MATRIX] * count, object)
+    with pytest.raises(RefusedError, match="HermiteMap, Phase, ndarray; allowed"):
+        SeriesModel().solve(HermiteMap(0.2, 0, 0.5, 0), MATRIX, inclusions)
+
+
 def estimated_and_true(points, *, seed, decades):
     """Of the rule in θ, for random maps and materials; the estimate needs no more than the
     stresses, so the series stands in for slices.
