@@ -390,8 +390,8 @@ class FuzzyCell:
             order, by `inputs` or else as the phase states, and empty if all are 0.
 
         Raises:
-            RefusedError: An input is no parameter of the radius or of a phase, or there are not two
-                phases without names.
+            RefusedError: An input is no parameter of the radius or of a phase, a loss factor may be
+                negative, or there are not two phases without names.
         """
         named = _named(phases)
         parameters = _parameters(radius, named)
@@ -399,6 +399,9 @@ class FuzzyCell:
         for name, number in inputs.items():
             require_choice("input", name, parameters)
             numbers[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+            low = numbers[name].support.lower
+            is_allowed = low >= 0 or not name.endswith("_loss")
+            require(is_allowed, name, value=f"from {low:g}", allowed="loss factors of 0 or more")
 
         # Loss factors are no coordinates of the samples: the stiffness does not depend on them, and
         # those of the cell are linear in them. A campaign needs one input at least.

@@ -135,7 +135,8 @@ class ImagePhase:
                 fuzzy number.
 
         Raises:
-            RefusedError: The mapping has another key, or lacks modulus or poisson.
+            RefusedError: The mapping has another key, or lacks modulus or poisson, or the loss
+                factor may be negative. The other values are checked when the image is solved.
         """
         numbers = {}
         for name, value in values.items():
@@ -143,6 +144,9 @@ class ImagePhase:
             numbers[name] = _as_fuzzy(value)
         for name in ("modulus", "poisson"):
             require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
+        if "loss" in numbers:
+            low = numbers["loss"].support.lower
+            require(low >= 0, "loss of a phase", f"from {low:g}", "loss factors of 0 or more")
         return cls(**numbers)
 
     @property

@@ -83,6 +83,12 @@ def test_an_input_that_is_no_parameter_is_refused(phases, name):
         fuzzy_stiffness(SeriesModel(), RADIUS, phases, {name: Interval(1, 2)}, progress=False)
 
 
+@pytest.mark.parametrize("loss", [-0.1, Triangular(-0.01, 0.0, 0.05)])
+def test_a_loss_factor_that_may_be_negative_is_refused(loss):
+    with pytest.raises(RefusedError, match=r"matrix_loss is from -0.*0 or more"):
+        fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, {"matrix_loss": loss}, progress=False)
+
+
 @dataclass(frozen=True)
 class MixtureModel(SeriesModel):
     """A model that is only for this test: the series by another name, with half its modulus."""

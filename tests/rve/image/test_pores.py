@@ -203,3 +203,10 @@ def test_an_image_that_may_be_void_throughout_is_refused():
     phase = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
     with pytest.raises(RefusedError, match="modulus of the phases is 0"):
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
+
+
+def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
+    phase = {"modulus": 1e9, "poisson": 0.3, "loss": Triangular(-0.01, 0.0, 0.05)}
+    with pytest.raises(RefusedError, match=r"loss of a phase is from -0\.01"):
+        fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
