@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 from os import PathLike
@@ -110,8 +110,8 @@ class RefusedError(ValueError):
         def sentence(value_text: str, allowed_text: str) -> str:
             """Return "PLACE: KEY is VALUE; allowed: ALLOWED", with key and place of this error.
 
-            "KEY is missing" stands there if the value of this error is None. An empty place, and
-            empty allowed values, are left out.
+            "KEY is missing" stands there if the value of this error is None, and "KEY is empty" if
+            its text is. An empty place, and empty allowed values, are left out.
             """
             text = f"{key} is {value_text or 'empty'}"
             if value is None:
@@ -256,7 +256,9 @@ def require_numbers(name: str, values: object) -> None:
     It may be empty, and an array of any shape; a list in a list is refused, and so are texts, truth
     values and complex numbers. `name` stands in the message.
     """
-    is_list = isinstance(values, Collection) and not isinstance(values, str)
+    # Sets have no order, and of a dictionary the keys would be taken, of bytes the codes.
+    no_lists = (str, bytes, Mapping, Set)
+    is_list = isinstance(values, Collection) and not isinstance(values, no_lists)
     require(is_list, name, value=repr(values), allowed="a list of numbers")
     if isinstance(values, np.ndarray):
         # An array is checked without a loop over its entries, of which matrices have many. The loop

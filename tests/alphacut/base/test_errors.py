@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
+from alphacut.base.errors import require_numbers
 from alphacut.fuzzy import (
     Crisp,
     FailedError,
@@ -116,3 +117,14 @@ def test_errors_pass_between_processes():
         copy = pickle.loads(pickle.dumps(error))
         assert type(copy) is type(error)
         assert str(copy) == str(error)
+
+
+@pytest.mark.parametrize("values", [{1.0, 2.0}, {1.0: 2.0}, b"ab", "12", [1.0, np.nan], 1.0, None])
+def test_what_is_no_list_of_finite_numbers_is_refused(values):
+    with pytest.raises(RefusedError):
+        require_numbers("alpha", values)
+
+
+@pytest.mark.parametrize("values", [[], (0, 1.5), np.ones((2, 3)), {"a": 1.0}.values()])
+def test_lists_of_finite_numbers_pass(values):
+    require_numbers("alpha", values)
