@@ -46,7 +46,8 @@ def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
     if value == 0 or not math.isfinite(value):
         return value
     is_upward = (side == "upper") != (nature is Nature.ATTAINED)
-    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
+    exponent = digits - 1 - math.floor(math.log10(abs(value)))
+    scale = 10.0 ** min(exponent, 308)  # the largest power of ten; tinier values get fewer digits
     # Without this 0.1 · 3, which is 0.30000000000000004 in floats, would be rounded up to 0.3001.
     round_off = 1e-10 * abs(value) * scale
     if is_upward:
