@@ -172,9 +172,14 @@ def parse_limit(value: object) -> CaseLimit:
     with its unit. Of drifts, residual drifts and the base shear it may be a fraction, "1/200" or
     "0.5 %", which then refers to the height of the storey or to the weight.
 
+    Returns:
+        CaseLimit: Its value is in the SI unit of the output; a fraction if it refers to a height or
+        the weight; and in SI of whatever unit was written if the name of the output tells none.
+
     Raises:
-        RefusedError: The text is another one, the sign does not fit the side, the unit is not that
-            of the output, or a limit of a magnitude is not positive.
+        RefusedError: The text is another one, the sign does not fit the side, VALUE is several
+            values or an interval, its unit is not the one that the name of the output tells, or a
+            limit of a magnitude is not positive.
     """
     match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift <= 1/200', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
@@ -195,6 +200,8 @@ def parse_limit(value: object) -> CaseLimit:
             # Only a structure from matrices knows the unit of such an output: any unit is taken
             # here, and `CaseLimit.value_in_si` reads the text again.
             fuzzy, _ = quantity.parse_fuzzy_in_any_unit(text)
+            if fuzzy.support.width > 0:
+                raise ValueError("several values stand where one is needed")
             number = float(fuzzy.nominal)
         else:
             number = quantity.parse_number(text, unit)

@@ -77,6 +77,7 @@ def test_limits_of_every_storey_are_of_least_heights_and_weights(tmp_path):
 
 WRONG = ["q1", "q1 <= ", "q1 <= -1 m", "q1 <= 3 N", "q 1 <= 3 m", 7]
 WRONG += ["max q3 >= 2 mm", "min q3 <= 2 mm", "q3 >= 2 mm", "q3 <= 1/200", "drift <= 1/0"]
+WRONG += ["r1 <= [1, 2] m", "r1 <= 5 m ± 1 m"]
 
 
 @pytest.mark.parametrize("text", WRONG)
