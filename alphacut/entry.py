@@ -102,7 +102,7 @@ def main(
     Every error becomes one line on standard error: status 2 for bad input, 3 for failed samples of
     a campaign, 128 and the signal's number for an interruption, 1 for any other failure, and 0 for
     success or a reader of the output that has gone. An error of the program itself shows its
-    traceback.
+    traceback. The options --help and --version end the process by SystemExit.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
@@ -217,8 +217,12 @@ def show_log(is_on: bool) -> Iterator[None]:
 def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
     """Read a command line and run its command; return the exit status.
 
+    Python's warnings become lines "warning: …" on standard error while the command runs.
+
     Args:
-        arguments: The command line after the program's name.
+        arguments: The command line after the program's name. Options of the solver library PETSc,
+            which begin with -rve_, may stand anywhere; commands on a case get them as
+            `options.petsc`, and for other commands they are refused.
         program: The program's name, for messages.
         names: File in `alphacut.commands` of each command, by the command's name.
 

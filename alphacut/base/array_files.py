@@ -89,8 +89,9 @@ def read_npy(path: Path, *, kinds: str = "buif") -> Numbers:
             for floats, c for complex numbers, S and U for texts.
 
     Returns:
-        An array that cannot be written to. It reads the file as long as it exists, so the file must
-        not change meanwhile. An array without entries is no map.
+        An array that cannot be written to, of the shape and type in the head of the file. It reads
+        the file as long as it exists, so the file must not change meanwhile. An array without
+        entries is no map.
 
     Raises:
         RefusedError: The file is cut off, damaged, or holds numbers of other kinds or other things.

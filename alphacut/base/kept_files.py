@@ -67,12 +67,15 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
 
     The temporary file stands beside `path`, with the same suffix, and is empty at first. Folders on
     the way are made. If the block raises an exception, the temporary file is removed and `path`
-    stays as it was. If `path` leads to a device or a pipe, the content is written into it instead.
+    stays as it was.
+
+    If `path` leads to a device or a pipe and `follow_links` is true, nothing is replaced: the block
+    must create the temporary file itself, and its content is then written into the device.
 
     Args:
         path: The file, which need not exist.
-        follow_links: Whether a link stays and its target is replaced; otherwise the link itself is
-            replaced, also one to a device.
+        follow_links: Whether a link stays and its target is replaced; otherwise whatever has the
+            name is replaced itself, also a link to a device.
 
     Raises:
         FailedError: An OSError or RuntimeError occurred in the block or here, and less than 1 MiB

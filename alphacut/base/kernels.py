@@ -221,7 +221,8 @@ def digest(module: str) -> str:
     contains the kernels that it calls and the constants that it reads, which may stand in other
     modules. So the digest of a module that has kernels covers those of all modules of this project
     that it imports, too. A module has kernels if it has been imported and has decorated a function
-    (`with_kernels`). The result is kept for the process.
+    (`with_kernels`). Modules with kernels must not import each other in a circle. The result is
+    kept for the process.
 
     Args:
         module: Full name of a module of this project, such as alphacut.frame.response.duhamel.

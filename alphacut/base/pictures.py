@@ -34,6 +34,8 @@ MAX_PIXELS = 6e7
 def opened_picture(path: Path) -> Iterator[Image]:
     """Yield a picture of Pillow whose pixels are not read yet, and close it afterwards.
 
+    Pillow's own limit of the number of pixels is switched off for the whole process.
+
     Args:
         path: A file in the format BMP, GIF, JPEG, JPEG 2000, PNG, PPM, TIFF or WebP.
 

@@ -92,9 +92,9 @@ class CellContent(Section, defer_build=True):
 
         Returns:
             The section on the random variable θ, and the section [cell]. A cell whose mesh comes
-            from a file needs the distribution of θ alone: [radius], or θ between -3 and 3 without
-            one. A cell with one particle comes with the map from θ to its radius: [radius], else
-            the map of the constant fraction `cell.fraction`.
+            from a file needs the distribution of θ alone: [radius], or without one a standard
+            normal variable cut off at -3 and 3. A cell with one particle comes with the map from θ
+            to its radius: [radius], else the map of the constant fraction `cell.fraction`.
 
         Raises:
             RefusedError: The cell is an image or missing, or a particle has neither [radius] nor a
@@ -125,7 +125,8 @@ class CellContent(Section, defer_build=True):
         Without `mesh.file` the program makes the mesh: then [cell.phases] and `mesh.refine` have no
         meaning, and [radius] must be a whole radius map, with the keys a1 … a4. With `mesh.file`
         the geometry comes from the file: [cell.phases] must give a phase for each physical group,
-        element sizes and radius maps are refused, and [radius] may only have the distribution of θ.
+        element sizes and radius maps are refused, [radius] may only have the distribution of θ, and
+        `modulus.tolerance` needs `mesh.refine`.
 
         Raises:
             RefusedError: With the key that does not fit.

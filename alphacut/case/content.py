@@ -331,6 +331,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
     Raises:
         BadInput: With every problem of the case at once, as one line each.
-        RefusedError: A change is no "KEY=VALUE", or its key is unknown or given twice.
+        RefusedError: The file cannot be read; or a change is no "KEY=VALUE", or its key is unknown
+            or given twice.
     """
     return parse(with_structures(Content, built=True), path, changes)

@@ -147,8 +147,10 @@ def with_forces(
     """Return the structure with the forces of a case, whose amplitudes become its parameters.
 
     Args:
-        structure: The structure without them.
-        sections: The forces by their time histories.
+        structure: The structure without them. It is not changed, and returned itself if there are
+            no sections.
+        sections: Each has one time history and the amplitudes that act by it, each a fuzzy number
+            with its SI unit, by the degree of freedom.
         places: Names of the degrees of freedom in their order; none if it takes no forces.
 
     Raises:

@@ -46,7 +46,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
 
     Raises:
         RefusedError: The value is no such pair, the factor is no product of powers, the file is
-            missing or holds no matrix of this shape, or all entries are zero.
+            missing or holds no matrix of this shape, or the matrix is not symmetric or zero.
     """
     match value:
         case [str(factor), str(file)]:

@@ -70,7 +70,7 @@ class PackingSection(Section):
         allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
         cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
         require(fits, key, self.fraction, allowed, cure)
-        _ = self.radii
+        _ = self.radii  # reads the file, or builds the distribution between the two limits
 
     def pack(
         self, *, spheres: bool, seed: int, workers: int = 1, progress: Progress | None = None
@@ -158,6 +158,8 @@ class MicrostructureSection(Section):
     def particles(self, *, spheres: bool, workers: int, progress: Progress) -> Sequence[Particles]:
         """Return the packings, or the one section of a material whose circles were measured.
 
+        Measured circles come from a file, or are found in an image.
+
         Args:
             spheres: Whether packed particles are spheres instead of discs. Measured ones are discs.
             workers: Number of processes that pack.
@@ -169,7 +171,7 @@ class MicrostructureSection(Section):
         """
         if self.packing is None:
             measured = self.measured
-            assert measured is not None  # one of the three is there
+            assert measured is not None  # a section without packing has circles or an image
             return [measured]
         return self.packing.pack(
             spheres=spheres, seed=self.seed, workers=workers, progress=progress

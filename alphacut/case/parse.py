@@ -46,9 +46,14 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
         path: The file. Files that the case names are looked for in its folder.
         changes: Texts "KEY=VALUE" that replace keys of the file.
 
+    Returns:
+        The path, the text of the file, the validated content, and the changes as they were given.
+
     Raises:
-        BadInput: With every problem of the case at once.
-        RefusedError: A change is no "KEY=VALUE", or its key is unknown or given twice.
+        BadInput: The file is not TOML; or, with every problem at once, keys are missing, unknown or
+            have wrong values.
+        RefusedError: The file cannot be read; or a change is no "KEY=VALUE", or its key is unknown
+            or given twice.
     """
     path = Path(path)
     text = text_of(path)

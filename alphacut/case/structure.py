@@ -64,9 +64,10 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
     """Return the damping ratios over the critical one that a value of a case states.
 
     Args:
-        value: A ratio of all modes, such as "2 %"; a list with a text for each mode from the
-            slowest on; or "material", to take the ratios from the loss factor of the material, or
-            "material + 1 %" with the ratio of the joints added.
+        value: A ratio of all modes, such as "2 %", or as a list of numbers alone, a fuzzy one; a
+            list with a text for each mode from the slowest on; or "material", to take the ratios
+            from the loss factor of the material, or "material + 1 %" with the ratio of the joints
+            added.
 
     Returns:
         MaterialDamping for "material"; else one fuzzy ratio, or one for each mode.
@@ -239,13 +240,13 @@ class StructureSection(Section):
 
         Args:
             modulus: Young's modulus in Pa; the section's own, or a stand-in, if not given.
-            loss: Loss factor of the material; a stand-in if not given. A structure that takes none
-                of both ignores them.
+            loss: Loss factor of the material; a stand-in if not given. A structure that takes
+                neither of them ignores both.
 
         Raises:
             RefusedError: The values of the section make no structure.
         """
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of structure has its own
 
     @cached_property
     def nominal(self) -> Structure:
