@@ -11,7 +11,7 @@ from typing import cast
 
 import numpy as np
 
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, require
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.prism.cell_fields import CellFields
 from alphacut.rve.prism.fields import fields_of_solution
@@ -40,6 +40,7 @@ class ProductSpace:
 
     Raises:
         FoldedMeshError: The map bends more than the layers can follow.
+        RefusedError: The mesh of the model does not follow the particles, as that of a level set.
 
     Example:
         >>> from alphacut.stochastic import HermiteMap
@@ -49,8 +50,8 @@ class ProductSpace:
     """
 
     def __init__(self, model: PrismModel | MeshModel, law: RadiusMap | ThetaDistribution) -> None:
-        self._petsc = model.petsc
         self._problem = _separate_problem(model, law)
+        self._petsc = model.petsc
         self.space: fem.FunctionSpace = self._problem.space
         self.dx: dict[str, ufl.Measure] = self._problem.dx
         self.density: fem.Function = self._problem.density
@@ -199,8 +200,17 @@ def _separate_problem(
         FoldedMeshError: The map bends more than the layers can follow.
         MeshError: The file holds no mesh of a cell.
         RefusedError: `law` is not of the kind that the model takes, does not fit the mesh, or has a
-            density that is zero at a quadrature point.
+            density that is zero at a quadrature point; or the mesh of the model does not follow the
+            particles, as that of a level set.
     """
+    # Phases of a level set are those of points, while measures are those of whole prisms.
+    require(
+        isinstance(model, PrismModel | MeshModel),
+        "model",
+        type(model).__name__,
+        "a PrismModel, or a MeshModel",
+        "give the particle as an outline, or mesh the particles",
+    )
     if isinstance(model, MeshModel):
         cached = model.cached_problem()
         radius_map: RadiusMap = mesh_law(cached.grid, law)

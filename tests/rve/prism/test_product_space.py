@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.base.errors import RefusedError
-from alphacut.rve import LOADS, MeshModel, Phase, PrismModel, ProductSpace
+from alphacut.rve import LOADS, LevelSetModel, MeshModel, Phase, PrismModel, ProductSpace
 from alphacut.rve.fenicsx import PETSc, fem, ufl
 from alphacut.rve.solver.krylov import solve
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -99,6 +99,12 @@ def test_a_form_on_another_space_or_mesh_is_refused(cell):
         cell.assemble_vector(other.density * ufl.TestFunction(other.space)[0] * other.dx["matrix"])
     with pytest.raises(RefusedError, match="another space or mesh"):
         cell.mean(other.density * other.dx["matrix"])
+
+
+def test_a_model_whose_mesh_does_not_follow_particles_is_refused():
+    level_set = LevelSetModel(lambda x, y, t: np.hypot(x, y) - 0.5, 0.7, 2)
+    with pytest.raises(RefusedError, match="model is LevelSetModel; allowed: a PrismModel, or"):
+        ProductSpace(level_set, TruncatedNormal())
 
 
 def test_an_operator_without_symmetry_is_refused_and_not_solved_wrongly(cell, elastic):
