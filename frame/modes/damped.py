@@ -154,7 +154,7 @@ class DampedModes:
         # Near a pole (λ² M + λ D + K)⁻¹ is φ φᵀ / (φᵀ (2 λ M + D) φ (λ − λ_k)).
         weighted = (eigenvalue * 2.0)[:, None] * (shape @ structure.mass)
         weighted = weighted + shape @ structure.damping
-        norm = (weighted * shape) @ np.ones((len(structure.omega), 1))
+        norm = (weighted * shape) @ np.ones((len(structure.omega), 1))  # φᵀ (2 λ M + D) φ, (n, 1)
         of_sources = (force * _reciprocal(norm)).T[..., None]
         shape = (of_sources * shape).polynomial
         return cls(eigenvalue, shape, (eigenvalue[:, None] * shape).polynomial)
@@ -199,7 +199,9 @@ def needed_modes(
     energy = np.hypot(norm_of(shape * structure.omega), np.abs(rate) * norm_of(shape))
     r, s = np.split(structure.output_rows.value, 2, axis=1)
     output_norms = np.hypot(norm_of(r / structure.omega), norm_of(s))
-    output_norms = output_norms / np.maximum(tolerance, 1e-300)
+    # 1e-200 stands for 0, without an overflow by the products below
+    output_norms = output_norms / np.maximum(tolerance, 1e-200)
+    # by each mode with its conjugate, the error over the tolerance of the most affected output
     size = 2 * energy * amplitude.sum(axis=1) * output_norms.max()
 
     # The smallest ones are omitted as long as their sum stays below the tolerance.
@@ -302,9 +304,10 @@ def _eigen_series(structure: DampedStructure, chosen: Ints) -> tuple[TaylorModel
         known += product_part(eigenvalues, momenta, m, d, np.multiply, lowest=(1, 1))
         of_damping = product_part(velocities, D.parts, m, d, matmul)
         known += of_damping + product_part(shapes, K.parts, m, d, matmul)
+        # What couples modes of one eigenvalue would be divided by their difference, which is 0.
         for k, x in enumerate(bordered):
             _require_uncoupled(known[:, k] @ x.couplings.T, rate[k])
-        found = np.einsum("kij,mkj->mki", inverses, -known)
+        found = np.einsum("kij,mkj->mki", inverses, -known)  # φ_m, then λ_m, (monomials, n, N + 1)
         shapes.append(found[..., :N])
         eigenvalues.append(found[..., N:])
         added = rate[:, np.newaxis] * shapes[m] + eigenvalues[m] * shape

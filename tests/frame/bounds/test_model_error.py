@@ -35,9 +35,25 @@ CHAIN = MatrixStructure(
 NARROW = {"E": Interval(24.9e9, 25.1e9)}
 
 
+APART = MatrixStructure(
+    {"k": 1.0},
+    mass=[(1.0, np.eye(2))],
+    stiffness=[("k", np.diag([1.0, 4.0]))],
+    observed={"force": np.array([1e12, 0.0])},
+    damping=[(0.01, np.eye(2))],
+    q0=np.array([0.1, 0.0]),
+)
+
+
 def model(system, inputs, degree=4, **changes) -> ModalModel:
     flow = LinearFlow(system, tuple(inputs), 10.0, 0.1, Exact())
     return ModalModel.of_degree(replace(flow, **changes), boxes(inputs, (0,)), degree)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_mode_that_adds_nothing_is_left_out_without_a_tolerance():
+    """The second unknown is at rest; the output is so large that its modes over 0 overflow."""
+    assert model(APART, {"k": Interval(0.99, 1.01)}).count == 1
 
 
 @pytest.mark.parametrize(
