@@ -240,6 +240,7 @@ class Box:
         error = np.zeros((len(self.time), len(numbers)))
         coefficients = modes.output_coefficients(np.zeros_like(numbers), numbers).value
         for k, sigma in enumerate(modes.sigma[0]):
+            # a grid of one point: this mode alone
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
             oscillator = Oscillators(grid, self.loads, self.time, set(orders))
             for source, participation in modes.participation.items():

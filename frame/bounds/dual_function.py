@@ -207,11 +207,13 @@ def dual_value(
             K modes over which the maximum is taken, shape (K, 4).
         node: Index of the time node.
         side: −1 or 1.
-        data: `table`, responses of each mode to unit sources at the points of its table, at which
-            `omega` and `decay` are scaled ω and g; `participation` ± `participation_radius`, ranges
-            of the participation factors; `linear` and packed `quadratic` coefficients of z(u), and
-            `remainder` R; `truncated_response`, `truncated_linear` and `truncated_quadratic`, terms
-            of truncated modes. All of them, and |μ|, are at most `LARGEST` = 1e100.
+        data: `table`, responses of each mode to unit sources at the points of its table, shape (K,
+            S, T, points), where `omega` and `decay` (K, points) are scaled ω and g; `participation`
+            ± `participation_radius` (K, S), ranges of the participation factors; `linear` (Z, L)
+            and packed `quadratic` (Z, L (L + 1)/2) coefficients of z(u), and `remainder` R (Z,);
+            and of terms of truncated modes `truncated_response` (terms, T), by which
+            `truncated_linear` and `truncated_quadratic`, coefficients in the same order, are
+            multiplied. All numbers, and |μ|, are at most `LARGEST` = 1e100.
         gradient: Overwritten with a subgradient of D, shape (Z,).
         u: Overwritten with inputs near the second maximum, shape (L,).
     """

@@ -439,7 +439,9 @@ def improve_all(
     Args:
         jobs: The jobs; two of the same bounds must have different nodes.
         pool: Runs the tasks.
-        tick: Called after each task with the completed fraction, up to 1; never without tasks.
+        tick: Called after each task with the completed fraction, up to 1; never without tasks. An
+            exception of a task, or of `tick`, leaves this function; tasks already given to the pool
+            are not cancelled.
         peaks_alone: Whether only the highest bound of each job is to fall: nodes are improved from
             the highest bound down until none is above those that are done.
     """

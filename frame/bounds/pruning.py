@@ -116,7 +116,7 @@ def _bounds_over_piece(
 class RemainderAddition(NamedTuple):
     """What the remainders of Taylor models add to a bound."""
 
-    least: float  # lower estimate of the addition, in the unit of the output
+    total: float  # lower estimate of the addition, in the unit of the output
     input_fractions: Array  # fraction of it that each input accounts for, (d,)
 
 
@@ -135,9 +135,9 @@ def remainder_addition(bounds: OutputBounds, node: int) -> RemainderAddition:
         node: Index of the time node.
 
     Returns:
-        `least`, the estimated addition in the unit of the output, including the constants of the
-        bound; and `input_fractions`, the fraction that each input accounts for, shape (d,), which
-        add up to 1, or are 0 if nothing is added.
+        `total`, a lower estimate of the addition in the unit of the output, with the constants of
+        the bound; and `input_fractions`, the fraction that each input accounts for, shape (d,),
+        which add up to 1, or are 0 if nothing is added.
     """
     data = bounds.data
     d = data.linear.shape[1]
@@ -154,6 +154,6 @@ def remainder_addition(bounds: OutputBounds, node: int) -> RemainderAddition:
     by_variable = np.abs(slope) * data.remainder
     by_input = (by_variable / np.maximum(weights.sum(axis=1), 1e-300)) @ weights
     return RemainderAddition(
-        least=float(bounds.constant[1, node] + by_variable.sum()),
+        total=float(bounds.constant[1, node] + by_variable.sum()),
         input_fractions=np.asarray(by_input / max(float(by_input.sum()), 1e-300)),
     )

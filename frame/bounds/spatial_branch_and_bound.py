@@ -93,6 +93,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         UnprovedError: The system is not linear, its integrator is not the exact one, or bounds are
             not proved.
         FailedError: The proof contradicts a trajectory, and is wrong.
+        RefusedError: A trajectory does not exist, or is not finite.
     """
     queue = Queue(proof, flow)
     queue.run(progress)

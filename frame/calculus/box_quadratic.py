@@ -46,7 +46,8 @@ def local_maximum(
         H: Symmetric Hessians, shape (N, d, d).
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends of the boxes, shape (N, d).
-        start: Where the ascents begin, inside the boxes, shape (N, d); x = 0 if None.
+        start: Where the ascents begin, inside the boxes, shape (N, d), not changed; x = 0 if None,
+            which must lie in the boxes, too.
         rounds: Largest number of rounds. An ascent ends earlier where a round gains at most 1e-10
             of the value, or 1e-16.
 

@@ -391,8 +391,8 @@ class DualProof:
             highest = int(problem.model_value.argmax())
             addition = remainder_addition(problem, highest)
             fractions[box.active] = addition.input_fractions
-            if addition.least > numbers.WIDE * peak[o] and halvings(fractions, self.parts) >= 1:
-                what = f"the remainders of the modes are {addition.least / peak[o]:.2g} of a peak"
+            if addition.total > numbers.WIDE * peak[o] and halvings(fractions, self.parts) >= 1:
+                what = f"the remainders of the modes are {addition.total / peak[o]:.2g} of a peak"
                 raise UnprovedError(what, "take narrower inputs", int(fractions.argmax()))
 
 
