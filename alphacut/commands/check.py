@@ -122,6 +122,9 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
 def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -> Iterator[str]:
     """Yield a sentence for each quantity and limit whose size suggests a wrong unit.
 
+    The structure adds its own sentences: quantities that do not fit each other, and, if it is
+    known, weights that should not be left out (P-Delta).
+
     Args:
         content: The case.
         rows: Key, value and kind of each quantity in it, as `rows_of` gives them.
@@ -178,6 +181,7 @@ def motion_text(content: Content, structure: Structure) -> str:
 
     Raises:
         RefusedError: The records of a suite do not fit the structure.
+        FailedError: The response that the time step is judged by could not be computed.
     """
     section = content.envelope
     linear = structure.linear
@@ -196,7 +200,7 @@ def motion_text(content: Content, structure: Structure) -> str:
             )
             text += " s: are its times in another unit than s?\n"
     if (record := linear.ground) is not None:
-        peak = record.extremes[0]
+        peak = record.extremes[0]  # the largest magnitude; the other entry is that of its slope
         sizes = f"peak {engineering(peak, 'm/s^2')}, {peak / STANDARD_GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, {sizes}\n"
         text += "".join(f"{warning}\n" for warning in cut_record_warnings(content, structure))
@@ -321,7 +325,7 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
 
 
 def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
-    """Yield a sentence for each output whose peak may rise much between time nodes.
+    """Yield a sentence for each output whose peak may rise by over 1 % between time nodes.
 
     The peak, and what responses add to it between nodes, are those of the most plausible structure.
     Where columns yield, all peaks but those of accelerations are found between nodes as well; these
@@ -346,7 +350,8 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
     between = node_deviation(flow, nominal).T
     # At rest rounding alone moves a structure, and its peak is no measure of what is between nodes.
-    # `reach` is the size of each output that the energy of the response allows, shape (outputs,).
+    # `reach` is the size of each output that the energy of the response allows, shape (outputs,);
+    # a billionth of it, AT_REST, is far above rounding and below any peak of interest.
     peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
     # Before a late force sets in, nothing moves and the energy is zero: nothing is widened then.
     farthest = within_steps(at_nodes, between).max(axis=1)
@@ -593,9 +598,10 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
 
     Args:
         data: Dataset of an envelope file, in SI units, with the axes alpha, time, output and
-            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2). "proved_lower"
-            and "proved_upper", guaranteed bounds beside wider ones, "inner_lower" and
-            "inner_upper", attained ones, and the errors need not be there.
+            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2), "label" the
+            name of each output with its unit in brackets, and the attributes are "nature" and
+            "method". "proved_lower" and "proved_upper", guaranteed bounds beside wider ones,
+            "inner_lower" and "inner_upper", attained ones, and the errors need not be there.
 
     Returns:
         The envelope. Its fuzzy inputs are only known as intervals: their cuts on the lowest level.

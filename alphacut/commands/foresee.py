@@ -286,6 +286,7 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
     average = section.average
 
     def run(fraction: float) -> float:
+        """Solve about a fraction of the image, keep the result in `solved`; return the fraction."""
         part = cropped(study, fraction)
         found = solve_study(part, alpha=alpha, average=average, device="cpu", tick=no_progress)
         solved.append(found)
@@ -428,6 +429,7 @@ def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
         return begun_seconds(envelope.stage(structure, task), power=1.7)
 
     def run(fraction: float) -> float:
+        """Compute the envelope over about a fraction of the duration; return the fraction."""
         part, done = shortened(task, fraction)
         envelope.stage(structure, part).compute(StageContext())
         return done

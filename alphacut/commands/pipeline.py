@@ -68,6 +68,9 @@ def open_results(
 ) -> Iterator[tuple[Case, StageStore]]:
     """Yield the case and the store of its results, whose folder is locked during the block.
 
+    Under MPI the first rank alone locks the folder, and empties it for ``--fresh``. A damaged list
+    of its files is a warning: the store then takes no earlier result from it.
+
     Args:
         options: Options of a command that keeps results; some of them have no ``--fresh`` or
             ``--device``.
@@ -351,8 +354,8 @@ class Pipeline:
             structure: The structure.
 
         Returns:
-            The peaks of the study that has just this response, if there is one; else they are
-            computed by a stage of their own. None if no question reads peaks.
+            The peaks of the study that has just this response, if there is one; else those that a
+            stage of their own computes, or None if no question reads peaks.
 
         Raises:
             RefusedError: An input or an output does not fit the structure.
@@ -394,6 +397,7 @@ class Pipeline:
 def _draw_microstructure(
     fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection
 ) -> None:
+    """Write the figures of a radius map into a folder."""
     from alphacut.figures.microstructure import draw  # whose libraries take time to import
 
     draw(fitted, folder, section)

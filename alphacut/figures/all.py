@@ -54,6 +54,7 @@ def draw_figures(results: Results, store: StageStore) -> list[str]:
     """
 
     def compute(context: StageContext) -> StageResult[list[str]]:
+        """Write the figures into the folder of the context; return their paths in it, sorted."""
         assert context.folder is not None  # a run with figures keeps its results
         paths = []
         with figure_style():

@@ -78,7 +78,8 @@ def draw_tolerances(answer: Tolerances) -> Figure:
     All are divided by the nominal value of the input, or by 1 where this is zero.
 
     Args:
-        answer: Admissible scale, with the own and the scaled support of each input.
+        answer: For each input its support in the case, `own`, and scaled by the admissible scale,
+            `kept`, which is the nominal value alone if limits are exceeded at each scale.
     """
     supports = answer.supports.values()
     nominal = np.array([[x.nominal or 1.0] for x in supports])  # (inputs, 1)
@@ -96,9 +97,10 @@ def draw_tolerances(answer: Tolerances) -> Figure:
 def draw_decision(answer: Decision) -> Figure:
     """Draw a bar from the smallest to the largest peak over its limit, for each limit and α-level.
 
-    Bars of higher levels are darker and thinner. Above them stands the verdict with its guarantee
-    and the degrees to which exceeding the limit is possible and necessary. Events that any of
-    several limits is exceeded have no peak and are left out.
+    Each limit has a row, at whose middle the bars of all its levels lie over each other, those of
+    higher levels darker and thinner. Above them stands the verdict with its guarantee and the
+    degrees to which exceeding the limit is possible and necessary. Events that any of several
+    limits is exceeded have no peak and are left out.
 
     Args:
         answer: Verdicts on the limits, the first of which is drawn on top.
@@ -135,9 +137,9 @@ def peak_over_limit(limit: LimitDecision) -> Ends:
             infinite where none is excluded.
 
     Returns:
-        Ratios of shape (levels,) each, by the magnitude of the limit. Of a limit of zero they are 1
-        less the margin over the largest finite margin, so that their bars have about the length of
-        those of other limits.
+        Ratios of shape (levels,) each, to the magnitude of the limit. Of a limit of zero they are 1
+        less the margin over the largest magnitude of a finite margin, so that their bars have about
+        the length of those of other limits.
     """
     size = abs(limit.limit)
     if size == 0.0:
@@ -290,7 +292,7 @@ def draw_demands(axes: Axes, answer: Fragility, names: Sequence[str]) -> None:
         names: Names of limits of one and the same peak, whose bounds are then the same.
     """
     for record, increment in answer.increments.items():
-        high, low = answer.demand_curve(names[0], record)
+        high, low = answer.demand_curve(names[0], record)  # shape (levels, measures) each
         for level, shade in enumerate(style.colours(answer.alpha)):
             band: Look = {"color": shade, "lw": 0, "alpha": 0.7}
             filled = axes.fill_between(increment.measure, low[level], high[level], **band)

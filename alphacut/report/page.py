@@ -130,18 +130,21 @@ def plot(
     Args:
         name: Name of the study.
         study: Its numbers.
-        dataset: Its envelope over alpha, output and time, in SI units.
+        dataset: Its envelope, variables lower, upper and error over alpha, output and time, in SI
+            units.
         units: Unit in which each output is shown.
 
     Returns:
-        Document with the names and units of the outputs, the α-levels, the step between time nodes
-        in s, and the series "lower", "upper" and "error": for each level and then each output all
-        values over time, as 32-bit floats, low byte first, in base64. The error is zero if the
+        Document with a title, the number of fuzzy inputs, the guarantee, the names of the outputs,
+        their units and the factors from SI, the α-levels, the step between time nodes in s, and the
+        series "lower", "upper" and "error": for each level and then each output all values over
+        time in SI units, as 32-bit floats, low byte first, in base64. The error is zero if the
         envelope is guaranteed, since it then contains the error.
     """
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
-    # The inputs are the same for all peaks, and so is the set that their box encloses.
+    # Inputs learned from a measurement are a set without a simple shape: bounds are computed for
+    # the box that encloses it, as the title says. It is the same for all peaks of a study.
     encloses = next((peak.encloses for peak in study.peak.values()), "")
     box = ""
     if encloses:

@@ -406,7 +406,8 @@ def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
     Returns:
         A text for each level and three more. The last two, the farthest attained peak of the lowest
         level and its distance from the bound as a fraction of this, are empty for peaks that are
-        not guaranteed, and for those of a box around a set, of which no response is known.
+        not guaranteed, and if the box of the inputs encloses a set learned from a measurement: no
+        response of the box is known to be one of the set.
     """
     lower = factor * peak.lower
     upper = factor * peak.upper
@@ -479,8 +480,9 @@ def natures(parts: Parts) -> Iterator[str]:
     """Yield sentences, without full stops, on what is guaranteed and how it was tested.
 
     They say that the stiffness on an own mesh is an upper bound; which peaks are guaranteed,
-    estimated or attained; what a box around a set of inputs means; what a mean over records is; and
-    how many exact responses agree with guaranteed bounds. Each stands only if it applies.
+    estimated or attained; what bounds mean if the box of the inputs encloses a set that was learned
+    from a measurement; what a mean over records is; and how many exact responses agree with
+    guaranteed bounds. Each stands only if it applies.
 
     Args:
         parts: Numbers of the results.
@@ -526,6 +528,8 @@ def agreement(is_guaranteed: bool) -> str:
 def smaller_steps(parts: Parts) -> Iterator[str]:
     """Yield a sentence for each peak whose bound the time step widens noticeably.
 
+    It does if what responses may add between nodes is over 1 % of the bound and over half of its
+    uncertainty (`is_widened_by_step`).
     Bounds hold at all times, so they contain what responses may add between the time nodes. The
     sentence says about what half the step would give.
 
@@ -592,7 +596,8 @@ def drivers(parts: Parts) -> Iterator[str]:
         yield _driver_sentence("E", parts.shares["E"], count=3)
     for name in peaks[-1:]:
         what = name.replace("the peak", "the reached peak")
-        # Inside a box around a set nothing is known to be reached: the search was in the box.
+        # A box around a set learned from a measurement was searched: no point of it is known to
+        # belong to the set, so that nothing is known to be reached.
         if parts.encloses:
             what = f"{name}, as tried in the box around {parts.encloses},"
         yield _driver_sentence(what, parts.shares[name], count=2)

@@ -130,7 +130,8 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
     Returns:
         Bounds, error and attained value in SI units, NaN where no value is known to be attained,
         and the distance of the attained value from the bound as a fraction of this ("gap, share").
-        If the peaks are those of a box around a set of inputs, a column "inputs" says so.
+        If the bounds are those of a box that encloses a set of inputs, learned from a measurement,
+        a column "inputs" says so.
     """
     found = []
     for name, study in studies.items():
@@ -165,7 +166,8 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
     Returns:
         Row of each time node: the time in s and, for each level, lower bound, upper bound and
         error. Guaranteed bounds contain the error; there the third column is the gap to attained
-        values, and is left out if the bounds are those of a box around a set of inputs.
+        values. It is left out if the bounds are those of a box that encloses a set of inputs,
+        learned from a measurement, as the titles then say; and so is what `data` does not have.
     """
     series = data.sel(output=output)
     nature = Nature(data.attrs["nature"])

@@ -203,6 +203,7 @@ def stage(kind: type[Answer], section: QuestionSection, response: Response) -> S
 def _computed(
     kind: type[Answer], section: QuestionSection, response: Response, context: StageContext
 ) -> StageResult[Answer]:
+    """Answer the question of a section, reporting progress to the context."""
     return StageResult(ANSWERS[kind](section, response, context.tick))
 
 

@@ -145,6 +145,7 @@ class EnvelopeTask:
         names = [str(name) for name in data["output"].values]
 
         def by_output(values: xarray.DataArray) -> dict[str, float]:
+            """Return values over the outputs, shape (outputs,), by the names of these."""
             return dict(zip(names, map(float, values.values), strict=True))
 
         numbers = EnvelopeResult(
@@ -158,7 +159,7 @@ class EnvelopeTask:
             method=str(data.attrs["method"]),
             nature=Nature(data.attrs["nature"]),
             motions_tested=int(data.attrs.get("motions_tested", 0)),
-            step=float(data["time"].values[1]),
+            step=float(data["time"].values[1]),  # equal steps from time 0 on
             units={x: structure.unit(x) for x in (*names, *outputs_of([*peak_bounds]))},
         )
         return StageResult(numbers, data)

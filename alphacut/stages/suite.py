@@ -196,6 +196,7 @@ def incremental_stage(
     limits = limits_by_name(section.limits_of(structure), ())
 
     def compute(context: StageContext) -> StageResult[Increments]:
+        """Return the bounds over the intensity for each limit, reporting progress."""
         return StageResult(increments_of(analysis, limits, context.tick))
 
     # The analysis has the frame, the record and the cuts of the inputs, so that it stands for them.
