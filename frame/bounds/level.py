@@ -192,9 +192,12 @@ class LevelModels:
             by_magnitude += np.outer(load_deviation(response.load, time), of_others)
         responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
         responses += feedthroughs.values()
+        # `by_magnitude` adds all contributions as if none cancelled another one; now those in
+        # `responses`, which are known as functions of time, are added with their signs.
         narrowed = narrowed_deviation(responses, time, by_magnitude, unresolved)
         if unresolved.any():
-            # Steps in which a force jumps need the change of all contributions within the step.
+            # The bound for steps in which a force jumps needs the change of all contributions
+            # within the step, which of unresolved ones is not known.
             return narrowed
         return narrowed_at_jumps(responses, time, narrowed)
 

@@ -82,7 +82,8 @@ def grid_over(
 ) -> Grid:
     """Return a grid of equally spaced points over ranges of frequency ω and of q = decay/ω.
 
-    A range of one value is made slightly wider: by 1e-9 of ω, or by 1e-12 in q.
+    A range of one value, or whose upper end lies below the lower one, becomes a slightly wider one
+    from the lower end on: by 1e-9 of ω, or by 1e-12 in q.
 
     Args:
         omega: Lower and upper end of ω, in rad/s, positive.
