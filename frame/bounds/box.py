@@ -85,8 +85,9 @@ class Box:
                 given.
 
         Raises:
-            UnprovedError: No mode of the structure can be enclosed, or the box is too wide for it
-                to oscillate and stay stable. The attribute `along` is the index, among all n
+            UnprovedError: Dashpots couple the modes, or another reason that `over_box` names; no
+                mode can be enclosed; or the structure is not known to oscillate and to be stable in
+                the whole box. The attribute `along` is the index, among all n
                 inputs, of the input whose bisection is most likely to help, or None.
         """
         try:

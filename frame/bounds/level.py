@@ -143,8 +143,8 @@ class LevelModels:
 
         Args:
             structure: The structure as Taylor models over the box of the inputs.
-            excitation: Loads by name, T time nodes from 0 on, and the names of the sources, at
-                least one.
+            excitation: Loads by name, T ≥ 1 rising time nodes t ≥ 0, and the names of the sources,
+                at least one.
             truncation_tolerance: Allowed error of each of the m outputs by modes that are not
                 enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
                 unless it is given.
