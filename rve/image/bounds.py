@@ -112,7 +112,8 @@ class StiffnessBounds:
         Returns:
             Lower and upper bound. Without a lower bound of the stiffness (percolating pores) the
             lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
-            upper one is infinite.
+            upper one is infinite, and in the plane, where G may then exceed any multiple of K, the
+            lower one is −∞ as well.
 
         Raises:
             FailedError: In space, a bound of the stiffness is singular to rounding.
@@ -359,12 +360,14 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
     Raises:
         FailedError: The matrix is singular to rounding, or has a diagonal entry that is not
             positive.
-        numpy.linalg.LinAlgError: The elimination meets a pivot that is exactly zero.
     """
     # Powers of two make the diagonal near 1 without rounding: loads of any size count alike.
     scale = 2.0 ** -np.round(np.log2(np.diagonal(matrix)) / 2)
     scaled = scale[:, None] * matrix * scale
-    inverse = np.linalg.inv(scaled)
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:  # a pivot is exactly zero: NaN fails the test below
+        inverse = np.full_like(scaled, np.nan)
     inverse = (inverse + inverse.T) / 2
     # With X the computed inverse and R = I − X·matrix, the true inverse is (I − R)⁻¹ X. In the
     # norm of row sums it is off by at most ‖R‖‖X‖/(1 − ‖R‖), and so is every eigenvalue.

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.image.bounds import StiffnessBounds
+from alphacut.base.errors import FailedError
+from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
 from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import (
@@ -234,3 +235,10 @@ def test_the_preconditioner_inverts_waves_of_any_length(stress, rng):
     fields = inverse.apply(rng.normal(size=(1, element.unknowns, *shape)))
     again = inverse.apply(operator.apply(fields))
     assert np.abs(again - fields).max() < 1e-5 * np.abs(fields).max()
+
+
+@pytest.mark.parametrize("matrix", [np.ones((3, 3)), np.diag([1.0, 0.0, 1.0])])
+def test_a_singular_matrix_has_no_bounds_of_its_inverse(matrix):
+    singular = pytest.raises(FailedError, match="singular to rounding")
+    with np.errstate(divide="ignore", invalid="ignore"), singular:
+        inverse_below(matrix)
