@@ -260,8 +260,11 @@ def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
 
     Args:
         alpha: Rising levels, shape (levels,).
-        cuts: Lower and upper ends, shape (levels, 2). Of the level 1 alone the result is the crisp
-            mean of both ends.
+        cuts: Lower and upper ends, nested, shape (levels, 2). The first cut holds from α = 0 on. Of
+            the level 1 alone the result is the crisp mean of both ends.
+
+    Raises:
+        RefusedError: An end is not finite, or the cuts are not nested.
     """
     # On level 1 alone there is no support to give the fuzzy number a width.
     if tuple(alpha) == (1.0,):
@@ -662,6 +665,7 @@ def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
         "inclusion_modulus": 1,
     }
     of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in cell.inputs}
+    # What mechanics proves is tested at two points of each cut; signs that users state at 16.
     return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
 

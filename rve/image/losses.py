@@ -64,7 +64,8 @@ def energy_fractions(
     Args:
         model: Model by which `solution` was made and by which the changed images are solved.
         solution: Solution of an image without pores and rigid phases, whose upper and lower moduli
-            are the same. Its stresses are the first guess.
+            are the same. The lower bounds of its constants are positive, which is not checked. Its
+            stresses are the first guess.
         images: Moduli of that image.
         phase: Number from 0 of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
         n_phases: Number of phases.

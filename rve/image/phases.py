@@ -38,6 +38,7 @@ class PhaseModuli:
     shear: float
 
     def __post_init__(self) -> None:
+        """RefusedError unless each modulus is 0, infinite or inside (1e-60, 1e60) Pa."""
         for name, value in (("bulk", self.bulk), ("shear", self.shear)):
             is_allowed = value in (0.0, math.inf) or 1e-60 < value < 1e60
             allowed = "values in (1e-60, 1e+60) Pa"

@@ -312,8 +312,8 @@ def image_study(
         """Return the lowest and the highest phase of each pixel at an α-level, two integer arrays.
 
         The grey values are compared with the α-cuts of the thresholds, at the level None with their
-        nominal values. Only at a level, and with thresholds that are not fuzzy, does the picture's
-        noise and uneven light leave phases open in their place, as its segmentation says.
+        nominal values. For a picture at a level, if no threshold is fuzzy, its grey values are
+        varied by the noise and the uneven light that its segmentation has found.
         """
         # A fuzzy threshold says all that is not known, noise and light included.
         if segmentation is not None and level is not None and not is_fuzzy:
@@ -394,7 +394,10 @@ class FuzzyImageStiffness:
 
     @property
     def modulus(self) -> FuzzyNumber:
-        """Fuzzy Young's modulus of the average in Pa; between two levels the wider α-cut holds."""
+        """Fuzzy Young's modulus of the average in Pa; between two levels the wider α-cut holds.
+
+        RefusedError where a bound is infinite, beside pores that percolate or rigid phases.
+        """
         return fuzzy_number(self.alpha, self.young)
 
     @property
@@ -552,7 +555,8 @@ def solve_study(
         average: "isotropic" or "axes": the average over directions that E and ν of the plane are
             of.
         device: "cpu", or "cuda" by CuPy.
-        tick: Function that is called with the completed fraction, up to 1 before the last steps.
+        tick: Function that is called with the completed fraction, which rises; after the last call,
+            of less than 1, come the widths and the loss factors.
 
     Returns:
         Bounds at each level, widths of E by cause at the lowest level where both bounds exist, loss

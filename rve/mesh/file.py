@@ -405,7 +405,7 @@ def write(
 ) -> None:
     """Write prisms to a binary file in Gmsh's format MSH, each phase a physical group of volumes.
 
-    A file that exists is replaced. Gmsh must be installed.
+    A file that exists is replaced.
 
     Args:
         path: A name that ends in .msh; Gmsh tells the format by the ending.
@@ -416,6 +416,10 @@ def write(
         names: Names of the phases, which become those of the physical groups; at least one.
         fields: Values at the nodes of the prisms by name, shape (m, 15, components). Each becomes a
             view behind the mesh. Element k of a view is the k-th prism.
+
+    Raises:
+        ImportError: Gmsh is not installed.
+        Exception: Whatever Gmsh raises, such as of a file that cannot be written.
     """
     with square.open_gmsh() as gmsh:
         gmsh.option.setNumber("Mesh.Binary", 1)

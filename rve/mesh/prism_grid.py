@@ -130,6 +130,7 @@ class LevelSet(FixedCell):
         # `array_of_call` makes floats of what z returns. A mask of the particles would pass as
         # zeros and ones, all in the matrix, so its type is noted before.
         def noted(*coordinates: Array) -> Array:
+            """Return the values of z at points; note in `kinds` whether they are Booleans."""
             found = np.asarray(self.z(*coordinates))
             kinds.append(found.dtype == bool)
             return found

@@ -98,6 +98,7 @@ def triangles(
         gradings.append(bend_grading(outline, radius, refinement))
 
     def min_size(x: float, y: float) -> float:
+        """Return the shortest edge length that a grading wants at a point, or `size` if less."""
         return size * min(1.0, min(grading(x, y) for grading in gradings))
 
     sizes = min_size if gradings else None
@@ -294,6 +295,7 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
     import gmsh
 
     def add_point(angle: float) -> int:
+        """Add the point of the outline at a polar angle in radians, and return Gmsh's tag of it."""
         distance = radius * float(outline(np.array(angle)))
         return int(geo.addPoint(distance * np.cos(angle), distance * np.sin(angle), 0, size))
 
@@ -372,6 +374,7 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     factor = PER_RADIUS / refinement
 
     def over_nominal(x: float, y: float) -> float:
+        """Return the edge length at a point over the nominal one."""
         return factor * float((radii + np.hypot(px - x, py - y)).min())
 
     return over_nominal

@@ -296,7 +296,7 @@ class PrismModel(CellModel):
         The grid is meshed at the reference radius of a map (about the midpoint of its radii).
         Elements at the bends of an outline may fold where it is moved to the map, for which the
         function is to raise FoldedMeshError: it is then called again with a grid of shorter edges
-        there, six times at most, and only once for a circle.
+        there, six times in all at most. For a circle it is called once.
 
         Args:
             radius_map: Radius r(θ) of the particle, with the distribution of θ.

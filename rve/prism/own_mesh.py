@@ -157,6 +157,7 @@ class MeshModel(_NamedModel):
     refine: bool = False
 
     def __post_init__(self) -> None:
+        """RefusedError unless `petsc` is a table of options without dash and prefix."""
         require_petsc(self.petsc)
 
     def solve(
@@ -237,6 +238,7 @@ class LevelSetModel(_NamedModel):
     parallel: bool = False
 
     def __post_init__(self) -> None:
+        """RefusedError for a mesh size, a number of layers or options that are not allowed."""
         require_prisms(self.mesh_size, self.layers)
         require_petsc(self.petsc)
 

@@ -75,6 +75,7 @@ class ProductSpace:
         return self._integral(form) / total
 
     def _integral(self, form: ufl.Form) -> float:
+        """Return the integral of a scalar form, summed over all ranks, all of which must call."""
         scalar = fem.assemble_scalar(self._compiled(form, num_arguments=0))
         return float(self._problem.comm.allreduce(scalar))
 

@@ -24,7 +24,7 @@ class CertificateError(FailedError):
 def checks_within_limits(
     checks: Mapping[str, float], *, discretisation: float = ROUND_OFF
 ) -> dict[str, float]:
-    """Return a copy of violations of properties that right results have; none is too large.
+    """Return a copy of violations of properties that right results have, if none is too large.
 
     Args:
         checks: Relative violations, 0 for none, by the names "residual" and "hill_mandel" (of

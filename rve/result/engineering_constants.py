@@ -143,6 +143,7 @@ class Mixture:
         """
         rule = gauss_rule(cell.radius_map.distribution, points=32)
         inclusion = cell.fraction(rule.nodes)
+        # Isotropic phases have n = C33 = C11 and l = C13 = C12.
         stiffness = np.array(cell.stiffness)
         axial = stiffness[:, 0, 0]
         lateral = stiffness[:, 0, 1]
@@ -172,12 +173,12 @@ class Mixture:
 
         With k the plane-strain bulk moduli of the phases and ⟨k⟩ their mean by area, the bulk
         modulus of the cell is ⟨k⟩ − z̄ (k₂ − k₁)². The result is clipped to Hashin and Shtrikman's
-        bounds of z̄; where the error of the bulk modulus hides z̄, it is their midpoint with these
-        bounds.
+        bounds of z̄. Where the error of the bulk modulus hides z̄, or k₁ = k₂, it is their midpoint
+        with these bounds.
 
         Args:
             bulk: Plane-strain bulk modulus of the cell in Pa.
-            relative_error: Declared relative error of it; NaN makes the bounds NaN.
+            relative_error: Declared relative error of it; NaN makes the bounds NaN unless k₁ = k₂.
 
         Returns:
             z̄ with its lower and upper bound, in 1/Pa.
@@ -286,6 +287,9 @@ class AxialStiffness:
 
         Returns:
             E_x, E_y, ν_xy and G_xy with their absolute errors, shape (4,) each, moduli in Pa.
+
+        Raises:
+            numpy.linalg.LinAlgError: C − c cᵀ/C33 is singular.
         """
         c = self.lateral
         reduction = np.outer(c, c) / self.axial

@@ -49,7 +49,8 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
         the first-order formula, a term of second order; NaN where the model declares none.
 
     Raises:
-        RefusedError: The result has no energies, or neither it nor the arguments have losses.
+        RefusedError: The result has no energies, or `losses` is not given and the result has no
+            cell whose phases could state them.
     """
     energies = result.energies
     if energies is None:

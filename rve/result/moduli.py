@@ -108,7 +108,8 @@ def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, flo
     A bound of K is X in 1/(X + term) = Σ fraction/(K of the phase + term), and that of G likewise.
 
     Args:
-        bulk: K of the reference, in Pa: of three dimensions, or of plane strain.
+        bulk: K of the reference, in Pa: of three dimensions, or of plane strain. Not 0 beside a
+            shear modulus of 0.
         shear: G of the reference, in Pa.
         space: Whether the composite is one of space; else of the plane across fibres.
 

@@ -62,5 +62,6 @@ def reference_bounds(
 
 
 def _ends(values: Array) -> tuple[float, float]:
+    """Return the lower and the upper bound of an array of both as numbers of Python."""
     lower, upper = map(float, values)
     return lower, upper

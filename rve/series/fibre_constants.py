@@ -173,7 +173,8 @@ def _image_couplings(harmonics: int) -> Array:
     """Return what unit a_n of all images add to the Taylor coefficients at 0, for odd orders.
 
     Rows are the orders k = 1, 3, … of the coefficients and columns the n = 1, 3, … of the a_n,
-    shape (harmonics, harmonics). The lattice has the period 2.
+    shape (harmonics, harmonics). The lattice has the period 2. Equal arguments give the same array,
+    which must not be changed.
     """
     orders = 2 * np.arange(harmonics) + 1
     # Two orders add up to 4 · harmonics − 2 at most.

@@ -310,6 +310,7 @@ class SeriesModel(AnyModel):
     series: ClassVar[Series] = CIRCLES
 
     def __post_init__(self) -> None:
+        """RefusedError for fewer than 2 points, or an accuracy that is not allowed."""
         require_points(self.points)
         accuracy = self.accuracy
         if not (is_number(accuracy) and self.MIN_ACCURACY <= accuracy <= self.MAX_ACCURACY):
@@ -320,10 +321,12 @@ class SeriesModel(AnyModel):
     def with_resolution(cls, resolution: Resolution) -> Self:
         """Return the model whose E has at most the relative error that a resolution allows.
 
+        An accuracy below `MIN_ACCURACY` of the class is not asked for, however small the tolerance.
+
         Args:
-            resolution: Its `tolerance` of E (None for `DEFAULT_TOLERANCE` of the class; if that is
-                None too, for the default accuracy) and whether strain `energies` of the phases are
-                wanted; all else concerns other models.
+            resolution: Its `tolerance` of E (None, or 0, for `DEFAULT_TOLERANCE` of the class; if
+                that is None too, for the default accuracy) and whether strain `energies` of the
+                phases are wanted; all else concerns other models.
 
         Raises:
             RefusedError: The tolerance is so large that the accuracy would be above 0.1.

@@ -267,6 +267,7 @@ class SlicesModel(CellModel):
     convention: ClassVar[str] = AVERAGES[AXES]
 
     def __post_init__(self) -> None:
+        """RefusedError for a mesh size, a number of points or an outline that is not allowed."""
         require_mesh_size(self.mesh_size)
         require_points(self.points)
         require_outline(self.outline)
@@ -399,7 +400,7 @@ def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array
     nodes = _radius_of_nodes(cell, rule, radii)
 
     def absolute_theta_error(moduli: Array) -> Array:
-        """Return the error of the mean of moduli at the radii, shape (n, 3), in Pa, shape (3,)."""
+        """Return the error in Pa of the means, shape (3,), of moduli at the radii, shape (n, 3)."""
         relative_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
         return relative_errors * rule.mean(moduli[nodes])
 
@@ -456,7 +457,8 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     half_width = max(np.ptp(x), 1e-12) / 2
     mean = rule.weights @ moduli[nodes]
 
-    # From a degree that leaves some freedom up to that of the interpolating polynomial.
+    # From a degree that leaves some freedom up to that of the interpolating polynomial, one less
+    # than the number of radii. The limits of both, 9 and 14, are tuned.
     first_degree = min(max(0, radii.size - 4), 9)
     last_degree = min(radii.size, 15)
     distances = []

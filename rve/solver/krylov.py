@@ -70,6 +70,7 @@ class SolverOptions:
         return f"one UFL form over {elements} by DOLFINx, solved by PETSc's {krylov} with {self}"
 
     def __str__(self) -> str:
+        """Return "theta" for the preconditioner along θ, and the options that were changed."""
         changes = {**self.environment, **self.overrides}
         words = ["theta"] if self.by_levels else []
         words += [f"-{PREFIX}{name} {value}".strip() for name, value in changes.items()]

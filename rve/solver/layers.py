@@ -127,6 +127,9 @@ class BlockSum:
             pattern: Sparsity pattern of A in blocks of 2 × 2; its values are not used.
             parents: Numbers of the pairs of unknowns that a node depends on, shape (nodes,
                 parents), −1 for none. At least one is not −1.
+
+        Returns:
+            The sums by which `entries` makes the entries of Bᵀ A B from the blocks of A.
         """
         size = int(parents.max()) + 1
         node = _rows(pattern)

@@ -74,7 +74,8 @@ def _basis(dimension: int, *, stress: bool) -> Basis:
     Returns:
         `functions`, each by its coefficients of 1, x, x², … on [0, 1]; `owners`, for each function
         the number of its unknown in a cell and how many cells further this cell is; and `places`,
-        the coordinate of each unknown in its cell, and whether it is odd, as a slope is.
+        the coordinate of each unknown in its cell, from 0 to 1, and whether it is odd, as a slope
+        is. In space a cell has one unknown, by default at 0 and not odd.
     """
     if dimension == 3 and not stress:  # values at both ends
         return Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))

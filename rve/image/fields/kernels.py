@@ -256,7 +256,7 @@ def _fill_strips(
             voxel x at k · nx + x.
         strips: Modes of each term, shape (terms, n modes along z, n rows, n · nx), the last axis as
             of `lines`. Row y stands at y modulo n; its entries are overwritten but for the highest
-            modes, which are zero where a derivative lowers the degree.
+            modes where a derivative lowers the degree, which must be zero before.
     """
     n = tables.shape[-1]
     nz, ny, nx = field.shape[1:]

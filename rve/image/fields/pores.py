@@ -217,7 +217,7 @@ def _coefficients(element: Element, position: Array, degrees: tuple[int, ...]) -
     """Return the coefficients of the element's functions that make up a monomial, at nodes.
 
     The monomial is a product of powers of the coordinates, of degree 2 at most. The coefficients
-    are exact: multiples of 1/8 of whole numbers.
+    are exact: whole multiples of 1/32 in space, whole numbers in the plane.
 
     Args:
         element: Element of stresses.
