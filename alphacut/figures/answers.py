@@ -36,6 +36,7 @@ def draw_bars(bars: Sequence[tuple[Array, Look]], names: Iterable[str], label: s
         label: Label of the horizontal axis.
     """
     rows = np.arange(len(bars[0][0]), dtype=float)[::-1]
+    # inches: the axis with its label takes 0.9, each row 0.36
     figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
     for intervals, look in bars:
         lower = intervals[:, 0]
@@ -108,6 +109,7 @@ def draw_decision(answer: Decision) -> Figure:
     limits = [limit for limit in answer.limits.values() if limit.peak is not None]
     figure, axes = plt.subplots(figsize=(WIDTH, 1.2 + 0.85 * len(limits)))
     rows = np.arange(len(limits))[::-1]  # the first limit on top
+    # Rows are 1 apart: the widest bar, of 0.66, leaves room for two lines of text above it.
     for row, limit in zip(rows, limits, strict=True):
         ratios = peak_over_limit(limit)
         look: Look = {"height": 0.66 - 0.4 * answer.alpha, "color": style.colours(answer.alpha)}

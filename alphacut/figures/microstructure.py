@@ -109,7 +109,7 @@ def draw_map(fitted: FittedRadiusMap) -> Figure:
     # The exact map is r(θ) = F⁻¹(F_Θ(θ)): the quantile of the sample at the probability of θ.
     theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 601), float)
     axes.step(theta, fitted.truncated.quantile(distribution.cdf(theta)), color=BLUE, label="sample")
-    nominal = box.fit.map((box.a2[1], box.a4[1]))
+    nominal = box.fit.map((box.a2.nominal, box.a4.nominal))
     label = f"$a_2$ = {nominal.a2:.4f}, $a_4$ = {nominal.a4:.4f}"
     axes.plot(theta, nominal(theta), color=ORANGE, ls="--", label=label)
     lower, upper = box.bounds(theta)

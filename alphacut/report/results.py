@@ -588,7 +588,9 @@ def drivers(parts: Parts) -> Iterator[str]:
     the result on the lowest level falls if the input is fixed at its nominal value.
 
     Args:
-        parts: Numbers of the results, with these fractions by result and input in `shares`.
+        parts: Numbers of the results, with these fractions by result and input in `shares`. The
+            results are "E", "ν" and, for each output, "the peak of NAME". Without them nothing is
+            yielded.
     """
     # The last output of a case is in general that of the top floor, which moves most.
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
@@ -683,7 +685,7 @@ def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
             unit = shown_units[output_of(output)]
             for name, ends in statistics.items():  # mean, median …
                 what = f"{name} of the records' peaks of {output}"
-                yield ComparedEntry(what, unit, float(ends[0]))
+                yield ComparedEntry(what, unit, float(ends[0]))  # of the bounds over the levels
     if parts.decision is not None:
         for limit in parts.decision.limits.values():
             yield ComparedEntry(limit.words, no_unit, limit.verdict_words)

@@ -132,8 +132,9 @@ class RunProgress:
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
         """Return the function that takes the progress of the next stages, and reserve their part.
 
-        The rest of the bar is divided by the rough seconds of the stages to come; `seconds_left`
-        and `done` are changed.
+        The stages get that part of what is left of the bar which their rough seconds are of
+        `seconds_left`, those of all stages to come. Both `seconds_left` and `done`, the fraction of
+        the bar that is reserved so far, are changed.
 
         Args:
             names: Names of the stages that will be computed next.
@@ -145,7 +146,8 @@ class RunProgress:
         self.seconds_left -= self._seconds_of(skipped)
         seconds = self._seconds_of(names)
         first = self.done
-        # The maximum keeps the bar within its end where stages come that nobody foresaw.
+        # Where stages come that nobody foresaw, their seconds may be more than those that are left:
+        # the maximum keeps the bar within its end.
         if seconds:
             self.done += (1 - first) * seconds / max(seconds, self.seconds_left)
         self.seconds_left -= seconds
@@ -217,7 +219,8 @@ class StageStore:
                 results[stage.name] = found
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
-        # A stage alone may use all workers itself, and further files need this process.
+        # A stage alone may use all workers itself, and only this process gives it a folder for
+        # further files.
         # The bar moves by the work of stages, which is more even than by their number.
         total = sum(stage.work for stage in stale)
         done = 0.0

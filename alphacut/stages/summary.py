@@ -170,6 +170,7 @@ class Parts:
             TypeError: A name in `further` is no field, or a field without a default is missing.
         """
         drawn = {task.name: tuple(task.figures) for task in results.tasks}
+        # Stages with a single result have the name of their field, such as "modulus".
         parts: dict[str, Any] = {name: x.numbers for name, x in results.single.items()}
         parts |= {
             "structure": results.frame_result,
