@@ -87,8 +87,8 @@ class Box:
         Raises:
             UnprovedError: Dashpots couple the modes, or another reason that `over_box` names; no
                 mode can be enclosed; or the structure is not known to oscillate and to be stable in
-                the whole box. The attribute `along` is the index, among all n
-                inputs, of the input whose bisection is most likely to help, or None.
+                the whole box. The attribute `along` is the index, among all n inputs, of the input
+                whose bisection is most likely to help, or None.
         """
         try:
             whole = self.structure
