@@ -151,11 +151,11 @@ class ArrayArchive:
         place = f"{self.path.name}:{name}"
         is_known = member.compress_type in (ZIP_STORED, ZIP_DEFLATED)
         require(is_known, place, f"compressed by method {member.compress_type}", "deflate or none")
-        most = DEFLATE_RATIO * member.compress_size  # 1032 bytes for one, by the format
+        max_bytes = DEFLATE_RATIO * member.compress_size  # 1032 bytes for one, by the format
         if member.compress_type == ZIP_STORED:
-            most = member.compress_size
+            max_bytes = member.compress_size
         value = f"of {member.file_size} bytes out of {member.compress_size}"
-        require(member.file_size <= most, place, value, f"up to {most}")
+        require(member.file_size <= max_bytes, place, value, f"up to {max_bytes}")
         is_inside = member.compress_size <= self.path.stat().st_size
         require(is_inside, place, value, "what lies in the file")
         # The caller mostly makes a copy, such as a conversion to floats.

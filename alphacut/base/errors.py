@@ -207,9 +207,9 @@ def path_of(key: str, value: object) -> Path:
 
 
 def is_number(value: object, *, whole: bool = False) -> bool:
-    """Return whether a value is a real number, or an integer, of Python or of NumPy.
+    """Return whether a value is a real number of Python or of NumPy; with `whole`, an integer.
 
-    True and False are not numbers here.
+    NaN and infinities are numbers; True and False, arrays and the float 2.0 as an integer are not.
     """
     kind = Real
     if whole:

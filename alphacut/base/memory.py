@@ -30,8 +30,9 @@ def free_memory() -> float:
     # process without a message. The word "max" is no number: there is no limit.
     with suppress(OSError, ValueError):
         group = Path("/sys/fs/cgroup")
-        most = int((group / "memory.max").read_text())
-        free.append(float(most - int((group / "memory.current").read_text())))
+        allowed = int((group / "memory.max").read_text())
+        used = int((group / "memory.current").read_text())
+        free.append(float(allowed - used))
     with suppress(ImportError, OSError, ValueError, IndexError):
         import resource  # not on Windows
 

@@ -63,10 +63,10 @@ def opened_picture(path: Path) -> Iterator[Image]:
             coding = str(picture.info.get("compression"))
         # The largest number of bytes for which a byte of the file can stand is known of most
         # codings. JPEG and WebP may write any number of equal pixels in a few bytes.
-        most = MAX_PIXELS
+        max_pixels = MAX_PIXELS
         if coding in MAX_BYTES_PER_BYTE:
-            most = 8.0 * MAX_BYTES_PER_BYTE[coding] * size  # a pixel has at least one bit
+            max_pixels = 8.0 * MAX_BYTES_PER_BYTE[coding] * size  # a pixel has at least one bit
         value = f"{what} in a file of {size} bytes"
-        require(pixels <= most, path.name, value, f"up to {most:.3g} pixels")
+        require(pixels <= max_pixels, path.name, value, f"up to {max_pixels:.3g} pixels")
         require_free_memory(path.name, float(bytes_per_pixel * pixels), what)
         yield picture

@@ -70,9 +70,10 @@ class Content(CellContent):
     def limited_outputs(self) -> tuple[str, ...]:
         """Return the names of the peaks over time whose bounds the questions need, each once.
 
-        The peak of an output is the largest magnitude over time, named as the output, such as "q3".
-        The largest and the smallest value have names of their own: "max q3" and "min q3". Questions
-        that compute responses themselves, instead of reading peaks of the envelope, are left out.
+        Questions are the sections with limits of the response, such as [decision]. Those that
+        compute responses themselves, instead of reading peaks of the envelope, are left out. The
+        peak of an output is the largest magnitude over time, named as the output, such as "q3"; the
+        largest and the smallest value have names of their own, "max q3" and "min q3".
         """
         peaks: dict[str, None] = {}
         for section in self.questions.values():
@@ -237,6 +238,9 @@ class Content(CellContent):
 
     def _require_response(self, envelope: EnvelopeSection, structure: Structure) -> None:
         """Refuse studies and questions that the structure cannot answer.
+
+        A [[study]] is an envelope with inputs, outputs and a duration of its own; questions are the
+        sections with limits of the response, such as [decision].
 
         Checked are the method and the integrator where columns yield, the inputs, outputs and
         duration of [envelope] and of each [[study]], that no two studies have the same name, that a

@@ -99,8 +99,8 @@ class CaseLimit:
             # the strictest of those that it may mean.
             masses = structure.floor_masses
             require(bool(masses), key, self.text, allowed)
-            least = sum(mass.support.lower for mass in masses)
-            return self.value * (STANDARD_GRAVITY * least)
+            min_mass = sum(mass.support.lower for mass in masses)
+            return self.value * (STANDARD_GRAVITY * min_mass)
         height = structure.heights.get(self.output)
         if height is None:
             raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")

@@ -224,7 +224,8 @@ class RoundCell(Section):
         angle between the first axis and x.
 
         Raises:
-            RefusedError: The text is another one, or the ratio of the axes is not from 1/4 to 4.
+            RefusedError: The text is another one, the ratio of the axes is not from 1/4 to 4, or
+                the angle is not finite.
         """
         if self.particles in ("cylinders", "spheres"):
             return None

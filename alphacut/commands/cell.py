@@ -121,8 +121,8 @@ def export(problem: CellProblem, path: Path) -> Document:
     cell = problem.cell
     if isinstance(cell, MeshedCell):
         assert mesh.file is not None  # a cell of phases is one of a mesh from a file
-        law = cast("ThetaDistribution", problem.nominal_radius)
-        fields = MeshModel(mesh.file).fields(law, cell.nominal_phases)
+        theta = cast("ThetaDistribution", problem.nominal_radius)
+        fields = MeshModel(mesh.file).fields(theta, cell.nominal_phases)
     else:
         nominal = problem.nominal
         model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)

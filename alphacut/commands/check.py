@@ -361,10 +361,10 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
             continue
         if has_events:
             what = f"the step of {step:g} s is too coarse: its peak may be missed"
-            most = f"by about {fraction:.1%}"
+            by_how_much = f"by about {fraction:.1%}"
             if fraction >= 1:
-                most = "altogether"
-            yield f"{name}: {what} {most} between nodes"
+                by_how_much = "altogether"
+            yield f"{name}: {what} {by_how_much} between nodes"
         else:
             # A curve is farthest from its chord by h²/8 max |q''|: the distance falls with the
             # square of the step h, and half a step leaves a quarter.

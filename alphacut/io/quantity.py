@@ -176,9 +176,9 @@ def _wrong_unit(unit: str, si: str) -> str:
     what = f'the unit "{unit}" is wrong'
     if si:
         what = f'the unit "{unit}" is no unit of {dimension.name}'
-    own = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
-    if own:
-        what = f'the unit "{unit}" is a unit of {own}, and no unit of {dimension.name}'
+    actual = next((x.name for x in QUANTITIES.values() if unit in x.powers), "")
+    if actual:
+        what = f'the unit "{unit}" is a unit of {actual}, and no unit of {dimension.name}'
     fits = partial(_is_unit_of, si=si)
     if cure := unit_cure(unit, si, fits=fits, known=dimension.powers):
         return f"{what}; {cure}"

@@ -434,6 +434,9 @@ def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
 def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
     """Return the limits of [decision] by the name of their peak, each with its verdict.
 
+    Args:
+        parts: Numbers of the results.
+
     Returns:
         Limit in the SI unit of the peak, and "yes", "no", "can be" or "undecided" on whether it is
         exceeded, in the order of the case. Empty without this question.
