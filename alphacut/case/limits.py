@@ -253,7 +253,7 @@ class QuestionSection(Section):
         # The output need not be observed by the structure: limited peaks are computed anyway.
         structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
         with _naming(key):
-            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
+            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)  # of any outputs
         return limits
 
     def require_answerable(self, structure: Structure) -> None:

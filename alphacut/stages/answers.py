@@ -161,7 +161,8 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
     """Return the answer to [fragility]: the fraction of records that exceed limits, over intensity.
 
     Args:
-        section: Its limits and the intensity measure.
+        section: Its limits, the intensity measure, and `independent`, whether the records count as
+            independent draws, which gives limits of 95 % confidence.
         response: The peaks under each record in `suite` and, of a frame that yields, `increments`.
         _: Progress, which is not reported: all responses are known.
 
@@ -174,7 +175,7 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
         raise RefusedError("fragility", "without records", "a section [records]")
     return fragility_of(
         linear,
-        limits_by_name(section.limits_of(response.structure), ()),
+        limits_by_name(section.limits_of(response.structure), ()),  # of any outputs
         intensity=section.measure,
         independent=section.independent,
         alpha=response.task.section.alpha,
