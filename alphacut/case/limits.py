@@ -60,6 +60,9 @@ class CaseLimit:
     def limit(self, structure: Structure, key: str) -> Limit:
         """Return the limit in the SI unit of its output, as `alphacut.frame` takes it.
 
+        The side is "max", "min" or "mean", or empty if the magnitude of the output is limited; the
+        text is the whole limit as the case states it, such as "max q3 <= 80 mm".
+
         Args:
             structure: Structure with the output. Heights and weight are taken from it.
             key: Key of the limits in the case, for messages.
@@ -80,8 +83,8 @@ class CaseLimit:
     def value_in_si(self, structure: Structure, key: str) -> float:
         """Return the limit in the SI unit of its output.
 
-        A relative limit of a base shear is a fraction of the weight of all floors; any other one is
-        a fraction of the height of the storey.
+        If the limit is relative, as "drift1 <= 1 %", its `value` is a fraction: of a base shear,
+        that of the weight of all floors; of any other output, that of the height of the storey.
 
         Args:
             structure: The structure, for its weight, heights and the units of its outputs.

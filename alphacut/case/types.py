@@ -127,7 +127,8 @@ class Quantity:
         """Return the allowed values in words, such as 'a length above 0, as "2 m"'.
 
         The words are the dimension or "whole number", then each finite bound of the range in SI
-        units, and an example with a unit if there is one.
+        units, and an example with a unit if there is one. The bounds `above` and `below` are not
+        allowed values themselves, `minimum` and `maximum` are.
         """
         dimension = QUANTITIES[self.si]
         words = dimension.name
@@ -157,7 +158,7 @@ class Quantity:
 
         Raises:
             RefusedError: The value is no such quantity, or it leaves the range at either end of its
-                support.
+                support. The hint of the quantity, `cure`, is part of the message if it has one.
         """
         try:
             number = self._parsed(value)

@@ -196,6 +196,8 @@ class Figures:
     def take(self, name: str) -> Picture | None:
         """Return a figure by its name, and forget it, so that `others` leaves it out.
 
+        The name is removed from `paths`, which has the files of all figures that are left.
+
         Returns:
             Caption and content; None if the run has no such figure, it was taken before, or its
             file is missing or damaged, of which a warning is printed.
