@@ -441,7 +441,9 @@ def _require_material(content: Content) -> ImageStudy | None:
         fits = all(content.image_cell.is_solid) or not has_motion
         cure = "give a pore a small modulus, a rigid phase a large one, or take stage modulus alone"
         require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
-        return image.study_of(content.image_cell)
+        study = image.study_of(content.image_cell)
+        study.require_solid(content.modulus.alpha)
+        return study
     if "microstructure" not in content.stages:
         problem = CellProblem.of(content)
         problem.require_mesh()

@@ -157,7 +157,7 @@ class ModuliImages:
             beside a rigid phase: there is no upper bound.
 
         Raises:
-            ValueError: No modulus is positive and finite.
+            RefusedError: No modulus is positive and finite.
         """
         moduli = self.lower if stress else self.upper
         if not stress and np.isinf(moduli).any():
@@ -166,6 +166,8 @@ class ModuliImages:
         for k in range(len(moduli)):
             values = moduli[k]
             finite = values[(values > 0) & np.isfinite(values)]
+            allowed = "some phase that cannot be a pore or rigid"
+            require(finite.size > 0, "modulus of the phases", "0 or infinite throughout", allowed)
             clipped[k] = np.minimum(values, 1e4 * finite.max())
             if not stress:
                 clipped[k] = np.maximum(clipped[k], 1e-6 * finite.min())

@@ -197,6 +197,22 @@ class ImageStudy:
         axes = "pixels (y, x)" if len(shape) == 2 else "voxels (z, y, x)"
         return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
 
+    def require_solid(self, alpha: Sequence[float]) -> None:
+        """Check that at each level some phase is neither a pore nor rigid by its lower end.
+
+        Args:
+            alpha: The α-levels that are solved.
+
+        Raises:
+            RefusedError: There is no such phase. Pores and rigid phases alone have no energy that
+                could be bounded.
+        """
+        for level in alpha:
+            is_solid = any(0 < phase.modulus.cut(level).lower < RIGID for phase in self.phases)
+            what = f"0 or infinite at α = {level:g} in every phase"
+            allowed = f"a phase whose lower end there is above 0 and below {RIGID:g} Pa"
+            require(is_solid, "modulus of the phases", what, allowed)
+
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Return the lower and upper moduli of each pixel or voxel at given α-levels.
 
@@ -281,9 +297,9 @@ def image_study(
         for nominal values, to the lowest and highest phase of each pixel.
 
     Raises:
-        RefusedError: A phase lacks a modulus or has another key, none has a modulus between 0 and
-            rigid, thresholds and labels are both or neither given, one does not fit the image,
-            noise leaves too much of a picture open at the thresholds, or its sides are too unlike.
+        RefusedError: A phase lacks a modulus or has another key, thresholds and labels are both or
+            neither given, one does not fit the image, noise leaves too much of a picture open at
+            the thresholds, or its sides are too unlike.
     """
     ImageModel(image.sides)  # refuses sides too unlike
     count = len(labels) or len(thresholds) + 1
@@ -291,11 +307,6 @@ def image_study(
     require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
     require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
     listed = tuple(x if isinstance(x, ImagePhase) else ImagePhase.of(x) for x in phases)
-    # Pores and rigid phases alone have no energy that could be bounded.
-    is_solid = any(0 < phase.modulus.support.lower < RIGID for phase in listed)
-    what = "0 or infinite at a level in every phase"
-    allowed = f"a phase whose lower ends are above 0 and below {RIGID:g} Pa"
-    require(is_solid, "modulus of the phases", what, allowed)
     if labels:
         return _labelled_study(image, listed, labels)
 
@@ -564,12 +575,13 @@ def solve_study(
         pixel.
 
     Raises:
-        RefusedError: A value is not allowed, only some phases have loss factors, or the image does
-            not fit into memory.
+        RefusedError: A value is not allowed, all phases are pores or rigid at a level, only
+            some have loss factors, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
     start = perf_counter()
+    study.require_solid(alpha)
     model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     solution = model.solve(nominal)

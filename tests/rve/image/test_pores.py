@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.base.errors import RefusedError
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import Interval, Triangular
 from alphacut.rve.image.fields.element import element_of, stress_derivatives
 from alphacut.rve.image.fields.energy import modes_of
 from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
@@ -203,6 +203,18 @@ def test_an_image_that_may_be_void_throughout_is_refused():
     phase = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
     with pytest.raises(RefusedError, match="modulus of the phases is 0"):
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
+    found = fuzzy_image_stiffness(
+        image, [phase, phase], labels=(0, 1), alpha=(0.5, 1.0), progress=False
+    )
+    assert found.young[0] == pytest.approx([0.5e9, 1.5e9], rel=1e-3)
+
+
+def test_an_image_of_pores_and_what_may_be_rigid_is_refused():
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
+    pore = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
+    rigid = {"modulus": Interval(1e9, 1e18), "poisson": 0.3}
+    with pytest.raises(RefusedError, match="modulus of the phases is 0 or infinite throughout"):
+        fuzzy_image_stiffness(image, [pore, rigid], labels=(0, 1), progress=False)
 
 
 def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
