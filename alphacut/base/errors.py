@@ -271,9 +271,13 @@ def require_numbers(name: str, values: object) -> None:
 
 
 def require_sequence(key: str, values: object, allowed: str) -> None:
-    """Raise RefusedError unless `values` is a list, a tuple or an array with an axis."""
+    """Raise RefusedError unless `values` is a list, a tuple or an array with an axis.
+
+    A column of pandas is an array here: like those of NumPy it says how many axes it has.
+    """
     is_list = isinstance(values, Sequence) and not isinstance(values, str)
-    is_array = isinstance(values, np.ndarray) and values.ndim > 0
+    axes = getattr(values, "ndim", 0)
+    is_array = is_number(axes) and axes > 0
     cure = "put a single value into brackets"
     require(is_list or is_array, key, value=type(values).__name__, allowed=allowed, cure=cure)
 

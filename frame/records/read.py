@@ -106,7 +106,8 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         value = "without the head that files of this name begin with"
         cure = 'load it anew; numbers alone have records.step = "0.005 s" and records.unit = "g"'
         # A file of these names that is numbers alone has lost its head, and with it unit and step.
-        lost_head = is_named and begins_with_number and not is_described
+        # Who states the unit knows that; beside times the step is not needed.
+        lost_head = is_named and begins_with_number and not (unit or channel)
         require(not lost_head, path.name, value, allowed, cure)
         return read_table(file, step, unit, channel)
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):

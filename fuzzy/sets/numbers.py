@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import checked_number, require, require_sequence
+from alphacut.base.errors import RefusedError, checked_number, require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,11 +144,15 @@ def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
     """Return levels as a tuple of floats.
 
     Raises:
-        RefusedError: It is no list, tuple or array, there is no level, or they do not rise strictly
-            within [0, 1].
+        RefusedError: It is a single value, there is no level, or they do not rise strictly within
+            [0, 1].
     """
-    require_sequence("alpha", alpha, "a list of levels, as levels(4)")
-    levels = tuple(map(checked_level, alpha))
+    try:
+        given = tuple(alpha)
+    except TypeError:
+        cure = "put a single value into brackets"
+        raise RefusedError("alpha", alpha, "a list of levels, as levels(4)", cure) from None
+    levels = tuple(map(checked_level, given))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
     require(ordered, "alpha", value=list(levels), allowed="levels that rise within [0, 1]")
     return levels

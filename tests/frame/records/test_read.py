@@ -125,6 +125,8 @@ def test_a_file_named_as_a_format_without_its_head_is_told_so(tmp_path):
     with pytest.raises(RefusedError, match="without the head that files of this name begin with"):
         read_recording(path)
     assert len(read_recording(path, step=0.02, unit="g").samples) == len(written.samples())
+    two = saved(tmp_path, written.csv_text(mark=" ").partition("\n")[2], "record.at2")
+    assert len(read_recording(two, unit="g").samples) == len(written.samples())
 
 
 def test_what_is_unusual_is_said(tmp_path):

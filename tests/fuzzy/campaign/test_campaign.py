@@ -50,7 +50,7 @@ def run(function=model, method=None, **options):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"alpha": 5}, "alpha is int; allowed: a list of levels"),
+        ({"alpha": 5}, "alpha is 5; allowed: a list of levels"),
         ({"knowledge": {"a": 1}}, "knowledge is .*; allowed: facts"),
         ({"store": 3, "identity": {"version": 1}}, "store is 3; allowed: the path"),
     ],

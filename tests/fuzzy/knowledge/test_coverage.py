@@ -1,6 +1,7 @@
 """Fuzzy numbers from data hold what they claim, as often as they say."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,6 +10,7 @@ from scipy import stats
 from alphacut.fuzzy import RefusedError, from_data
 from alphacut.fuzzy.knowledge.from_data import from_scatter
 from alphacut.fuzzy.knowledge.order_statistics import windows
+from alphacut.fuzzy.sets.numbers import checked_levels
 from benchmarks.fuzzy.coverage import LAWS, held, ways
 
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
@@ -87,6 +89,14 @@ def test_truth_values_pairs_and_numbers_beyond_floats_are_no_measurements(values
 def test_what_has_no_order_is_no_list_of_measurements(values):
     with pytest.raises(RefusedError, match=r"values is .*; allowed: a list"):
         from_data(values, "next value")
+
+
+def test_a_column_of_pandas_is_a_list_of_measurements_and_of_levels():
+    column = pd.DataFrame({"E": [3.0, 1.0, 2.0]})["E"]
+    number = from_data(column, "median", bounds=(0, 9))
+    assert number.cut(0.75) == from_data([1.0, 2.0, 3.0], "median", bounds=(0, 9)).cut(0.75)
+    assert checked_levels(column.sort_values() / 3) == (1 / 3, 2 / 3, 1.0)
+    assert checked_levels(k / 2 for k in range(3)) == (0.0, 0.5, 1.0)
 
 
 @pytest.mark.parametrize("bounds", [5, (1,), (0, 3, 9), (3, 0)])
