@@ -27,6 +27,7 @@ from typing import (
 )
 
 import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -137,7 +138,8 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
     if origin is Literal:
         _require(document in arguments, document, path)
         return document
-    if origin is np.ndarray:
+    # Of NDArray[…] the origin is NDArray itself from NumPy 2.5 on, and np.ndarray before.
+    if origin in (np.ndarray, NDArray):
         # null becomes NaN; lists of different lengths, and texts, raise ValueError
         return _checked(lambda rows: np.array(rows, float), document, path)
     if issubclass(origin, Mapping):

@@ -105,7 +105,8 @@ def sources() -> set[str]:
         prefix + path.relative_to(ROOT).as_posix()
         for name, prefix in folders.items()
         for path in (ROOT / name).rglob("*")
-        if path.suffix in {".py", ".html", ".css", ".js", ".toml"} or path.name == "py.typed"
+        if path.suffix in {".py", ".html", ".css", ".js", ".toml", ".mplstyle"}
+        or path.name == "py.typed"
     }
 
 
