@@ -11,6 +11,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.extras import extra_named
 from alphacut.base.nature import Nature as Nature
 from alphacut.base.nature import rounded as rounded
 from alphacut.fuzzy.knowledge.joint import JointClaim
@@ -426,7 +427,8 @@ class Bounds:
         evaluations, seconds, basis, and encloses where it is not empty: the name of the set that
         the box of the inputs encloses.
         """
-        import xarray
+        with extra_named():
+            import xarray
 
         time = {} if self.time is None else {"time": self.time}
         axes = {"alpha": self.alpha, **time, "output": list(self.outputs)}

@@ -13,12 +13,12 @@ from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from typing import Any
 
-import cffi
 import numpy as np
 import scipy.sparse as sp
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
+from alphacut.base.extras import extra_named
 from alphacut.rve.interruption import uninterrupted
 
 if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of others after it
@@ -50,7 +50,8 @@ def _without_numba() -> Iterator[None]:
             del sys.modules["numba"]
 
 
-with uninterrupted(), _without_numba():
+with uninterrupted(), _without_numba(), extra_named():
+    import cffi
     import petsc4py  # after MPI, and before DOLFINx: its wheels need that
     from mpi4py import MPI
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.extras import extra_named
 from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
@@ -228,7 +229,8 @@ class FuzzyStiffness:
             and `curve11`, their stresses σ11 over θ, shape (sample, theta), whose attribute
             "relative_error" is the error of a stress at a single θ.
         """
-        import xarray
+        with extra_named():
+            import xarray
 
         bounds = self.bounds
         assert bounds.samples is not None

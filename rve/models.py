@@ -30,7 +30,7 @@ class ModelEntry:
     needs_isotropy: bool = False
 
     def load(self) -> type[CellModel]:
-        """Return the class; ImportError where DOLFINx is needed and missing."""
+        """Return the class; MissingLibraryError where DOLFINx is needed and missing."""
         found: type[CellModel] = getattr(import_module(f"alphacut.rve.{self.module}"), self.kind)
         return found
 

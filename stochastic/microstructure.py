@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.base.errors import require, require_numbers
+from alphacut.base.extras import extra_named
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
@@ -244,9 +245,10 @@ class FittedRadiusMap:
             p-box of the fuzzy slopes, and "fitted" of the map at the nominal slopes.
 
         Raises:
-            ImportError: xarray is not installed.
+            MissingLibraryError: xarray is not installed.
         """
-        import xarray
+        with extra_named():
+            import xarray
 
         fit = self.pbox.fit
         radius = np.linspace(fit.a1, fit.a3, 501)

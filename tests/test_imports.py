@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.base.extras import EXTRAS
 from tests.environment.house import ROOT, folder_of_package, top_folder, trees
 
 MAY_IMPORT = {
@@ -19,21 +20,8 @@ MAY_IMPORT = {
     "frame": {"base", "fuzzy", "stochastic"},
     "alphacut": {"base", "fuzzy", "stochastic", "rve", "frame"},
 }
-HEAVY = {
-    "dolfinx",
-    "petsc4py",
-    "mpi4py",
-    "basix",
-    "ufl",
-    "gmsh",
-    "pyvista",
-    "matplotlib",
-    "xarray",
-    "pandas",
-    "sklearn",
-    "skimage",
-    "scipy.stats",
-}
+HEAVY = {"pyvista", "sklearn", "scipy.stats"}.union(*EXTRAS.values())
+"""What takes long to import, and what pip installs only with an extra."""
 
 
 def package_of(module: str) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from alphacut.base.array_files import DEFLATE_RATIO
 from alphacut.base.errors import require
+from alphacut.base.extras import extra_named
 from alphacut.base.memory import require_free_memory
 
 if TYPE_CHECKING:
@@ -49,7 +50,8 @@ def opened_picture(path: Path) -> Iterator[Image]:
     # memory of a pixel while it is read: Pillow's four bytes, a copy of them, and a float
     bytes_per_pixel = 16
 
-    from PIL import Image
+    with extra_named(path.name):
+        from PIL import Image
 
     # Pillow's own limit, 179 million pixels of any file, is too low for some good pictures and too
     # high for small files; the size is checked here.

@@ -6,12 +6,14 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, NoReturn, TextIO
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
-from alphacut.case.cell import CellContent
 from alphacut.io.files import as_json, suggestion
+
+if TYPE_CHECKING:
+    from alphacut.case.cell import CellContent
 
 PETSC_PREFIX = "-rve_"
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from pydantic_core import to_json
 
 from alphacut.base.errors import RefusedError, printable, require
+from alphacut.base.extras import MissingLibraryError, install_command
 from alphacut.base.kept_files import is_special
 
 INSIDE = "ALPHACUT_INSIDE"
@@ -48,7 +48,10 @@ def _first_variable(names: Iterable[str], *, default: int) -> int:
 
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
     """Return a document as JSON, ending in a line feed; numbers that are not finite become null."""
-    # Python's own `json` writes NaN, which no other program reads.
+    # Python's own `json` writes NaN, which no other program reads. Imported here so that `missing`
+    # can be called where Pydantic is not installed.
+    from pydantic_core import to_json
+
     content = to_json(document, indent=indent, inf_nan_mode="null", fallback=_plain)
     return content.decode() + "\n"
 
@@ -171,19 +174,17 @@ def missing(error: ImportError) -> str:
     """Return the message about an import that failed: what is missing, and how to install it.
 
     Libraries of the optional dependencies of this project, such as dolfinx, are installed by their
-    extra, as pip install '.[cell]'. Others are named alone.
+    extra, as pip install 'alphacut[cell]'. Others are named alone.
 
     Args:
         error: The exception of the import. Its name may be that of a module of the library, or
             None where a library has raised the error itself.
     """
-    of_cell = "dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py"
-    extras = {"skimage": "particles", **dict.fromkeys(of_cell, "cell")}
-    library = (error.name or "what is missing").partition(".")[0]
-    cure = f"install {library}"
-    if library in extras:
-        cure = f"pip install '.[{extras[library]}]'"
+    message = str(error)
+    if not isinstance(error, MissingLibraryError):  # which says how to install it
+        library = (error.name or "what is missing").partition(".")[0]
+        message += f"; {install_command(library)}"
     # ./enter, which sets this variable, brings an environment with all libraries.
     if not os.environ.get(INSIDE):
-        cure += ", or run inside ./enter"
-    return f"{error}; {cure}"
+        message += ", or run inside ./enter"
+    return message

@@ -17,7 +17,6 @@ from pathlib import Path
 from types import FunctionType
 
 import numpy as np
-from pydantic import BaseModel
 
 from alphacut.base.kept_files import digest_of
 from alphacut.io.files import INSIDE
@@ -115,6 +114,8 @@ def _canonical(value: object) -> object:
     the file, without the folder; of any other object its text. Fields are not converted here: the
     caller, `json.dumps`, asks again for each.
     """
+    from pydantic import BaseModel  # not above: entry.py must run to say that it is missing
+
     if isinstance(value, BaseModel):
         return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]
     if is_dataclass(value) and not isinstance(value, type):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from alphacut.base.csv_text import csv_text
+from alphacut.base.extras import extra_named
 from alphacut.base.nature import Nature
 from alphacut.base.number_text import Table, text_table
 from alphacut.fuzzy.result import of_enclosing_box
@@ -89,7 +90,8 @@ class Answer(ABC):
         its explaining sentences are the attributes "title" and "notes". Without rows the dataset
         has no variables.
         """
-        import xarray
+        with extra_named():
+            import xarray
 
         rows = self.records()
         variables = {}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.extras import extra_named
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.geonet import is_geonet, read_geonet
 from alphacut.frame.records.networks import FORMATS
@@ -156,11 +157,8 @@ def _read_waveform(
         RefusedError: ObsPy is not installed or cannot read the file, there is no such channel or it
             has gaps, the unit is missing, or the samples do not fit the peak in the head.
     """
-    try:
+    with extra_named(f"{name}, miniSEED or SAC"):
         import obspy
-    except ImportError:
-        cure = "pip install 'alphacut[obspy]'"
-        raise RefusedError(name, "miniSEED or SAC", "with obspy", cure) from None
     try:
         # ObsPy is told the format, since to find one it loads pickles, which are programs. It is
         # handed the content, since of names it unpacks archives and follows patterns.

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.base.extras import extra_named
 from alphacut.frame.structures.model import Dynamics, StructureModel
 from alphacut.frame.structures.quantities import Output, require_names
 
@@ -150,7 +151,8 @@ class Equations:
     """
 
     def __init__(self, system: LagrangianSystem) -> None:
-        import sympy
+        with extra_named():
+            import sympy
 
         n = system.coordinates
         q = sympy.Matrix(sympy.symbols(f"q:{n}", real=True))

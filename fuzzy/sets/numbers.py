@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.base.extras import extra_named
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,7 +130,8 @@ class FuzzyNumber(ABC):
 
 def new_axes() -> Axes:
     """Axes of a new figure of Matplotlib, which is imported now."""
-    import matplotlib.pyplot as plt
+    with extra_named():
+        import matplotlib.pyplot as plt
 
     axes: Axes = plt.subplots()[1]
     return axes

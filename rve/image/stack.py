@@ -11,7 +11,8 @@ import numpy as np
 
 from alphacut.base.array_files import DEFLATE_RATIO
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require
+from alphacut.base.errors import require
+from alphacut.base.extras import extra_named
 from alphacut.base.memory import require_free_memory
 from alphacut.base.pictures import LZW_RATIO, opened_picture
 from alphacut.rve.image.memory import require_memory
@@ -38,11 +39,8 @@ def read_stack(path: Path, sides: Sequence[float]) -> Array:
             in a way that is not read.
         Exception: What tifffile raises of a damaged file, of many kinds.
     """
-    try:
+    with extra_named(path.name, "save the volume as .npy"):
         import tifffile
-    except ImportError:
-        cure = "install tifffile, or save the volume as .npy"
-        raise RefusedError(path.name, "a TIFF stack", "no stack without tifffile", cure) from None
     with tifffile.TiffFile(path) as file:
         return _read_file(path, file, sides)
 

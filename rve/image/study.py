@@ -19,6 +19,7 @@ from alphacut.base.array_files import read_npy
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.csv_text import csv_text
 from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.extras import extra_named
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Nature, rounded
@@ -480,7 +481,8 @@ class FuzzyImageStiffness:
             "nature" (the guarantee), "lengths" (sides of a pixel in m along its axes) and "phases"
             (their names).
         """
-        import xarray
+        with extra_named():
+            import xarray
 
         stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in self.cuts])
         grid = ("z", "y", "x")[-self.phase.ndim :]

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.extras import extra_named
 from alphacut.base.user_cache import cached_arrays
 from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
 from alphacut.rve.interruption import uninterrupted
@@ -88,7 +89,7 @@ def triangles(
         spline.
 
     Raises:
-        ImportError: Gmsh is not installed, and the mesh is not in the cache.
+        MissingLibraryError: Gmsh is not installed, and the mesh is not in the cache.
         Exception: Whatever Gmsh raises if it cannot mesh the square.
     """
     gradings: list[Sizes] = []
@@ -222,9 +223,10 @@ def open_gmsh() -> Iterator[Any]:
         The module `gmsh`, initialised.
 
     Raises:
-        ImportError: Gmsh is not installed.
+        MissingLibraryError: Gmsh is not installed.
     """
-    import gmsh
+    with extra_named():
+        import gmsh
 
     # Gmsh loses exceptions of functions that it calls, KeyboardInterrupt among them.
     with uninterrupted(second_ends=True):

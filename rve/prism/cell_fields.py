@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
+from alphacut.base.extras import extra_named
 from alphacut.rve.mesh.file import write
 
 
@@ -61,7 +62,8 @@ class CellFields:
             raise RefusedError("file", str(path), f"names that end in {', '.join(formats)}")
         if kind == "gmsh":
             return self._write_gmsh(path)
-        import meshio
+        with extra_named():
+            import meshio
 
         fine = self.in_tetrahedra()
         mesh = meshio.Mesh(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
+from alphacut.base.extras import extra_named
 from alphacut.base.pictures import opened_picture
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
@@ -146,7 +147,8 @@ def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
             area is in pieces that are not round: with less area than a circle of 4 pixels radius,
             or filling less than 90 % of their convex hull.
     """
-    from skimage import measure
+    with extra_named(name):
+        from skimage import measure
 
     phase = _particle_mask(picture, name)
     rows, columns = phase.shape

@@ -3,10 +3,12 @@
 import ast
 import re
 import sys
+import tomllib
 from importlib.util import find_spec
 from pathlib import Path
 
-from tests.environment.house import FOLDERS, ROOT, trees
+from alphacut.base.extras import EXTRAS
+from tests.environment.house import FOLDERS, PACKAGES, ROOT, files_in, trees
 
 SAME = (
     "distributed dolfinx gmsh hypothesis jinja2 matplotlib meshio mpi4py numba numpy pint "
@@ -50,6 +52,16 @@ FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
     "openseespylinux": "benchmarks/frame/opensees.py",
 }
 
+IN_WHEELS = dict.fromkeys(
+    ("basix", "cffi", "dolfinx", "mpi4py", "petsc4py", "ufl"), "dolfinx-solver-real"
+) | {
+    "PIL": "pillow",
+    "cupy": "cupy-cuda13x",
+    "pydantic_core": "pydantic",
+    "skimage": "scikit-image",
+}
+"""Distributions at PyPI, or those that depend on them, whose names are not those of the imports."""
+
 
 def imports_of(tree: ast.Module) -> set[str]:
     """Top-level names that a file imports, by statement or by a name given to pytest or importlib."""
@@ -68,9 +80,10 @@ def imports_of(tree: ast.Module) -> set[str]:
     return {name.partition(".")[0] for name in found}
 
 
-def foreign_imports() -> set[str]:
-    """Names that the files of the project import and that neither it nor Python has."""
-    names = set().union(*map(imports_of, trees().values()))
+def foreign_imports(*folders: str) -> set[str]:
+    """Names that files of the project, or of folders, import and that neither it nor Python has."""
+    files = files_in(*folders) if folders else trees()
+    names = set().union(*(imports_of(trees()[file]) for file in files))
     return names - sys.stdlib_module_names - set(FOLDERS) - LOCAL
 
 
@@ -97,3 +110,19 @@ def test_the_environment_has_all_outside_the_home_folder():
         spec = find_spec(name)
         assert spec, name
         assert not Path(spec.origin or Path.home()).is_relative_to(Path.home()), name
+
+
+def names_of(requirements: list[str]) -> set[str]:
+    """Names of distributions without their versions."""
+    return {re.split("[<>=]", requirement.replace("-", "_"))[0] for requirement in requirements}
+
+
+def test_pip_brings_what_the_packages_import():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    assert set(EXTRAS) == set(extras) - {"test"}
+    for extra, libraries in EXTRAS.items():
+        wheels = {IN_WHEELS.get(library, library).replace("-", "_") for library in libraries}
+        assert wheels == names_of(extras[extra]), extra
+    always = names_of(project["dependencies"])
+    assert foreign_imports(*PACKAGES) <= always.union(*EXTRAS.values())

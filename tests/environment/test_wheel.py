@@ -93,8 +93,8 @@ def wheel(venv, archive):
 
 @pytest.fixture(scope="module")
 def installed(venv, wheel):
-    """The virtual environment with the wheel in it."""
-    venv.run("pip", "install", "--quiet", wheel)
+    """The virtual environment with the wheel in it, and what cases need."""
+    venv.run("pip", "install", "--quiet", f"{wheel}[cases]")
     return venv
 
 
@@ -130,13 +130,37 @@ def test_the_archive_holds_what_tests_need(archive):
         assert name in files
 
 
+def readme_blocks() -> list[str]:
+    """README's programs: an envelope, and a function of one's own."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    return re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+
+
+def test_without_an_extra_frames_and_functions_work_and_other_doors_name_theirs(wheel, tmp_path):
+    venv = Venv(tmp_path / "bare")
+    venv.run("pip", "install", "--quiet", wheel)
+    listed = json.loads(venv.run("pip", "list", "--format=json"))
+    names = {package["name"].lower() for package in listed} - {"pip", "alphacut"}
+    assert {"numpy", "scipy", "numba", "joblib", "threadpoolctl"} <= names
+    assert not {"sympy", "xarray", "pandas", "pydantic", "matplotlib", "pillow"} & names
+    assert len(names) <= 10
+    envelope, function = readme_blocks()
+    assert venv.run("python", "-c", envelope).startswith("bounds guaranteed")
+    assert venv.run("python", "-c", function).startswith("bounds estimated")
+    message = venv.run(
+        "python", "-c", f"{function}\npropagate(deflection, inputs).to_dataset()", status=1
+    )
+    assert message.endswith("xarray is missing; pip install 'alphacut[cases]'\n")
+    message = venv.run("alphacut", "check", ROOT / "cases/paper.toml", status=1)
+    assert len(message.splitlines()) == 1
+    assert "pip install 'alphacut[cases]'" in message
+
+
 def works(venv: Venv, folder: Path) -> None:
     """README's ten lines, a series cell, an envelope, a report; no class exists twice."""
     shutil.copytree(ROOT / "cases", folder / "cases")
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    lines = re.search(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    assert lines
-    assert venv.run("python", "-c", lines[1], cwd=folder).startswith("bounds guaranteed")
+    envelope, _ = readme_blocks()
+    assert venv.run("python", "-c", envelope, cwd=folder).startswith("bounds guaranteed")
     case = "cases/paper.toml"
     cell = venv.run("alphacut", "cell", case, "--method=series", "--json=-", cwd=folder)
     assert 22 < json.loads(cell)["E_GPa"] < 26
@@ -172,4 +196,4 @@ def test_one_line_says_what_is_missing(installed, tmp_path):
     words = ("cell", "cases/paper.toml", "--method=prism")
     message = installed.run("alphacut", *words, cwd=tmp_path, status=2)
     assert len(message.splitlines()) == 1
-    assert "pip install '.[cell]'" in message
+    assert "pip install 'alphacut[cell]'" in message

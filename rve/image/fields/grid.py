@@ -17,6 +17,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.extras import install_command
 from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.kernels import apply_by_rows
 
@@ -59,7 +60,7 @@ def device_array(device: str) -> Callable[[Array], Fields]:
     if device == "cpu":
         return np.asarray
     require(device == "cuda", "device", value=device, allowed="cpu or cuda")
-    cure = "take cpu, or install cupy and array-api-compat where an NVIDIA device is"
+    cure = f"take cpu, or {install_command('cupy')} where an NVIDIA device is"
     try:
         import array_api_compat  # noqa: F401  # `namespace` needs it
         import cupy

@@ -1,13 +1,18 @@
 """Messages: one line of at most 300 characters, the cure whole; odd values name what is allowed."""
 
+import pickle
+import sys
+
 import numpy as np
 import pytest
 
 from alphacut.base.errors import checked_number
+from alphacut.base.extras import MissingLibraryError
 from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
-from alphacut.fuzzy import Crisp, FailedError, General, RefusedError, propagate
+from alphacut.fuzzy import Crisp, FailedError, General, Interval, RefusedError, propagate
 from alphacut.io.files import missing
+from alphacut.rve import read_image
 from tests.alphacut.small import FRAME, written
 
 CURE = "take it from the head of the file"
@@ -28,10 +33,30 @@ def test_value_and_allowed_are_cut_and_never_the_cure():
 def test_a_missing_package_is_named_with_its_cure_here(monkeypatch):
     error = ImportError("No module named 'skimage'", name="skimage.measure")
     monkeypatch.setenv("ALPHACUT_INSIDE", "1")
-    assert missing(error) == f"{error}; pip install '.[particles]'"
+    assert missing(error) == f"{error}; pip install 'alphacut[particles]'"
     assert missing(ImportError("no backend")) == "no backend; install what is missing"
     monkeypatch.delenv("ALPHACUT_INSIDE")
-    assert missing(error).endswith(", or run inside ./enter")
+    assert missing(error).endswith("'alphacut[particles]', or run inside ./enter")
+
+
+def test_a_missing_package_is_refused_once_and_by_the_extra_that_brings_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.setenv("ALPHACUT_INSIDE", "1")
+    bounds = propagate(lambda x: 2 * x, {"x": Interval(1.0, 2.0)})
+    with pytest.raises(MissingLibraryError) as refused:
+        bounds.to_dataset()
+    assert isinstance(refused.value, RefusedError)
+    assert str(refused.value) == "xarray is missing; pip install 'alphacut[cases]'"
+    assert missing(refused.value) == str(refused.value)
+    assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+
+
+def test_a_missing_package_names_the_file_that_needs_it(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "tifffile", None)
+    with pytest.raises(RefusedError) as refused:
+        read_image(tmp_path / "a.tif", spacing=[1e-6] * 3)
+    cure = "pip install 'alphacut[volumes]', or save the volume as .npy"
+    assert str(refused.value) == f"a.tif: tifffile is missing; {cure}"
 
 
 @pytest.mark.parametrize("digits", ["9" * 6000, "0x" + "f" * 6000])
