@@ -28,7 +28,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
-from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
+from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule, widest_cut
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
 
@@ -102,13 +102,6 @@ def identify(
         lower = np.maximum(lower * (1 - 4e-16), prior_lower)
         upper = np.minimum(upper * (1 + 4e-16), prior_upper)
     return Identified(evidence, levels, lower, upper, empty)
-
-
-def widest_cut(number: FuzzyNumber) -> Cut:
-    """Return the support of a number, or the widest cut that a claim determines."""
-    if isinstance(number, ClaimedNumber):
-        return number.cut(number.decided)
-    return number.support
 
 
 @dataclass(frozen=True, eq=False)

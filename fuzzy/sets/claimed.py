@@ -129,3 +129,10 @@ class ClaimedNumber(FuzzyNumber):
         return f"{type(self).__name__}({self.claim.about}: {ends})"
 
     __repr__ = __str__
+
+
+def widest_cut(number: FuzzyNumber) -> Cut:
+    """Return the support of a number, or the widest cut that a claim determines."""
+    if isinstance(number, ClaimedNumber):
+        return number.cut(number.decided)
+    return number.support

@@ -23,6 +23,7 @@ from alphacut.base.extras import extra_named
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Nature, rounded
+from alphacut.fuzzy.sets.claimed import widest_cut
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -146,7 +147,7 @@ class ImagePhase:
         for name in ("modulus", "poisson"):
             require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
         if "loss" in numbers:
-            low = numbers["loss"].support.lower
+            low = widest_cut(numbers["loss"]).lower
             require(low >= 0, "loss of a phase", f"from {low:g}", "loss factors of 0 or more")
         return cls(**numbers)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.base.errors import RefusedError
-from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy import Interval, Triangular, from_data
 from alphacut.rve.image.fields.element import element_of, stress_derivatives
 from alphacut.rve.image.fields.energy import modes_of
 from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
@@ -222,3 +222,13 @@ def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
     phase = {"modulus": 1e9, "poisson": 0.3, "loss": Triangular(-0.01, 0.0, 0.05)}
     with pytest.raises(RefusedError, match=r"loss of a phase is from -0\.01"):
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
+
+
+def test_a_measured_loss_factor_is_taken_on_levels_that_its_values_decide():
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
+    loss = from_data([0.01, 0.015, 0.02, 0.03], "median")
+    phase = {"modulus": 1e9, "poisson": 0.3, "loss": loss}
+    found = fuzzy_image_stiffness(
+        image, [phase, phase], labels=(0, 1), alpha=(0.5, 1.0), progress=False
+    )
+    assert found.proved_losses["E"][0] == pytest.approx(loss.cut(0.5), rel=1e-6)
