@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, array_of_call
+from alphacut.base.errors import RefusedError, array_of_call, checked_number
 
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
@@ -37,11 +37,10 @@ class Ellipse:
         """Check the arguments.
 
         Raises:
-            RefusedError: `aspect` is outside [0.25, 4], or `turn` is not finite.
+            RefusedError: `aspect` is no number in [0.25, 4], or `turn` is no finite number.
         """
-        if not (0.25 <= self.aspect <= 4 and np.isfinite(self.turn)):
-            value = f"{self.aspect:g} turned by {self.turn:g}°"
-            raise RefusedError("aspect of the ellipse", value, "values in [0.25, 4]")
+        checked_number("aspect of the ellipse", self.aspect, least=0.25, most=4)
+        checked_number("turn of the ellipse", self.turn)
 
     def __call__(self, angle: Array) -> Array:
         """Return the distances over ρ at angles."""
