@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack, cast
 import numpy as np
 
 from alphacut.base.arrays import Array, on_one_blas_thread
-from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.errors import FailedError, checked_number, require, require_choice
 from alphacut.base.extras import extra_named
 from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
 from alphacut.fuzzy.plans.design import Plan
@@ -32,7 +32,7 @@ from alphacut.rve.result.engineering_constants import (
     engineering_constants,
 )
 from alphacut.rve.result.loss_factors import CONSTANTS, MAX_FIRST_ORDER, loss_factors
-from alphacut.rve.result.moduli import AVERAGES
+from alphacut.rve.result.moduli import AVERAGES, require_average
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.stochastic import RadiusMap, ThetaDistribution
@@ -309,6 +309,8 @@ def fuzzy_stiffness(
         CampaignError: Samples failed; the others are in the store.
         FailedError: A coarser model contradicts guaranteed bounds.
     """
+    if average is not None:
+        require_average(average)
     cell = FuzzyCell.of(radius, phases, inputs)
     alpha_levels = tuple(levels(4) if alpha is None else alpha)
     loss_cuts = cell.loss_cuts(alpha_levels)
@@ -395,15 +397,18 @@ class FuzzyCell:
             order, by `inputs` or else as the phase states, and empty if all are 0.
 
         Raises:
-            RefusedError: An input is no parameter of the radius or of a phase, a loss factor may be
-                negative, or there are not two phases without names.
+            RefusedError: An input is no parameter of the radius or of a phase, or no finite number,
+                a loss factor may be negative, or there are not two phases without names.
         """
         named = _named(phases)
         parameters = _parameters(radius, named)
         numbers: dict[str, FuzzyNumber] = {}
         for name, number in inputs.items():
             require_choice("input", name, parameters)
-            numbers[name] = number if isinstance(number, FuzzyNumber) else Crisp(float(number))
+            if isinstance(number, FuzzyNumber):
+                numbers[name] = number
+            else:
+                numbers[name] = Crisp(checked_number(name, number))
             low = numbers[name].support.lower
             is_allowed = low >= 0 or not name.endswith("_loss")
             require(is_allowed, name, value=f"from {low:g}", allowed="loss factors of 0 or more")

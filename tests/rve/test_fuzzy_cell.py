@@ -83,6 +83,17 @@ def test_an_input_that_is_no_parameter_is_refused(phases, name):
         fuzzy_stiffness(SeriesModel(), RADIUS, phases, {name: Interval(1, 2)}, progress=False)
 
 
+@pytest.mark.parametrize("value", ["1", None, np.nan])
+def test_an_input_that_is_no_number_is_refused_by_its_name(value):
+    with pytest.raises(RefusedError, match=r"a2 is .* finite numbers"):
+        fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, {"a2": value}, progress=False)
+
+
+def test_an_average_of_another_name_is_refused_before_samples_are_solved():
+    with pytest.raises(RefusedError, match="average is voigt; allowed: axes or isotropic"):
+        fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, INPUTS, average="voigt", progress=False)
+
+
 @pytest.mark.parametrize("loss", [-0.1, Triangular(-0.01, 0.0, 0.05)])
 def test_a_loss_factor_that_may_be_negative_is_refused(loss):
     with pytest.raises(RefusedError, match=r"matrix_loss is from -0.*0 or more"):
