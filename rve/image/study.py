@@ -11,19 +11,26 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from alphacut.base.array_files import read_npy
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.csv_text import csv_text
-from alphacut.base.errors import FailedError, require, require_choice
+from alphacut.base.errors import (
+    FailedError,
+    checked_number,
+    is_number,
+    require,
+    require_choice,
+)
 from alphacut.base.extras import extra_named
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.fuzzy.sets.claimed import widest_cut
+from alphacut.fuzzy.sets.numbers import checked_levels
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -91,14 +98,15 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
 
     Raises:
         RefusedError: The file is missing, none of these, damaged, too large for memory, or states
-            sides of other ratios; or `spacing` is not positive or of another number.
+            sides of other ratios; or a length of `spacing` is no positive, finite number, or there
+            are not as many as axes.
     """
     file = Path(path)
     # A TIFF file may be a picture or a stack of slices: three sides say that it is a volume.
-    lengths = (float(spacing),) if isinstance(spacing, float | int) else tuple(spacing)
+    stated = (spacing,) if is_number(spacing) else tuple(cast("Sequence[float]", spacing))
+    lengths = tuple(checked_number("spacing", length, positive=True) for length in stated)
     dimension = len(lengths) if len(lengths) > 1 else _dimension_of(file)
     require(len(lengths) in (1, dimension), "spacing", spacing, f"one length, or {dimension}")
-    require(min(lengths) > 0, "spacing", spacing, "positive lengths in m")
     if len(lengths) == 1:
         lengths *= dimension
     image_lengths = lengths[::-1]
@@ -107,8 +115,11 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
 
 
 def _dimension_of(file: Path) -> int:
-    """Return 2 for a picture and 3 for a volume."""
-    if file.suffix.lower() == ".npy":
+    """Return 2 for a picture and 3 for a volume, or for .npy the number of axes of the array.
+
+    It is 2 for a file that does not exist. RefusedError for a damaged .npy.
+    """
+    if file.suffix.lower() == ".npy" and file.is_file():
         return int(np.ndim(read_npy(file, kinds="buifc")))
     return 3 if file.is_dir() or file.suffix.lower() in HEADS else 2
 
@@ -137,13 +148,14 @@ class ImagePhase:
                 fuzzy number.
 
         Raises:
-            RefusedError: The mapping has another key, or lacks modulus or poisson, or the loss
-                factor may be negative. The other values are checked when the image is solved.
+            RefusedError: The mapping has another key, or lacks modulus or poisson, a value is no
+                finite number, or the loss factor may be negative. Whether modulus and poisson are
+                allowed is checked when the image is solved.
         """
         numbers = {}
         for name, value in values.items():
             require_choice("key of a phase", name, ("modulus", "poisson", "loss"))
-            numbers[name] = _as_fuzzy(value)
+            numbers[name] = _as_fuzzy(f"{name} of a phase", value)
         for name in ("modulus", "poisson"):
             require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
         if "loss" in numbers:
@@ -157,9 +169,9 @@ class ImagePhase:
         return self.modulus.support.lower > 0 and self.modulus.support.upper < RIGID
 
 
-def _as_fuzzy(value: FuzzyNumber | float) -> FuzzyNumber:
-    """Return a number as a fuzzy number."""
-    return value if isinstance(value, FuzzyNumber) else Crisp(float(value))
+def _as_fuzzy(key: str, value: FuzzyNumber | float) -> FuzzyNumber:
+    """Return a number as a fuzzy number; RefusedError, which names `key`, for what is no number."""
+    return value if isinstance(value, FuzzyNumber) else Crisp(checked_number(key, value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,8 +313,9 @@ def image_study(
     Raises:
         RefusedError: A phase lacks a modulus or has another key, thresholds and labels are both or
             neither given, one does not fit the image, noise leaves too much of a picture open at
-            the thresholds, or its sides are too unlike.
+            the thresholds, or its sides are not positive or too unlike.
     """
+    require(min(image.lengths) > 0, "lengths", image.lengths, "positive lengths in m")
     ImageModel(image.sides)  # refuses sides too unlike
     count = len(labels) or len(thresholds) + 1
     has_one = bool(labels) != bool(thresholds)
@@ -313,7 +326,7 @@ def image_study(
         return _labelled_study(image, listed, labels)
 
     grey = image.values
-    numbers = [_as_fuzzy(threshold) for threshold in thresholds]
+    numbers = [_as_fuzzy("threshold", threshold) for threshold in thresholds]
     require_phases(grey, [number.cut(0.0) for number in numbers])
     is_fuzzy = any(number.support.width > 0 for number in numbers)
     segmentation = None  # the noise of a volume is not judged
@@ -578,12 +591,14 @@ def solve_study(
         pixel.
 
     Raises:
-        RefusedError: A value is not allowed, all phases are pores or rigid at a level, only
-            some have loss factors, or the image does not fit into memory.
+        RefusedError: The levels do not rise within [0, 1], a value is not allowed, all phases are
+            pores or rigid at a level, only some have loss factors, or the image does not fit into
+            memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
     start = perf_counter()
+    alpha = checked_levels(alpha)
     study.require_solid(alpha)
     model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli

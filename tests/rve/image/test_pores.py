@@ -217,6 +217,29 @@ def test_an_image_of_pores_and_what_may_be_rigid_is_refused():
         fuzzy_image_stiffness(image, [pore, rigid], labels=(0, 1), progress=False)
 
 
+@pytest.mark.parametrize("alpha", [(), (1.0, 0.0), (0.0, 2.0)])
+def test_levels_of_an_image_that_do_not_rise_are_refused(alpha):
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
+    phases = [{"modulus": modulus, "poisson": 0.3} for modulus in (1e9, 2e9)]
+    with pytest.raises(RefusedError, match="alpha is"):
+        fuzzy_image_stiffness(image, phases, labels=(0, 1), alpha=alpha, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "modulus", "message"),
+    [
+        ((1e-3, 0.0), 1e9, "lengths is .* positive"),
+        ((1e-3, 1e-3), "1 GPa", "modulus of a phase is '1 GPa'"),
+        ((1e-3, 1e-3), None, "modulus of a phase is None"),
+    ],
+)
+def test_lengths_and_moduli_that_are_no_numbers_are_refused(lengths, modulus, message):
+    image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), lengths)
+    phases = [{"modulus": x, "poisson": 0.3} for x in (modulus, 2e9)]
+    with pytest.raises(RefusedError, match=message):
+        fuzzy_image_stiffness(image, phases, labels=(0, 1), progress=False)
+
+
 def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     phase = {"modulus": 1e9, "poisson": 0.3, "loss": Triangular(-0.01, 0.0, 0.05)}

@@ -11,6 +11,7 @@ from PIL import Image
 from alphacut.fuzzy import RefusedError
 from alphacut.rve.image.files import files_of, read_grid
 from alphacut.rve.image.memory import require_memory
+from alphacut.rve.image.study import read_image
 
 tifffile = pytest.importorskip("tifffile")
 SHAPE, CUBE = (12, 5, 7), (1, 1, 1)
@@ -314,3 +315,16 @@ def test_the_number_that_changes_in_names_is_that_of_the_slice(tmp_path, rng, na
     for k, page in enumerate(values):
         Image.fromarray(page).save(tmp_path / f"{name.format(k)}.png")
     assert np.array_equal(read_grid(tmp_path, CUBE), values)
+
+
+@pytest.mark.parametrize("spacing", [0, np.inf, "1", (), (1e-3, np.nan), (1e-3, "1")])
+def test_lengths_of_pixels_that_are_no_positive_numbers_are_refused(tmp_path, spacing):
+    np.save(tmp_path / "a.npy", np.eye(4))
+    with pytest.raises(RefusedError, match="spacing is"):
+        read_image(tmp_path / "a.npy", spacing=spacing)
+
+
+@pytest.mark.parametrize("name", ["b.npy", "b.png", "b.mhd"])
+def test_a_missing_image_is_refused_by_its_name(tmp_path, name):
+    with pytest.raises(RefusedError, match=name):
+        read_image(tmp_path / name, spacing=np.float32(1.0))
