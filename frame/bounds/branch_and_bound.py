@@ -367,8 +367,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
 
     A problem is to maximise one side, −1 or 1, of one output at one time node; problems run over
     nodes, then outputs, then sides. Each begins at the best of the midpoint and of some Chebyshev
-    points (quasi-random, denser towards the ends), and is refined by Newton's method unless the box
-    is a point.
+    points (quasi-random, denser towards the ends), and is refined by Newton's method.
 
     Args:
         model: The modal model of m outputs at T time nodes.
@@ -388,19 +387,28 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
     values = np.concatenate(chunks).reshape(len(points), -1)  # (points, T m)
     best = np.stack([values.argmin(axis=0), values.argmax(axis=0)], axis=1).ravel()
     value = np.stack([-values.min(axis=0), values.max(axis=0)], axis=1).ravel()
+    # These values choose points alone. Those that are returned come from the tables of the loads,
+    # as those of branch and bound do, whose rounding is bounded.
     optima = Optima(points[best], value)
-    if (upper > lower).any():
-        refine(model, optima, np.arange(len(best)), lower, upper, min_gain)
+    refine(model, optima, np.arange(len(best)), lower, upper, min_gain, has_values=False)
     return optima
 
 
 def refine(
-    model: ModalModel, optima: Optima, problems: Ints, lower: Array, upper: Array, min_gain: float
+    model: ModalModel,
+    optima: Optima,
+    problems: Ints,
+    lower: Array,
+    upper: Array,
+    min_gain: float,
+    *,
+    has_values: bool = True,
 ) -> None:
     """Improve the best points of some problems by Newton's method within a box, in place.
 
     A problem ends when its quadratic model predicts a gain of at most `min_gain`, or after a fixed
-    number of steps. Values never decrease. Problems are taken in chunks that limit the memory.
+    number of steps. Values never decrease, unless they are not given. Problems are taken in chunks
+    that limit the memory.
 
     Args:
         model: The modal model, whose outputs are maximised with the sign of the problem's side.
@@ -409,12 +417,14 @@ def refine(
         lower: Lower ends of the box, shape (d,), in unit coordinates.
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.
+        has_values: Whether the values of these problems are known; else they are overwritten with
+            those at their points.
     """
     # Tuned: the arrays of more than 6000 problems of six inputs do not fit into the cache of a
     # processor.
     size = max(6000 * 6 // max(lower.size, 6), 1)
     for piece in np.array_split(problems, -(-len(problems) // size) or 1):
-        _newton(model, optima, piece, lower, upper, min_gain)
+        _newton(model, optima, piece, lower, upper, min_gain, has_values=has_values)
 
 
 class _Jets(NamedTuple):
@@ -426,7 +436,14 @@ class _Jets(NamedTuple):
 
 
 def _newton(
-    model: ModalModel, optima: Optima, problems: Ints, lower: Array, upper: Array, min_gain: float
+    model: ModalModel,
+    optima: Optima,
+    problems: Ints,
+    lower: Array,
+    upper: Array,
+    min_gain: float,
+    *,
+    has_values: bool,
 ) -> None:
     """Maximise side × output of some problems by trust-region steps within a box, in place.
 
@@ -444,11 +461,15 @@ def _newton(
         lower: Lower ends of the box, shape (d,).
         upper: Upper ends, shape (d,).
         min_gain: In units of the outputs.
+        has_values: Whether the values of these problems are known; else they are overwritten with
+            those at their points first.
     """
     box_width = 2.0  # of the unit box [−1, 1]^d
     # Tuned: with a larger first radius more first steps fail.
     radius: Array = np.full(len(problems), 0.4)
     jets = _jets(model, optima.point[problems], problems)
+    if not has_values:
+        optima.value[problems] = jets.value
     gradient = jets.gradient
     hessian = jets.hessian
     # A problem that has not converged after 300 steps, which is rare, keeps an attained value.

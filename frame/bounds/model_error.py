@@ -30,7 +30,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import absolute_moments
-from alphacut.frame.response.load_tables import REACH, Direct, LoadTables
+from alphacut.frame.response.load_tables import Direct, LoadTables
 
 ROUNDING = 1e-9
 """Bound of the relative rounding of norms and of integrals over a load: a million terms of some
@@ -51,8 +51,9 @@ def proved_error(model: ModalModel) -> Array:
         ‖e(t)‖ ≤ ‖e(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(d_k* K d_k + e_k* M⁻¹ e_k),
 
     since damping only takes energy; for a load a, ‖e(0)‖ is the norm after a unit impulse times ∫
-    |a|. An output takes at most its norm of this deviation; the errors of its coefficients and of
-    the tables of w_k add to it.
+    |a|. An output takes at most its norm of this deviation, `EnergyNorms.outputs`; the errors of
+    its coefficients add to it. The w_k of the model are exact: what their tables miss is in
+    `remainder_bounds`.
 
     Args:
         model: Modal model of a structure that is known to lose energy everywhere in the box.
@@ -82,8 +83,7 @@ def proved_error(model: ModalModel) -> Array:
             continue
         deviation += part.impulse * start_errors[s] + 2 * part.elapsed @ energy_rates[s]
         coefficient_error = (coefficients[s] - part.coefficient).magnitude()
-        table_error = part.table_error[:, np.newaxis] * part.coefficient.magnitude()
-        output_error += 2 * part.waves[0] @ (coefficient_error + table_error)
+        output_error += 2 * part.waves[0] @ coefficient_error
     return (1 + ROUNDING) * (deviation[:, np.newaxis] * norms.outputs + output_error)
 
 
@@ -231,7 +231,6 @@ class ResponsePart:
     elapsed: Array  # bounds of ∫ |w| from 0 to t, (T, n)
     # bound of ∫ |a| of the load up to t, (T,), in m/s; 1 for the free response
     impulse: Array
-    table_error: Array  # bound of the model's error of w, over waves[0], (n,)
     load: LoadTables | None = None  # the load; None for the free response
 
 
@@ -248,8 +247,7 @@ def response_parts(model: ModalModel, growth: Array) -> list[ResponsePart]:
     Returns:
         For each part: `coefficient` C, polynomials of shape (n, m); `waves`, bounds of |∂^r w/∂λ^r|
         for r = 0 to 3, shape (4, T, n); `elapsed`, bounds of ∫ |w| from 0 to t, shape (T, n);
-        `impulse`, bounds of ∫ |a| up to t, shape (T,), 1 for the free response; and `table_error`,
-        the relative error of w in the model's tables, shape (n,).
+        and `impulse`, bounds of ∫ |a| up to t, shape (T,), 1 for the free response.
     """
     time = model.flow.time[:, np.newaxis]
     divisor = np.where(growth == 0, 1.0, growth)
@@ -259,7 +257,6 @@ def response_parts(model: ModalModel, growth: Array) -> list[ResponsePart]:
         waves=powers * np.exp(growth * time),
         elapsed=np.where(growth == 0, time, np.expm1(growth * time) / divisor),
         impulse=np.ones(len(time)),
-        table_error=np.zeros(model.count),
     )
     return [free] + [_forced_part(model, growth, load) for load in model.loads]
 
@@ -278,7 +275,7 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
     Returns:
         C; `waves`, bounds of |∂^r R/∂λ^r| for r = 0 to 3, shape (4, T, n); `elapsed`, bounds of ∫
         |R| from 0 to t, shape (T, n), and `impulse`, of ∫ |a|, shape (T,), which are 0 for a direct
-        part; and the relative error of the tables.
+        part.
     """
     time = model.flow.time
     if isinstance(load, Direct):  # w of the first mode is a(t), and that of all others 0
@@ -289,7 +286,6 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
             waves=waves,
             elapsed=np.zeros(waves[0].shape),
             impulse=np.zeros(len(time)),
-            table_error=load.truncation,
             load=load,
         )
 
@@ -308,7 +304,6 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
         waves=of_modes[:4],
         elapsed=np.where(growth < 0, decaying, of_modes[1]),
         impulse=undamped[0],
-        table_error=load.truncation,
         load=load,
     )
 
@@ -329,7 +324,7 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     Returns:
         `third`, bounds of the third derivatives by u_i, u_j, u_k, shape (T, m, d, d, d), symmetric
         in the last three axes; and `rounding`, bounds of the rounding of an output and of its
-        slopes by the inputs, shape (T, m, 1 + d).
+        slopes by the inputs, with what the tables of loads truncate, shape (T, m, 1 + d).
     """
     d = len(lower)
     n = model.count
@@ -341,16 +336,25 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     rho = [part[..., np.newaxis] for part in eigenvalue]
     cubic = np.zeros((len(time), count(d, 3), m))
     rounding = np.zeros((len(time), 1 + d, m))  # of values, then of slopes
+    relative_rounding = _relative_rounding(model, eigenvalue[0][0])
     for part in response_parts(model, growth):
-        relative_rounding = _relative_rounding(model, eigenvalue[0][0], part.load)
+        # What the tables of a load miss of R, R′ and R″. Values, slopes and Hessians of the outputs
+        # are made of these: C R; C_i R + C λ_i R′; and so on. Third derivatives, for which alone R‴
+        # is needed, are bounded and not computed.
+        table_errors: Array = np.zeros((4, len(time), n))
+        if part.load is not None:
+            table_errors[:3] = part.load.errors(part.waves, growth)
         term = majorant_parts(part.coefficient, reach)  # of C ρ^p / p!, (monomials, n, m)
         for p in range(4):
             waves = 2 * part.waves[p]
             cubic += np.tensordot(waves, term[3], (1, 1))
             quadratic = TaylorModel(tuple(term[:3]), np.zeros((n, m)), d)
-            # The first two degrees are bounds of the values and of the slopes.
+            # A quadratic model with errors in its value, slopes and Hessian is off by these
+            # errors times 1, |x_i| and |x_i x_j|, and its slopes by those of slopes and Hessian
+            # times 1 and |x_j|. The first two degrees of the majorant bound both.
             largest = np.concatenate(majorant_parts(quadratic, upper - lower)[:2])
-            rounding += np.tensordot(relative_rounding * waves, largest, (1, 1))
+            errors = relative_rounding * waves + 2 * table_errors[p]
+            rounding += np.tensordot(errors, largest, (1, 1))
             term = [
                 product_part(term, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
                 for k in range(4)
@@ -372,22 +376,19 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     )
 
 
-def _relative_rounding(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
+def _relative_rounding(model: ModalModel, rate: Array) -> Array:
     """Bound the relative rounding error of each mode's response at each time node, shape (T, n).
 
-    It is ε times the number of operations; the rounding of λ enters exp(λ t) times |λ| t.
+    It is ε times the number of operations on polynomials, waves and their sums; the rounding of λ
+    enters exp(λ t) and the response to a load times |λ| t, since |∂w/∂λ| ≤ t w with the bounds w
+    of `response_parts`. What the tables of a load miss is not contained; see `LoadTables.errors`.
 
     Args:
         model: The modal model of n modes with T time nodes.
         rate: Bounds of |λ|, shape (n,), in 1/s.
-        load: Tables of the response to a load, whose series have operations of their own; None for
-            the free response.
     """
     n_terms, d = model.eigenvalue.exponents.shape
     of_polynomial = n_terms + model.degree + 2
     phase = rate * model.flow.time[:, np.newaxis]
     operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
-    if load is not None:
-        # The series of a load's table has at most 100 terms, which exceed its sum by exp(REACH).
-        operations = operations + (8 * len(model.flow.time) + 100) * np.exp(REACH)
     return np.finfo(float).eps * operations

@@ -246,13 +246,17 @@ def responses_at_nodes(
         phasor = np.exp(1j * angle)
         # the sum and its factors have 8 roundings, besides that of the angle
         size = np.abs(minus[0]) + np.abs(plus[0])
-        # rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ
-        slope = np.exp(np.maximum(sigma.real * t, 0.0)) * history.extremes[0] * t**2
+        # Rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ, t the elapsed time.
+        elapsed = times[:, None]
+        if window and node is None:
+            elapsed = _time_in_window(time, window)[:, None]
+        slope = np.exp(np.maximum(sigma.real * elapsed, 0.0)) * history.extremes[0] * elapsed**2
         rounding = (8 + np.abs(angle)) * size + (np.abs(sigma) + omega) * slope
         error = (minus_rounding + plus_rounding) / 2 + UNIT_ROUNDOFF * rounding
         return (phasor * minus - phasor.conj() * plus) / 2j, error
     length = len(time)
     longest = float(time[-1])
+    sample_roundings = 0.0
     if window:
         length = window
         longest = float(time[min(window, len(time) - 1)] - time[0])
@@ -263,6 +267,9 @@ def responses_at_nodes(
             places = np.arange((len(samples) - 1) * divisions + 1) / divisions
             resampled = np.interp(places, np.arange(len(samples)), samples)
             history = replace(history, step=history.step / divisions, samples=resampled)
+            # Roundings of a sample, relative to the largest one: its place and the new step, which
+            # move it by u t in its slope of at most 2/step, and the interpolation.
+            sample_roundings = 8 + 4 * float(time[-1]) / history.step
     # a mode that grows is integrated over a window, or over an interval if that is longer
     require_in_range(sigma, history.step, max(history.step, longest))
     out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
@@ -274,7 +281,21 @@ def responses_at_nodes(
             _respond_at_nodes(sigma, pieces, orders, length, out, error)
         else:
             _respond_at_given(sigma, pieces, orders, node, out, error)
+    if sample_roundings and node is None:
+        # ∫ |δf| exp(Re σ τ) dτ over the time since the window began
+        elapsed = _time_in_window(time, length)[:, None]
+        grown = np.exp(np.maximum(sigma.real * elapsed, 0.0))
+        error += UNIT_ROUNDOFF * sample_roundings * history.extremes[0] * elapsed * grown
     return out, error
+
+
+def _time_in_window(time: Array, window: int) -> Array:
+    """Return the time from the beginning of its window to each of T nodes, shape (T,), in s.
+
+    Windows begin at each `window`-th node, which itself belongs to the window before.
+    """
+    begin = np.maximum(np.arange(len(time)) - 1, 0) // window * window
+    return np.asarray(time - time[begin])
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
@@ -426,13 +447,16 @@ def _respond(
             a = load.first[i] + slope * x
             elapsed = x
             fading = u[2]
+            of_difference = 0.0
             if since > 0:
                 elapsed -= since
                 w = np.exp(sigma * elapsed)
                 fading = abs(w)
+                of_difference = UNIT_ROUNDOFF * rate * elapsed  # of x − since in the exponent
             free = w * r0
             value = free + a * P[0] - slope * P[1]
-            node_rounding = fading * rounding + u[0] * (abs(free.real) + abs(free.imag))
+            node_rounding = fading * rounding
+            node_rounding += (u[0] + of_difference) * (abs(free.real) + abs(free.imag))
             node_rounding += u[1] * (abs(a) + abs(slope) * x / 2)
             size = abs(value.real) + abs(value.imag)
             # |dρ/dt| ≤ |σ ρ| + |a|
@@ -449,10 +473,12 @@ def _respond(
         elapsed = h
         w = e
         fading = decay
+        of_difference = 0.0
         if since > 0:
             elapsed -= since
             w = np.exp(sigma * elapsed)
             fading = abs(w)
+            of_difference = UNIT_ROUNDOFF * rate * elapsed
             since = 0.0
         if orders.ndim > 2:
             second = r2 + 2 * elapsed * r1 + elapsed * elapsed * r0
@@ -460,7 +486,8 @@ def _respond(
         if orders.ndim > 1:
             r1 = w * (r1 + elapsed * r0) + a * J1 - slope * J2
         r0 = w * r0
-        rounding = fading * rounding + of_product * (abs(r0.real) + abs(r0.imag))
+        rounding = fading * rounding
+        rounding += (of_product + of_difference) * (abs(r0.real) + abs(r0.imag))
         rounding += of_integrals * (abs(a) + abs(slope) * h / 2)
         r0 += a * J0 - slope * J1
 

@@ -2,13 +2,30 @@
 
 R(t; λ) = ∫₀ᵗ exp(λ (t − s)) a(s) ds is ρ of `duhamel`. Here each pair of a node t and an eigenvalue
 λ costs a few operations, whatever the length of the load a.
+
+Within a window of the length L that begins at t_w, with x = (λ − midpoint) L and the values F_j of
+the integral from t_w on at N points x_j of the circle |x| = r,
+
+    F(x) = Σ_k c_k x^k,    |c_k| ≤ ∫ |a(t − τ)| exp(Re midpoint τ) (τ/L)^k/k! dτ,
+    m_i = Σ_j F_j x_j^-i / N = c_i + c_{i+N} r^N + c_{i+2N} r^2N + …,    i < N.
+
+Σ m_i x^i stands for F. The terms k ≥ N are left out, and those of m_i are added, which are not
+larger together for |x| ≤ r. The q-th derivative by x, q < N, thus misses that of F by at most
+
+    2 Σ_{k ≥ N} r^(k − q)/(k − q)! ∫ |a| exp(Re midpoint τ) dτ ≤ ε_q ∫ |a| exp(g τ) dτ,
+    ε_q = 2 r^n/n! / (1 − r/(n + 1)),    n = N − q,
+
+with any g ≥ Re midpoint, such as an upper bound of Re λ over the box. Errors δF_j of the values
+change m_i by δm_i, with Σ_i |δm_i|² r^2i = Σ_j |δF_j|²/N (Parseval). By Cauchy and Schwarz
+
+    |Σ_i i (i − 1) … (i − q + 1) δm_i x^(i − q)| ≤ r^-q √(Σ_i (i … (i − q + 1))²) √(Σ_j |δF_j|²/N).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, exp, lgamma, log
+from math import ceil, comb, exp, lgamma, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +33,11 @@ from numpy.typing import NDArray
 from alphacut.base.arrays import Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import History
-from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 
 Complex = NDArray[np.complex128]
 REACH = 6.0
@@ -44,8 +62,10 @@ class LoadTable:
         deviation: Largest |λ − midpoint|, in 1/s.
 
     Attributes:
-        truncation: Relative truncation error: the series leave out at most this number times
-            ∫ |a(s)| exp(Re λ (t − s)) ds.
+        truncation: Relative truncation errors of R and of its first two derivatives by λ, shape
+            (3,): in a window of the length L the series miss the q-th derivative by at most
+            truncation[q] L^q ∫ |a(s)| exp(g (t − s)) ds, the integral being over the window, for
+            each g ≥ Re midpoint.
 
     Raises:
         UnprovedError: Phases differ by more than `REACH` within a step.
@@ -64,15 +84,74 @@ class LoadTable:
         # tuned: the terms |z|ⁿ/n! fall from n = e |z| on, and what is left out is `truncation`
         order = ceil(2.72 * radius + 18)
         self.midpoint = midpoint
+        self.max_rate = abs(midpoint) + deviation
         self.scale = 1 / (length * h)
         self.time = time
         self.ends = np.arange(length, steps, length)
-        # |exp(z) − Σ_{k < n} z^k/k!| ≤ |z|ⁿ/n! exp(2 |z|) for z = x τ/(length h), |z| ≤ radius
-        self.truncation = 2 * exp(order * log(radius) - lgamma(order + 1) + 2 * radius)
+        self.truncation = np.array([2 * _exponential_tail(radius, order - q) for q in range(3)])
         # Taylor coefficients, (T, order), by Cauchy's integral over that circle (a Fourier series)
         rate = midpoint + radius * self.scale * np.exp(2j * np.pi / order * np.arange(order))
-        (values,), _ = responses_at_nodes(rate, history, time, window=length)
+        (values,), rounding = responses_at_nodes(rate, history, time, window=length)
         self.moment = np.fft.fft(values, axis=1) / order / radius ** np.arange(order)
+
+        # The points of the circle are rounded: in x they are off by u (|midpoint| L + 8 r) at most.
+        # There |dF/dx| ≤ ∫ |a| exp(Re midpoint τ) dτ max(1, exp(Re x)).
+        integral = absolute_moments(-midpoint.real, history, time)[0]
+        growth = np.exp(np.maximum(rate.real - midpoint.real, 0.0) / self.scale)
+        of_points = UNIT_ROUNDOFF * (abs(midpoint) / self.scale + 8 * radius)
+        error = rounding + of_points * np.outer(integral, growth)
+        # The Fourier transform adds γ Σ_j |F_j| to each sum of N terms at most, in whatever order
+        # it forms them (Higham 2002, section 3.1; 4 N + 40 is more roundings than any path of a
+        # term has). Horner's scheme has 4 rounded operations for each coefficient on any path, and
+        # x has 3 roundings, each of which counts i times in x^i.
+        of_transform = gamma(4 * order + 40) * np.sqrt(order) + gamma(8 * order + 40)
+        root_mean_square = np.sqrt(np.mean(error**2, axis=1))
+        root_mean_square += of_transform * np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
+        # rounding of the series and of its derivatives by λ within the windows, (3, T)
+        self.rounding_in_windows = np.stack(
+            [
+                _norm_of_powers(order, q) / (radius * self.scale) ** q * root_mean_square
+                for q in range(3)
+            ]
+        )
+
+    def errors(self, waves: Array, growth: float) -> Array:
+        """Bound truncation and rounding of R, dR/dλ and d²R/dλ² in `response`, shape (3, T).
+
+        At the end t_w of a window R and its derivatives have errors E_p. A time τ later exp(λ τ) R
+        has contributed Σ_q binomial(p, q) τ^(p − q) E_q exp(Re λ τ) to the error of the p-th
+        derivative, and the series of the next window its own error.
+
+        Args:
+            waves: Bounds of |∂^r R/∂λ^r|, ∫ τ^r exp(growth τ) |a(t − τ)| dτ, in row r = 0, 1, 2;
+                further rows are not used. Shape (3 or more, T).
+            growth: Upper bound of Re λ over the eigenvalues and of Re midpoint, in 1/s, with which
+                `waves` are formed.
+        """
+        errors = np.zeros((3, len(self.time)))
+        at_start: Array = np.zeros(3)
+        start = 0
+        for end in [*self.ends, len(self.time) - 1]:
+            nodes = slice(start + 1, end + 1)
+            tau = self.time[nodes] - self.time[start]
+            # Rounding of exp(λ τ), whose exponent has two rounded factors, and of what it
+            # multiplies, relative to these products. They are at most `waves`.
+            relative = UNIT_ROUNDOFF * (24 + 4 * self.max_rate * tau)
+            carried = np.exp(growth * tau) * _shifted(at_start, tau)
+            errors[:, nodes] = (1 + relative) * carried + relative * waves[:3, nodes]
+            errors[:, nodes] += self.rounding_in_windows[:, nodes]
+            at_start = errors[:, end]
+            start = end
+        # What the series of a window leave out is carried on likewise. The time since the end of
+        # the window is less than t − s for each a(s) in it, so that all windows together leave out
+        # at most Σ_q binomial(p, q) truncation[q] L^q ∫ (t − s)^(p − q) |a(s)| exp(g (t − s)) ds,
+        # g = `growth`.
+        length = 1 / self.scale
+        for p in range(3):
+            for q in range(p + 1):
+                truncated = self.truncation[q] * length**q * waves[p - q]
+                errors[p] += comb(p, q) * truncated
+        return (1 + 1e-9) * errors  # with the rounding of these bounds themselves
 
     def response(self, rate: Array, node: Ints) -> Array:
         """Return R = ∫ exp(λ (t − s)) a(s) ds, dR/dλ, d²R/dλ² for N eigenvalues and nodes.
@@ -126,13 +205,25 @@ class LoadTables:
             tables.append(table)
         return tables
 
-    @property
-    def truncation(self) -> Array:
-        """Truncation error of R_k as a fraction of ∫ |a(s)| exp(Re λ (t − s)) ds, shape (n,)."""
-        return np.array([table.truncation for table in self.tables])
+    def errors(self, waves: Array, growth: Array) -> Array:
+        """Bound the errors of R, dR/dλ and d²R/dλ² as `response` returns them, shape (3, T, n).
+
+        Args:
+            waves: Bounds of |∂^r R/∂λ^r| at T nodes for n modes, r = 0, 1, 2, shape (3 or more, T,
+                n).
+            growth: Upper bounds of Re λ_k over a box about the midpoint, with which they are
+                formed, shape (n,), in 1/s.
+        """
+        of_modes = [
+            table.errors(waves[:, :, k], float(growth[k])) for k, table in enumerate(self.tables)
+        ]
+        return np.stack(of_modes, axis=-1)
 
     def at_nodes(self, rate: Array) -> Array:
-        """Return R at all T nodes for S sets of eigenvalues (S, n): shape (S, T, n)."""
+        """Return R at all T nodes for S sets of eigenvalues (S, n): shape (S, T, n).
+
+        It is computed without the tables, and its rounding is not bounded by `errors`.
+        """
         (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
@@ -162,10 +253,21 @@ class Direct(LoadTables):
     R of the first mode is a(t), and R of all others is zero.
     """
 
-    @property
-    def truncation(self) -> Array:
-        """Zero, shape (n,): nothing is truncated."""
-        return np.zeros(self.rate.shape)
+    def errors(self, waves: Array, growth: Array) -> Array:
+        """Bound the rounding of a(t) at T nodes, shape (3, T, n): zero for derivatives by λ.
+
+        Args:
+            waves: Not used.
+            growth: Not used.
+        """
+        load = self.history
+        # The place between two samples is off by some u t/step, of which a line makes twice as much
+        # of the largest sample; a sine has a phase with the rounding of Ω t.
+        turned = load.frequency * self.time + abs(load.phase)
+        roundings = 16 + 4 * self.time / load.step + 4 * turned
+        errors: Array = np.zeros((3, *waves.shape[1:]))
+        errors[0, :, 0] = UNIT_ROUNDOFF * roundings * load.extremes[0]
+        return errors
 
     def at_nodes(self, rate: Array) -> Array:
         """Return these R at all T nodes for S sets of eigenvalues: shape (S, T, n)."""
@@ -178,6 +280,39 @@ class Direct(LoadTables):
         R: Array = np.zeros((3, *rate.shape), complex)
         R[0, :, 0] = self.history.values(self.time[node])
         return R
+
+
+def _exponential_tail(radius: float, order: int) -> float:
+    """Return an upper bound of Σ_{k ≥ order} radius^k/k! for order + 1 > radius ≥ 1.
+
+    The sum is at most its first term times the geometric series of radius/(order + 1).
+    """
+    first = exp(order * log(radius) - lgamma(order + 1))
+    return (1 + 1e-9) * first / (1 - radius / (order + 1))
+
+
+def _norm_of_powers(order: int, q: int) -> float:
+    """Return √(Σ_i (i (i − 1) … (i − q + 1))²) over i < order: of the q-th derivatives of x^i."""
+    i = np.arange(order, dtype=float)
+    factors = np.prod([i - k for k in range(q)], axis=0) * np.ones(order)
+    return float(np.linalg.norm(factors))
+
+
+def _shifted(errors: Array, tau: Array) -> Array:
+    """Return Σ_q binomial(p, q) τ^(p − q) E_q for p = 0, 1, 2, shape (3, T).
+
+    Args:
+        errors: E, shape (3,).
+        tau: τ, shape (T,), in s.
+    """
+    value, slope, curvature = errors
+    return np.stack(
+        [
+            value + 0.0 * tau,
+            slope + tau * value,
+            curvature + 2 * tau * slope + tau**2 * value,
+        ]
+    )
 
 
 @compiled
