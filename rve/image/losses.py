@@ -170,9 +170,9 @@ def loss_of_young(bounds: StiffnessBounds, losses: Mapping[str, Array], average:
     """Return bounds of the loss factor of Young's modulus E of an average, shape (levels, 2).
 
     E is 9 K G/(3 K + G), or G (3 − G/K) with the K of plane strain. So d ln E = w d ln K + (1 − w)
-    d ln G with w = G/(3 K + G) or, in the plane, w = G/(3 K − G). The loss factor of E is the same
-    mean of those of K and G, to first order. It is bilinear in w and the loss factors, so that it
-    is extreme at their ends.
+    d ln G with w = G/(3 K + G) or, in the plane, w = G/(3 K − G). The loss factor of E is the mean
+    of the loss factors of K and G with the same weights, to first order. It is bilinear in w and
+    the loss factors, so that it is extreme at their ends.
 
     Args:
         bounds: Bounds of the stiffness, both present, by which K and G are positive and, in the

@@ -170,7 +170,8 @@ class ImageModel:
             stress: Whether to solve for stresses, whose energy bounds the compliance from above;
                 else for displacements, whose energy bounds the stiffness from above.
             start: Solution of the same kind, whose fields are the first guess; None for zero.
-            watch: Function called before each iteration in place of that of the solver.
+            watch: Function called before each iteration in place of `self.solver.watch`; None for
+                this one.
 
         Returns:
             `fields` under unit mean strains or stresses in Voigt's order, and `energy`, whose
@@ -204,17 +205,17 @@ class ImageModel:
 
         Args:
             images: Lower and upper moduli of each pixel or voxel at each level, for rising α, one
-                at least. Those of each level contain those of higher ones.
-            crisp: A pair of images and their solution by a model of the same division, whose fields
-                are the first guess.
+                at least. The intervals of a level contain the intervals of higher levels.
+            crisp: Lower and upper moduli at the nominal values, and their solution by a model of
+                the same division, whose fields are the first guess.
             progress: Function that is called with the fraction of the levels that is done, after
                 each.
 
         Returns:
             One ImageCut a level, in the order of `images`: `bounds` of the stiffness, `modulus` E
             in Pa and `poisson` ν of the average, each with a lower and an upper end, and
-            `constants` along the axes, shape (constants, 2). All but `bounds` contain those of
-            higher levels.
+            `constants` along the axes, shape (constants, 2). All but `bounds` are widened, if need
+            be, to contain the intervals of higher levels.
 
         Raises:
             FailedError: A solution does not converge, or a bound is singular to rounding.

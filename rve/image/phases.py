@@ -213,8 +213,8 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
 
     Returns:
         Bulk and shear moduli in Pa: `lower`, the smallest of the possible phases, and `upper`, the
-        largest of them, each of shape (2, y, x) or (2, z, y, x). They need not be those of one
-        phase.
+        largest of them, each of shape (2, y, x) or (2, z, y, x). Bulk and shear modulus of a pixel
+        need not be those of the same phase.
     """
     lower = np.array([(phase.lower.bulk, phase.lower.shear) for phase in phases])
     upper = np.array([(phase.upper.bulk, phase.upper.shear) for phase in phases])

@@ -234,13 +234,13 @@ def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:
 
     Args:
         name: Name of the head, for messages.
-        entries: Its entries; those of HeaderSize (MetaImage), byte skip and line skip (NRRD) are
+        entries: Its entries, of which HeaderSize (MetaImage), byte skip and line skip (NRRD) are
             used.
         is_packed: Whether the numbers are compressed.
 
     Returns:
-        0 where the head says nothing; −1 if the numbers are the last bytes of the file, which only
-        those that are not compressed can be.
+        0 where the head says nothing; −1 if the numbers are the last bytes of the file, which a
+        head may say only of numbers that are not compressed.
 
     Raises:
         RefusedError: The head states lines to skip, or no whole number of bytes.

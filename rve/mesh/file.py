@@ -418,7 +418,7 @@ def write(
             view behind the mesh. Element k of a view is the k-th prism.
 
     Raises:
-        ImportError: Gmsh is not installed.
+        MissingLibraryError: Gmsh is not installed.
         Exception: Whatever Gmsh raises, such as of a file that cannot be written.
     """
     with square.open_gmsh() as gmsh:

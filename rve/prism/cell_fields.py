@@ -52,7 +52,7 @@ class CellFields:
 
         Raises:
             RefusedError: The name has none of these endings.
-            ImportError: Gmsh is not installed, or for .vtu and .xdmf meshio.
+            MissingLibraryError: Gmsh is not installed, or for .vtu and .xdmf meshio.
             OSError: A file of VTK or XDMF cannot be written; Gmsh raises an Exception of its own.
         """
         path = Path(path)

@@ -58,8 +58,8 @@ def fields_of_solution(
 
     Args:
         problem: The cell that it was solved on, on one rank.
-        u: Fluctuation of the displacements, without those of the macroscopic strain, in halves of
-            the cell's side.
+        u: Fluctuation of the displacements, without the displacements of the macroscopic strain,
+            in halves of the cell's side.
         stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of three components, in
             Pa.
         load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
@@ -123,8 +123,8 @@ def nodal_fields(
 
     Args:
         problem: The cell, on one rank.
-        fluctuation: Displacements at DOLFINx's nodes without the macroscopic strain's, in halves of
-            the cell's side, shape (nodes, 2, loads).
+        fluctuation: Displacements at DOLFINx's nodes, without the displacements of the macroscopic
+            strain, in halves of the cell's side, shape (nodes, 2, loads).
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
         stress: (σ11, σ22, σ12) at the 15 nodes of each prism, shape (prisms, 15, 3, loads), in Pa.
         phase: Index of the phase at the nodes of each prism, shape (prisms, 15).
@@ -132,7 +132,7 @@ def nodal_fields(
     Returns:
         Fields with one point for each pair of a node and a phase that meets there, sorted by phase
         and then by node; `cells` are indices of these points. The phase of a prism that a level set
-        cuts is that of most of its nodes.
+        cuts is the phase of most of its 15 nodes.
     """
     grid = problem.grid
     positions = grid.positions(problem.map)

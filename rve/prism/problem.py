@@ -427,7 +427,7 @@ def solve_over_prisms(
         stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each, in
             Pa.
         strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
-        options: PETSc's options, with those of the default solver.
+        options: PETSc's options, the ones of the default solver included.
 
     Returns:
         Mean strains of each phase on each slice for each load, iterations for each load, the

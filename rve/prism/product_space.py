@@ -89,8 +89,8 @@ class ProductSpace:
         """Return displacements and stresses at the nodes for a solution, to be drawn or written.
 
         Args:
-            u: The fluctuation of the displacements, a function of `space`, without those of the
-                macroscopic strain; in halves of the cell's side.
+            u: The fluctuation of the displacements, a function of `space`, in halves of the cell's
+                side; it is without the displacements of the macroscopic strain.
             stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of shape (3,), in Pa.
             strain: The macroscopic strain (ε11, ε22, 2 ε12).
 
@@ -120,7 +120,7 @@ class ProductSpace:
             matrix: Symmetric reduced matrix, as `assemble_matrix` returns it.
             loads: Reduced right-hand sides, at least one, as `assemble_vector` returns them.
             petsc_options: Options of PETSc without the prefix `rve_`, which override the default
-                solver; those of the model if left out.
+                solver; the options of the model if left out.
 
         Returns:
             The reduced solutions in the order of the loads, iterations, and the largest relative
@@ -135,11 +135,12 @@ class ProductSpace:
         return solve(self._problem.solver(options, matrix), loads)
 
     def _compiled(self, form: ufl.Form, *, num_arguments: int) -> fem.Form:
-        """Return a form compiled by DOLFINx, after a check; that of the same form is kept.
+        """Return a form compiled by DOLFINx, after a check; it is kept for the next call.
 
-        A kept form uses the values that its coefficients have when it is assembled, not those of
-        now. The check is needed since DOLFINx assembles by the number of the form's arguments (test
-        and trial functions) and by their spaces without looking, and would write beyond its arrays.
+        A kept form uses the values that its coefficients have when it is assembled, not the values
+        of this call. The check is needed since DOLFINx assembles by the number of the form's
+        arguments (test and trial functions) and by their spaces without looking, and would write
+        beyond its arrays.
 
         Args:
             form: Form of the user.

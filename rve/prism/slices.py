@@ -71,7 +71,7 @@ def solve_sample(
         stiffness: Stiffness C of each phase (matrix, inclusion) in Voigt order (11, 22, 12 with 2
             ε12), (3, 3) each, in Pa.
         strains: Macroscopic strains ε̄ = (ε11, ε22, 2 ε12), shape (loads, 3).
-        options: PETSc's options, with those of the default solver.
+        options: PETSc's options, the ones of the default solver included.
 
     Returns:
         Mean strains of each phase on each slice, the iterations for each load, the largest relative
@@ -321,7 +321,7 @@ class SliceProblem:
         both have the same preconditioner, which is factorised anew.
 
         Args:
-            options: PETSc's options, with those of the default solver.
+            options: PETSc's options, the ones of the default solver included.
             matrix: Stiffness, as `matrix` of this problem returns it.
             loads: Number of loads; vectors of the solver hold them one after another.
 

@@ -90,8 +90,8 @@ def stress_checks(
 ) -> dict[str, float]:
     """Return relative violations of symmetry and of bounds by the mean stiffness, 0 for none.
 
-    Voigt's, Reuss's and, of isotropic phases, Hashin and Shtrikman's bounds are those of energies
-    of the loads, under which alone the stiffness is known.
+    Voigt's, Reuss's and, of isotropic phases, Hashin and Shtrikman's bounds are taken of energies
+    of the loads, since the stiffness is known under these loads alone.
 
     Args:
         stress: Homogenised (σ11, σ22, σ12) at the n nodes of θ, shape (n, 3, loads), in Pa.

@@ -45,8 +45,9 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
             given, those that the phases of the cell state for both, 0 where one states none.
 
     Returns:
-        Values and absolute errors by "E", "G" and "K". Errors hold those of the energies and, of
-        the first-order formula, a term of second order; NaN where the model declares none.
+        Values and absolute errors by "E", "G" and "K". The errors follow from those of the
+        energies; where the first-order formula is used, a term of second order is added. NaN where
+        the model declares none.
 
     Raises:
         RefusedError: The result has no energies, or `losses` is not given and the result has no
@@ -96,8 +97,8 @@ def first_order(
             that `energies` belong to, shape (3,): in the plane C11 + C12, C11 − C12 and C33.
 
     Returns:
-        Loss factors of E, G and K, shape (3,), and their absolute errors, shape (3,): those of the
-        energies, not that of the first-order formula; NaN where unknown.
+        Loss factors of E, G and K, shape (3,), and their absolute errors by the errors of the
+        energies, shape (3,), NaN where unknown. The error of the first-order formula is not added.
     """
     fractions, fraction_errors = energies.energy_fractions(constants_of)  # (phases, 2, 3)
     # The sum is over the phases and over their bulk and shear modulus, the first two axes.

@@ -50,8 +50,9 @@ def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: boo
 
     In the plane of fibres by Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119,
     1965), of space by Hashin and Shtrikman (ibid. 11, 127, 1963); of any number of phases and with
-    the extreme moduli of either Walpole (ibid. 17, 235, 1969). Those of K hold for hydrostatic
-    strain of any arrangement of fibres, and of any cubic one; those of G for isotropic ones.
+    the extreme moduli of either Walpole (ibid. 17, 235, 1969). The bounds of K hold for
+    any arrangement of fibres under equal strains along x and y, and for any cubic composite of
+    space under hydrostatic strain; the bounds of G hold for isotropic composites.
 
     Args:
         fractions: Fractions of the phases, shape (phases, …), where … is any shape; their sum over

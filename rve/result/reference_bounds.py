@@ -39,8 +39,8 @@ def reference_bounds(
             the plane across fibres, and K that of plane strain.
 
     Returns:
-        Lower and upper bound in Pa of K (`bulk`), G (`shear`) and E (`young`); that of E is E at
-        the lower, and at the upper bounds of K and G.
+        Lower and upper bound in Pa of K (`bulk`), G (`shear`) and E (`young`). The bounds of E are
+        E with both lower and E with both upper bounds of K and G.
 
     Raises:
         ValueError: The numbers of phases and fractions differ.

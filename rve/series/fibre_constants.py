@@ -40,7 +40,7 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
 
     Returns:
         Values and absolute errors by name: "E_T", "E_L", "nu_LT", "G_T", "G_L" and "K_T", moduli in
-        Pa. Errors but that of G_L are NaN if the result declares none.
+        Pa. If the result declares no errors, all errors but the one of G_L are NaN.
 
     Raises:
         RefusedError: The cell has no round particle and two isotropic phases.

@@ -63,7 +63,7 @@ class Basis:
 
 
 def _basis(dimension: int, *, stress: bool) -> Basis:
-    """Return the functions of one coordinate whose products over the axes are those of an element.
+    """Return the functions of one coordinate whose products over the axes an element consists of.
 
     Stresses are second derivatives of potentials, so that the slopes of these are continuous.
 

@@ -72,7 +72,7 @@ class Energies:
 
     @property
     def upper(self) -> Array:
-        """A matrix above that of the true total energies, shape (fields, fields).
+        """A matrix above the matrix of the true total energies, shape (fields, fields).
 
         Above means in the Loewner order: the difference is positive semidefinite. The total energy
         of each pair of fields is the sum of the products by trace and by deviator.
@@ -112,8 +112,8 @@ def energies(
         coefficients: Coefficients of the squares of trace and of deviator in each cell, of the
             shape of the grid, not negative, each with a relative error of up to 8 rounding units of
             2⁻⁵³.
-        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
-            shape; None for no distance.
+        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
+            exact fields.
 
     Returns:
         Energies with `value`, the symmetric products by trace and by deviator, shape (2, fields,
@@ -178,8 +178,8 @@ def modes_of(
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
-            shape; None for no distance.
+        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
+            exact fields.
 
     Yields:
         SlabModes: `slab`, the index of the cells in an array of the grid's shape; `modes`, shape
@@ -205,8 +205,8 @@ def modes_by_matrices(
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
-            shape; None for no distance.
+        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
+            exact fields.
 
     Yields:
         SlabModes for each slice of the first axis of the grid: `slab`, that slice; `modes`, shape
@@ -243,8 +243,8 @@ def _modes_by_rows(
         element: Element of displacements of voxels, with modes of the strain, or of stresses.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a voxel, z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the distances of `fields` from those that are meant, of the same
-            shape; None for no distance.
+        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
+            exact fields.
 
     Yields:
         SlabModes for some rows of a layer, so that few modes are in memory: `slab`, the index (z,
@@ -378,7 +378,7 @@ def _least_energy_fields(
     """Return fields under unit loads whose energy is nearly the least.
 
     The loads that are solved for are near the eigenvectors of an isotropic stiffness; the fields
-    are combined to those of the unit loads afterwards.
+    are combined to the fields of the unit loads afterwards.
 
     Args:
         element: Element of displacements or of stresses.
@@ -477,7 +477,7 @@ def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Arr
     Args:
         element: Element, which tells the modes of the trace from those of the deviator.
         trace: Coefficient c of the squared modes m of the trace, positive, of the grid's shape.
-        deviator: Coefficient of those of the deviator, positive, of the same shape.
+        deviator: Coefficient of the squared modes of the deviator, positive, of the same shape.
         modes: Mean modes of each load, shape (modes, loads).
     """
     total = np.zeros(modes.shape[1])

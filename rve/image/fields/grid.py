@@ -31,7 +31,7 @@ Fields = Any
 def namespace(array: Fields) -> ModuleType:
     """Return the module of an array's library, with the functions of the array standard.
 
-    NumPy's own module for its arrays; otherwise that of array_api_compat, for CuPy's arrays.
+    NumPy's own module for its arrays; for CuPy's arrays the one in array_api_compat.
     ImportError without that package, TypeError for an object that is no array of any library.
     """
     if isinstance(array, np.ndarray):
@@ -170,7 +170,7 @@ def slabs(fields: Fields) -> Iterator[slice]:
 
 
 def gather(element: Element, fields: Fields, slab: slice) -> Fields:
-    """Return the local unknowns of the cells of a slab: those of their own and of cells further on.
+    """Return the local unknowns of the cells of a slab: their own, and some of cells further on.
 
     Args:
         element: Element, whose local unknowns k are the unknown `local[k].unknown` of the cell that
