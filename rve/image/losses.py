@@ -80,7 +80,8 @@ def energy_fractions(
     unchanged = concave_constants(solution.bounds, model.average)
     fractions = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
     # Each quotient is off by at most gap/t + |c″/c| t/2, which is least at t = √(2 gap/|c″/c|). Of
-    # two phases in series with equal fractions |c″/c| is 1/2. Any t is proved.
+    # two phases in series with equal fractions |c″/c| is 1/2. Any t in (0, 1) is proved; the limits
+    # keep 1 − t positive, and `ROUNDING` small beside t.
     gap = max(ends.upper / ends.lower - 1 for ends in unchanged.values())
     t = float(np.clip(np.sqrt(2 * gap / 0.5), 1e-6, 0.5))
     for k in range(n_phases):

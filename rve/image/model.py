@@ -206,8 +206,9 @@ class ImageModel:
         Args:
             images: Lower and upper moduli of each pixel or voxel at each level, for rising α, one
                 at least. The intervals of a level contain the intervals of higher levels.
-            crisp: Lower and upper moduli at the nominal values, and their solution by a model of
-                the same division, whose fields are the first guess.
+            crisp: Lower and upper moduli of one more image, such as the nominal one, and their
+                solution by a model of the same division. Its fields are the first guess, and it is
+                the solution of levels with the same moduli.
             progress: Function that is called with the fraction of the levels that is done, after
                 each.
 

@@ -261,6 +261,7 @@ class AxialStiffness:
 
         # The part of C (1, 1, 0)/2 that is not of square symmetry enters times Δl/Δk. It vanishes
         # where Δk does, since the phases then have equal stress under (1, 1, 0).
+        # Below 1e-9 of the modulus the contrast is rounding of moduli that are meant to be equal.
         is_contrast = abs(bulk_contrast) > 1e-9 * mixture.moduli[0].max()
         ratio = lateral_contrast / bulk_contrast if is_contrast else 0.0
         anisotropic = response - bulk * equibiaxial

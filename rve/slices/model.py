@@ -454,15 +454,15 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     x = np.sqrt(1 - radii**2)
     fine_x = np.sqrt(1 - fine_radii**2)
     midpoint = (x.min() + x.max()) / 2
-    half_width = max(np.ptp(x), 1e-12) / 2
+    half_width = max(np.ptp(x), 1e-12) / 2  # not 0 where all radii are equal
     mean = rule.weights @ moduli[nodes]
 
     # From a degree that leaves some freedom up to that of the interpolating polynomial, one less
     # than the number of radii. The limits of both, 9 and 14, are tuned.
     first_degree = min(max(0, radii.size - 4), 9)
-    last_degree = min(radii.size, 15)
+    stop_degree = min(radii.size, 15)
     distances = []
-    for degree in range(first_degree, last_degree):
+    for degree in range(first_degree, stop_degree):
         basis = chebvander((x - midpoint) / half_width, degree)
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
         fit = chebvander((fine_x - midpoint) / half_width, degree) @ coefficients
