@@ -171,9 +171,10 @@ def read_knet(file: TextFile, unit: str) -> Recording:
     end = memo_lines[0]
     label_width = 18
     head = {x[:label_width].strip(): (k, x[label_width:]) for k, x in enumerate(file.lines[:end])}
-    [rate] = _knet_numbers(file, head, end, "Sampling Freq(Hz)", r"([0-9.]+)\s*Hz", "100Hz")
-    [duration] = _knet_numbers(file, head, end, "Duration Time(s)", r"([0-9.]+)", "300")
-    scale = r"([0-9.]+)\s*\(gal\)\s*/\s*([0-9.]+)"
+    real = r"([0-9]+\.?[0-9]*|\.[0-9]+)"
+    [rate] = _knet_numbers(file, head, end, "Sampling Freq(Hz)", rf"{real}\s*Hz", "100Hz")
+    [duration] = _knet_numbers(file, head, end, "Duration Time(s)", real, "300")
+    scale = rf"{real}\s*\(gal\)\s*/\s*{real}"
     example = "7845(gal)/8223790"
     gal, full_scale = _knet_numbers(file, head, end, "Scale Factor", scale, example)
     counts = file.numbers(end + 1, len(file.lines))
@@ -205,7 +206,7 @@ def _knet_numbers(
         head: Index of the line, counted from 0, and text of each field by its name.
         end: Index of the line at which the head ends, for the message.
         name: Name of the field.
-        pattern: Regular expression of its text, with a group for each number.
+        pattern: Regular expression of its text, with a group for each decimal number.
         example: A text that it may have, for the message.
 
     Raises:

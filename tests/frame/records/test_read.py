@@ -226,6 +226,7 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         (written.at2(NAMED).replace("E-01", "E-O1", 1), r"line \d+ is '.*E-O1'"),
         (written.knet().replace("Scale Factor", "Scale Fact."), "without Scale Factor"),
         (written.knet().replace("Time(s)  2", "Time(s)  3"), "600 samples, and 400 follow"),
+        (written.knet().replace("200Hz", "2.0.0Hz"), "line 11 is 2.0.0Hz"),
         (written.esm().replace("DATA_TYPE: ACC", "DATA_TYPE: VEL "), "accelerations in"),
         (written.esm().replace("cm/s^2", "cm"), "in units of cm"),
         (
