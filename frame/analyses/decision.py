@@ -111,9 +111,10 @@ class LimitDecision(LimitResult):
         if not np.isfinite(value):
             return "not known"
         if self.is_event:
-            # Percentages have one decimal place: the third one of the fraction.
-            places_before = floor(log10(abs(value) or 1e-3))
-            return percent_text(rounded(value, side, nature, max(4 + places_before, 1)))
+            # Percentages have one decimal place, which is the third one of the fraction. A fraction
+            # whose first digit has the place 10^e has e + 4 digits up to there; 0 counts as 0.001.
+            exponent = floor(log10(abs(value) or 1e-3))
+            return percent_text(rounded(value, side, nature, max(4 + exponent, 1)))
         # The number that is shown is rounded, which is in the unit of the limit.
         # It must stay a bound there: rounding in SI could move it back across the exact value.
         factor = 1.0
@@ -144,8 +145,9 @@ class Decision(Answer):
     def _texts(self, part: LimitDecision) -> dict[str, str]:
         """Return the texts of one row of the table by the titles of the columns.
 
-        Margin, bound, attained peak and gap are those of the lowest level. The last three are empty
-        for the event that any of several limits is exceeded, and the gap also where it is unknown.
+        Margin, bound, attained peak and gap (distance of both over the bound) are those of the
+        lowest level. The last three are empty for the event that any of several limits is exceeded,
+        and the gap also where it is unknown or the bound is 0.
 
         Args:
             part: Decision on the limit or event of the row.

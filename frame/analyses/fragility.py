@@ -82,7 +82,10 @@ class CriticalMeasures:
     def __post_init__(self) -> None:
         """Make unknown measures infinite, and check that `low` ≤ reached ≤ `high` and `low` > 0.
 
-        NaN stands for an unknown measure.
+        All have the shape (levels, records). No structure of a cut exceeds the limit below `low`,
+        and all do above `high`. A structure is known to exceed it above `low_reached`, and one is
+        known not to exceed it up to `high_reached`; either of these may be the larger one. NaN
+        stands for an unknown measure.
 
         Raises:
             RefusedError: A measure is not positive, or an attained one lies outside its bounds by
@@ -116,6 +119,9 @@ class CriticalMeasures:
                 its peak.
             limit: Limit L > 0 in SI units. If the peak is the smallest value of an output, it is
                 the limit of the largest value of the output with its sign changed.
+
+        Returns:
+            Measures of shape (levels, records) each.
 
         Raises:
             RefusedError: The bounds of a peak contradict each other.
@@ -158,6 +164,12 @@ class CriticalMeasures:
             records: Demands (peak over limit) under each record at rising measures, at least one.
                 No structure exceeds the limit at the first measure.
             name: Name of the limit, or of the event that any of several limits is exceeded.
+
+        Returns:
+            Measures of shape (levels, records) each.
+
+        Raises:
+            KeyError: A record has no such limit or event.
         """
         of_records = []
         for record in records:
@@ -193,7 +205,8 @@ class CriticalMeasures:
         reached = np.min([limit.low_reached for limit in limits], axis=0)
         high = np.min([limit.high for limit in limits], axis=0)
         # Different limits may attain their high measures by different structures, so that no larger
-        # measure is known to be attained.
+        # measure is known to be attained. Rounding may leave the attained one above `high`, which
+        # is raised to it.
         return cls(low, reached, reached, np.maximum(high, reached))
 
     def counts(self, measure: Array) -> Ends:
@@ -261,13 +274,17 @@ def counts_between(records: Sequence[Increments], name: str, measure: Array) -> 
     either. Outside them the nearest measure counts.
 
     Args:
-        records: Demands (peak over limit) at the measures of each record, at least one record.
+        records: Demands (peak over limit) at the rising measures of each record, at least one
+            record.
         name: Name of the limit, or of the event that any of several limits is exceeded.
-        measure: Measures at which the records are counted, shape (measures,).
+        measure: Measures at which the records are counted, in any order, shape (measures,).
 
     Returns:
         `lower`: number of records under which all structures of the cut exceed the limit; `upper`:
         number under which some do; floats of shape (levels, measures) each.
+
+    Raises:
+        KeyError: A record has no such limit or event.
     """
     # Demands have the shape (largest and smallest, levels, measures).
     n_levels = records[0].demands[name].shape[1]
@@ -879,6 +896,8 @@ def _limit_fragility(
 ) -> LimitFragility:
     """Return the fragility of one limit or event: bands, medians, dispersion and confidence limits.
 
+    Bands and confidence limits have the shape (levels, measures), medians and dispersion (levels,).
+
     Args:
         about: Side, output, unit and value of the limit, or the name of the event.
         nature: Guarantee of the critical measures.
@@ -886,8 +905,8 @@ def _limit_fragility(
         measure: Measures at which the fraction of the records is given, shape (measures,).
         counts: Bounds of the number of records under which a structure exceeds the limit at these
             measures, shape (levels, measures) each.
-        independent: Whether the records are independent draws. Only then are there confidence
-            limits of the fraction. A dispersion takes two records or more.
+        independent: Whether the records are independent draws. If not, the confidence limits of
+            the fraction are None. The dispersion is None if there is a single record.
     """
     n_records = critical.low.shape[1]
     confidence = dispersion = None

@@ -193,6 +193,8 @@ class IncrementalAnalysis:
     def elastic_scales(self, points: Array) -> Array:
         """Return the scales of the record at which structures would reach limits if elastic.
 
+        The record must not be zero throughout.
+
         Args:
             points: Inputs of the structures in SI units, shape (structures, inputs).
 
@@ -216,10 +218,10 @@ class IncrementalAnalysis:
         return np.asarray(small_scale / np.hstack([ductility, demands]))
 
     def _grid(self, structures: Array) -> list[float]:
-        """Return rising scales in geometric progression, with at most 1.1 between neighbours.
+        """Return rising scales in geometric progression, each at most 1.1 times the one before.
 
-        They end with the largest scale of the analysis. At the first one the given structures are
-        elastic and keep every limit.
+        They are two or more, and end with the largest scale of the analysis. At the first one the
+        given structures are elastic and keep every limit.
 
         Args:
             structures: Inputs of the structures in SI units, shape (structures, inputs).
@@ -277,6 +279,9 @@ class IncrementalAnalysis:
 
     def _move(self, scale: float, points: Array) -> None:
         """Compute the demands of structures at a scale and add them to `self.moved[scale]`.
+
+        This is a pair of arrays, which is made if it is missing: inputs, shape (structures,
+        inputs), and peaks over limits, shape (structures, limits and events).
 
         Args:
             scale: Scale of the record.
@@ -491,7 +496,8 @@ def incremental(
 
     Returns:
         The largest and smallest peak, by record and output, that the nominal structure and others
-        spread over each cut have. They are attained; other structures may go farther.
+        spread over each cut have, shape (2, levels, scales), over the rising scales; infinite for a
+        collapse. They are attained; other structures may go farther.
 
     Raises:
         RefusedError: The columns do not yield, a scale is not positive, a record is zero

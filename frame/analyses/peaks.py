@@ -186,7 +186,8 @@ class Peak:
     def gaps(self) -> Array:
         """Distance between the farthest bound and the attained value as a fraction of the bound.
 
-        The shape is (levels,). It is NaN where no attained value is known, and 0 for a bound of 0.
+        The shape is (levels,). It is 0 for a bound of 0, and else NaN where no attained value or
+        no finite bound is known.
         """
         attained = np.where(np.isfinite(self.reached), self.reached, np.nan)
         difference = np.abs(self.far_end - attained)
@@ -321,7 +322,8 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
             Responses that were computed attain both ends; that no peak lies outside is at most an
             estimate.
         column: Index of the output.
-        between: What responses may add to a peak within the time steps, shape (levels,).
+        between: What responses may add to a peak within the time steps, shape (levels,). That of
+            the lowest level, the first one, becomes `between_nodes` of the peak.
 
     Returns:
         The peak with the upper ends as attained values, and the lower ends plus `between` as peaks

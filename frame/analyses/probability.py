@@ -355,8 +355,8 @@ def _step_error(flow: Flow, points: Array) -> Array:
         points: Inputs whose responses are compared with more accurate ones, shape (points, inputs).
     """
     # Errors of time stepping accumulate, so that an estimate holds for all later nodes.
-    errors = flow.deviations(points)[1].max(axis=0)
-    return np.asarray(MARGIN * np.maximum.accumulate(errors, axis=0))
+    _, errors = flow.deviations(points)  # (points, times, outputs)
+    return np.asarray(MARGIN * np.maximum.accumulate(errors.max(axis=0), axis=0))
 
 
 class PeakRatios(NamedTuple):
@@ -403,8 +403,8 @@ def _peak_ratios(
         flow: Response as a function of the fuzzy and then the random inputs, in SI units.
         points: Values of the fuzzy inputs, shape (points, fuzzy inputs).
         draws: Values of the random inputs, shape (draws, random inputs).
-        between: What the limited outputs may add to the larger end of the step before each node
-            within the step, shape (limits, times).
+        between: By how much the magnitude of the limited outputs may exceed, within the step before
+            each node, the larger of its values at both ends of the step, shape (limits, times).
         step_error: Error of the limited outputs at the nodes, shape (limits, times).
         columns: Index of the output that each limit belongs to.
         limits: Limits of magnitudes, positive, shape (limits,).
@@ -450,7 +450,8 @@ def _limit_probability(
             the range of the points, with what peaks between the nodes may add.
 
     Returns:
-        Bounds, interval and error on each level, and the bounds as functions of the limit.
+        Bounds, interval and error, shape (levels,) each, and the bounds as functions of 201 limits
+        around the peaks: in SI units, and as multiples of the limits for an event of several.
     """
     # The bounds are computed for 201 further limits, and for the limit itself, a ratio of 1.
     # Beyond these limits the probability is 0 or 1.

@@ -108,8 +108,9 @@ def sensitivity(
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         """Return the smallest and the largest peak magnitude of each output that ascents find.
 
-        The first call must be with all inputs fuzzy; its optima are kept in `found`, and later
-        calls, with the inputs of a group fixed, begin their searches there.
+        The first call must be with all inputs fuzzy. It begins its search for each output at the
+        row of `start` and keeps its optima in `found`. Later calls, with the inputs of a group
+        fixed, begin their searches there.
 
         Args:
             numbers: Inputs by name, in the order of `inputs`; those of a fixed group are crisp.

@@ -196,7 +196,8 @@ def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str,
         facts: Length of the response, and the fraction of the Arias intensity after its end.
     """
     warnings = [f"of record {name} {remark}" for remark in record.remarks]
-    mean_fraction = float(record.samples.mean()) / record.extremes[0]
+    peak, _ = record.extremes
+    mean_fraction = float(record.samples.mean()) / peak
     # A larger mean hints at an offset of the instrument, whose displacement grows quadratically.
     if abs(mean_fraction) > 0.01:
         what = f"the mean of record {name} is {percent_text(mean_fraction)} of its peak"
@@ -363,8 +364,8 @@ def over_records(
         inputs: Fuzzy parameters by name, in SI units.
         suite: Records, see `read_suite`.
         duration: Longest response, in s; a response ends five natural periods after its record.
-        step: Distance of the time nodes, in s; peaks are bounded at `NODES` nodes in each step.
-        alpha: Levels.
+        step: Distance of the time nodes, in s; peaks are bounded at two nodes in each step.
+        alpha: Levels, rising within [0, 1].
         names: Names of peaks, such as "drift1" for the magnitude, "max q3" or "min q3"; by default
             the magnitudes of all outputs.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
