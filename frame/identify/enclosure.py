@@ -134,10 +134,10 @@ class LinearRelaxation:
         """Return an expression for the product of two expressions, and enclose it by inequalities.
 
         A variable z is added to the linear program for x y, and rows, which are expressions that
-        must not exceed 0. With x in [a, b] and y in [c, d], the
-        nonnegative products (x - a)(y - c), (b - x)(d - y), (b - x)(y - c) and (x - a)(d - y) give
-        four rows that are linear in x, y and z (McCormick, Mathematical Programming 10, 147, 1976).
-        If an expression is constant, the product is exact and nothing is added.
+        must not exceed 0. With x in [a, b] and y in [c, d], the nonnegative products
+        (x - a)(y - c), (b - x)(d - y), (b - x)(y - c) and (x - a)(d - y) give four rows that are
+        linear in x, y and z (McCormick, Mathematical Programming 10, 147, 1976). If an expression
+        is constant, the product is exact and nothing is added.
 
         Args:
             x: Coefficients by all variables, shape (size,).
@@ -160,10 +160,9 @@ class LinearRelaxation:
         """Return an expression for exp(y), and enclose it by inequalities.
 
         A variable is added to the linear program, and rows, which are expressions that must not
-        exceed 0. Since the exponential is convex, it lies above
-        its tangents at both ends and at the midpoint of the range of y, and below the secant of
-        this range. The ends and the secant are widened by a few units of rounding. If y is
-        constant, nothing is added.
+        exceed 0. Since the exponential is convex, it lies above its tangents at both ends and at
+        the midpoint of the range of y, and below the secant of this range. The ends and the secant
+        are widened by a few units of rounding. If y is constant, nothing is added.
 
         Args:
             y: Expression, given by its coefficients by all variables, shape (size,).
@@ -345,8 +344,9 @@ class ChainRelaxation(LinearRelaxation):
         shears = []
         below = nothing  # amplitude of the ground
         for z in range(n):
-            # The shear force of a storey over the mean stiffness, since programs with numbers near
-            # 1 are solved best.
+            # `self.stiffness` and `self.mass` are expressions of the values over the nominal ones,
+            # which `chain` has. The shear force is that over the mean nominal stiffness, since
+            # programs with numbers near 1 are solved best.
             shear = self.product(self.stiffness[z], shape[z + 1] - below)
             shears.append(shear * (chain.stiffness[z] / unit))
             below = shape[z + 1]

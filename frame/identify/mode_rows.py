@@ -44,6 +44,11 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     deviations may stand in the columns ``frequency_std [Hz]`` and ``shape_std``. An empty cell
     means that the amplitude was not measured.
 
+    Returns:
+        For each mode its number, frequencies in Hz, and amplitudes by floor, an array of the rows
+        each, empty if fewer than two floors were measured; and the standard deviations that the
+        file states, relative to the mean frequency and to the largest amplitude, or None.
+
     Raises:
         RefusedError: The file is missing, its header or a row is wrong, a mode has an amplitude
             in some rows and not in others, or all amplitudes of a mode are zero.

@@ -82,14 +82,17 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
         values: The lines below the head: for each node a line that begins with its number, and
             lines with six numbers each. Empty lines are passed over.
 
+    Returns:
+        The number of the mode, its frequency in Hz, and its amplitudes by node and direction.
+
     Raises:
         ValueError: The data set is damaged: a word is no number, a line is missing, or a node is
             given twice.
         IndexError: A line of the head has too few words.
     """
-    # The sixth line has six codes: of the model, the analysis, the kind of the data (as of a
-    # displacement in three directions), its meaning, the type of its numbers, and their count at a
-    # node.
+    # The sixth line has six codes: of the model, the analysis (2 of normal modes, 3 and 7 of
+    # complex modes of first and second order), the kind of the data (as of a displacement in three
+    # directions), its meaning, the type of its numbers, and their count at a node.
     _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
     is_normal = analysis == 2
     is_complex = analysis in (3, 7)
@@ -117,7 +120,9 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
         # A node has three or six directions.
         for axis, k in zip(DIRECTIONS, range(0, numbers_of_node, numbers_of_value), strict=False):
             amplitudes[f"{node}.{axis}"] = complex(*numbers[k : k + numbers_of_value])
-    return UffShape(int(head[6].split()[3]), hertz, amplitudes)
+    # The seventh line has the counts of its codes and of its numbers, the load case and the mode.
+    mode = int(head[6].split()[3])
+    return UffShape(mode, hertz, amplitudes)
 
 
 def _real_amplitudes(

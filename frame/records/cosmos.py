@@ -147,6 +147,7 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
             samples are missing or are no numbers; the unit is none of accelerations; or the peak of
             the samples is not the peak that the header states.
     """
+    # Groups: 1 the count of samples, 2 the duration in s, 3 the unit, 5 the characters of a number.
     match = DATA.fullmatch(file.lines[channel.line])
     assert match is not None
     count = int(match[1])
@@ -200,6 +201,7 @@ def _real_header(file: TextFile, line: int) -> Array:
     Raises:
         RefusedError: `line` is -1 or is no such line, or a word of the header is no finite number.
     """
+    # Groups: 2 the count of lines, 4 the characters of a number.
     match = REALS.fullmatch(file.lines[line]) if line >= 0 else None
     if match is None:
         allowed = HEADER_WORDS

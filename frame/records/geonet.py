@@ -101,7 +101,7 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
             counts and step; samples are missing or are no numbers; the step is not from 4e-5 s to
             below 0.5 s; or the samples have another peak than the head.
     """
-    match = MARK.match(file.lines[0])
+    match = MARK.match(file.lines[0])  # its group is UN in "UNCORRECTED ACCELEROGRAM"
     if match is not None and match[1]:
         cure = "take the corrected file of the same record, .V2A"
         raise file.refusal(0, file.lines[0].strip(), "a corrected accelerogram", cure)

@@ -95,6 +95,7 @@ class History:
         """
         checked_number("frequency", hertz, positive=True)
         omega = 2 * np.pi * float(hertz)
+        # The sine is multiplied by samples, which are 1 here and are held for ever.
         return cls(1.0, np.ones(2), start, is_held=True, frequency=omega, phase=phase)
 
     @property

@@ -51,8 +51,8 @@ def read_record(
         unusual, or was taken for granted.
 
     Raises:
-        RefusedError: The file cannot be read, is of another format, or does not fit its own head;
-            the message names the line.
+        RefusedError: An argument is of another type or is unknown; or the file cannot be read, is
+            of another format, or does not fit its own head: the message names the line.
 
     Example:
         >>> ground = read_record("cases/suite/record-2001.AT2")

@@ -84,6 +84,7 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     step = history.step
     if history.times is not None:
         step = _even_step(key, history.times)
+    # Line 9 of the head is of the ordinate and has its unit in columns 48 to 67.
     own_unit = found[chosen].head[8][47:67].strip()
     if own_unit.upper() in ("", "NONE"):
         own_unit = unit
@@ -140,7 +141,7 @@ def _require_acceleration(key: str, data_set: DataSet) -> None:
         ValueError: A code of the head is no whole number.
     """
     # Columns of the format: the function in line 6, the quantities of abscissa and ordinate at the
-    # beginning of lines 8 and 9.
+    # beginning of lines 8 and 9, as code numbers; 12 is an acceleration.
     function = int(data_set.head[5][:5])
     axis = int(data_set.head[7][:10])
     # A function of the general type 0 over times (17) is a time history (1) as well.
