@@ -178,7 +178,7 @@ INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), Exact())}
 
 
 def state_matrix(m: Matrices) -> Jet:
-    """Return the state matrices A of the free motion [q; v]˙ = A [q; v] (eq. 17, eq. 23).
+    """Return the state matrices A of the free motion [q; v]˙ = A [q; v].
 
     Args:
         m: Mass M, damping D and stiffness K of n unknowns at S parameter sets, with their

@@ -116,7 +116,8 @@ class YieldingFlow(Flow):
         if derivatives:
             allowed = "methods without derivatives: auto or quasi-monte-carlo"
             raise RefusedError("method", "a follower or a proof, of columns that yield", allowed)
-        return Jet.constant(self.values_and_peaks(points)[0], 0)
+        trajectories, _ = self.values_and_peaks(points)
+        return Jet.constant(trajectories, 0)
 
     def values_and_peaks(
         self, points: Array, *, takes_collapse: bool = False
@@ -792,7 +793,8 @@ def _observe(
             moment += storeys[5, i] * shear
         # The residual drift is that at which the storey would rest without load. Elastic unloading
         # leads to (1 − a) k p / (k − s), a the hardening, p the plastic drift and s the softening.
-        # The storey yields back on the way if that is beyond (1 − a) k d_y / |a k − s|.
+        # The storey yields back on the way if that is beyond (1 − a) k d_y / |a k − s|, which is
+        # infinite where a k = s, as without hardening and weight.
         back = abs((1 - hardening) * k * yield_drift / (hardening * k - softening))
         residual = min(max(offset_force / (k - softening), -back), back)
         by_kind = (

@@ -248,7 +248,8 @@ def _with_reached(proved: Envelope, flow: UnitFlow, followed: PassBounds) -> Env
         proved: The guaranteed envelope, with attained bounds.
         flow: The response over the boxes of the inputs, for which both were computed.
         followed: Attained bounds of the same problem: upper bounds of (-output, output), shape
-            (levels, times, outputs, 2), and the unit coordinates that attain them.
+            (levels, times, outputs, 2), and the unit coordinates that attain them, with a further
+            axis of the inputs.
     """
     # The attained values of a proof are reduced by a bound of their rounding, those of a follower
     # are not. Rounding of its trajectories stays below a 1e-9th of the peak.

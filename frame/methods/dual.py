@@ -480,6 +480,13 @@ def _exact_bounds(box: Box) -> BoxBounds:
 
     Args:
         box: The box, whose lower and upper ends are equal.
+
+    Returns:
+        `upper` and `attained`, shape (times, outputs, 2), on the last axis first of the output with
+        its sign changed; `attained_at`, the point in SI units, with a further axis of the inputs;
+        `between_nodes`, the distance from straight lines between nodes, and `attained_error`, shape
+        (times, outputs); `gap_fractions`, shape (outputs, 2, inputs); and `least_peaks`, bounds of
+        the largest magnitude over all times, shape (outputs,).
     """
     value, error = box.midpoint_response()
     sides = np.stack([-value, value], axis=-1)

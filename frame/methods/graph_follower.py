@@ -87,9 +87,11 @@ class Storage:
         """Compute graphs (trajectories of all outputs) with derivatives, and store them.
 
         A place is an upper bound that is followed: one side (0 for the output with its sign
-        changed, 1 for the output) of an output at a time node. `points`, `top`, `best`, `first`,
-        `second` and `steepest` are updated; where a new graph equals the best value so far, the
-        older graph stays the best.
+        changed, 1 for the output) of an output at a time node. At each place `top` (largest value),
+        `best` (index of its graph), and `first` and `second` (derivatives of the output there, with
+        the sign of the output on both sides) are updated; so are `points` (of all graphs) and, by
+        output, `steepest` (largest magnitude of a first derivative). Where a new graph equals the
+        best value so far, the older graph stays the best.
 
         Args:
             points: Inputs of the graphs, at least one, shape (graphs, inputs), in unit coordinates,
@@ -136,7 +138,7 @@ class Storage:
         bend: float = 1.0,
         reach: Array | float = np.inf,
     ) -> ModelMaxima:
-        """Return the maxima over a box of the Taylor models of the best graphs (eq. 22).
+        """Return the maxima over a box of the Taylor models of the best graphs.
 
         A place is a side of an output at a time node. Its model is the polynomial of second degree
         in the unit coordinates about the graph that is the best there.

@@ -234,7 +234,8 @@ class Proof:
         """Return, without raising it, the error for a model that is too inaccurate.
 
         It is a `GapError` with the index of the input to bisect, the one that contributes most, or
-        a `BisectionError` if more bisections are needed than the number of sub-boxes allows.
+        a `BisectionError` if more bisections are needed than the number of sub-boxes allows, or if
+        no input contributes to the error.
 
         Args:
             model: The model of the last degree that was tried.

@@ -539,7 +539,8 @@ def modal_energy_fractions(system: MatrixStructure, terms: Sequence[int] | Ints)
     With K = Σ K_i it is Σ φᵀK_i φ / φᵀK φ over the chosen terms K_i, for the undamped modes φ by
     rising frequency. To first order the loss factor of a mode is the mean of those of its parts
     with these weights (Johnson and Kienholz, AIAA Journal 20, 1284, 1982). The modes are those at
-    nominal values; there are as many as unknowns with mass.
+    nominal values; there are as many as unknowns with mass. The fraction of a mode without strain
+    energy, such as a rigid motion, is arbitrary or NaN.
 
     Args:
         system: The structure.

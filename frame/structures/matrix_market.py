@@ -147,6 +147,8 @@ def dense_of_entries(
 def _numbers(name: str, text: bytes) -> Array:
     """Return the numbers in a text, shape (numbers,), in which blanks separate them.
 
+    A number beyond the range of floats gives infinity.
+
     Raises:
         RefusedError: A word is no number, such as 1e or 1-2.
     """

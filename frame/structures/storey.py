@@ -428,7 +428,7 @@ class StoreyFrame(LinearSystem):
             inertia = p["I"][..., None]
         # A column that is clamped at both ends resists a unit displacement between them by
         # 12 E I / l³ (slope-deflection equations); c columns of a storey act side by side.
-        rigidity = 12.0 * p["E"][..., None] * inertia  # 24 E I / l³ of two columns in section 6.1
+        rigidity = 12.0 * p["E"][..., None] * inertia
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
     def yield_drifts(self, p: Mapping[str, Number]) -> Number:
