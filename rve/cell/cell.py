@@ -215,8 +215,9 @@ def continuous_radii(radius_map: RadiusMap) -> Array:
             distribution of θ.
 
     Raises:
-        RefusedError: It is no radius map, a radius is outside (0, 1), or neighbouring radii differ
-            by more than 0.01: the map jumps, and no rule in θ can tell the error of a jump.
+        RefusedError: It is no radius map, a radius is outside (0, 1), which is tested at 65 even
+            steps, or neighbouring radii differ by more than 0.01: the map jumps, and no rule in θ
+            can tell the error of a jump.
     """
     require_map(radius_map)
     distribution = radius_map.distribution

@@ -161,7 +161,8 @@ class PrismModel(CellModel):
         Raises:
             ConvergenceError: The linear solver stopped before its tolerance was reached.
             CertificateError: A property that every right result has is violated.
-            FoldedMeshError: The map bends more than the layers can follow.
+            FoldedMeshError: The map bends more than the layers can follow, or the particle nearly
+                touches the sides of the cell.
             RefusedError: Arguments are no map, phase and list of phases, a Poisson's ratio is above
                 0.45, a radius does not fit into the cell, the density of θ is zero at a quadrature
                 point, or PETSc does not use an option. With `estimate`, also what the more accurate
@@ -244,7 +245,8 @@ class PrismModel(CellModel):
             RefusedError: There is not exactly one inclusion, an argument is of the wrong kind, a
                 radius does not fit into the cell, the density of θ is zero at a quadrature point,
                 or PETSc does not use an option. Poisson's ratio is not limited here.
-            FoldedMeshError: The map bends more than the layers can follow.
+            FoldedMeshError: The map bends more than the layers can follow, or the particle nearly
+                touches the sides of the cell.
             ConvergenceError: The linear solver did not reach its tolerance.
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
@@ -264,7 +266,8 @@ class PrismModel(CellModel):
                 distribution of θ.
 
         Raises:
-            FoldedMeshError: The map bends more than the layers can follow.
+            FoldedMeshError: The map bends more than the layers can follow, or the particle nearly
+                touches the sides of the cell.
             RefusedError: It is no radius map, a radius does not fit into the cell, or the density
                 of θ is zero at a quadrature point.
         """

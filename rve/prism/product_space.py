@@ -39,7 +39,8 @@ class ProductSpace:
         density: f_Θ at the quadrature points.
 
     Raises:
-        FoldedMeshError: The map bends more than the layers can follow.
+        FoldedMeshError: The map bends more than the layers can follow, or the particle nearly
+            touches the sides of the cell.
         RefusedError: The mesh of the model does not follow the particles, as that of a level set.
 
     Example:
@@ -199,7 +200,8 @@ def _separate_problem(
         law: Radius map for prisms; distribution of θ for a mesh from a file.
 
     Raises:
-        FoldedMeshError: The map bends more than the layers can follow.
+        FoldedMeshError: The map bends more than the layers can follow, or the particle nearly
+            touches the sides of the cell.
         MeshError: The file holds no mesh of a cell.
         RefusedError: `law` is not of the kind that the model takes, does not fit the mesh, or has a
             density that is zero at a quadrature point; or the mesh of the model does not follow the

@@ -251,7 +251,7 @@ def converged_means(
 
     Raises:
         RuleError: No rule of up to 1200 nodes converges.
-        RefusedError: The radius jumps, or lies outside [0, 1).
+        RefusedError: The map jumps, or a radius is outside (0, 1).
         SeriesError: The series does not converge at some radius, since particles nearly touch.
     """
     most_points = 1200

@@ -365,8 +365,8 @@ class SeriesModel(AnyModel):
         Raises:
             SeriesError: Particles nearly touch.
             RuleError: No quadrature rule converges, since the radius map is not smooth.
-            RefusedError: A phase is not isotropic, there is no inclusion, or the radius lies
-                outside [0, 1) or jumps.
+            RefusedError: A phase is not isotropic, there is no inclusion, a radius is outside (0,
+                1), or the map jumps.
             CertificateError: A result violates a bound by more than its declared error.
         """
         require_solve_arguments(radius_map, matrix, inclusions)
