@@ -351,16 +351,17 @@ def peak_table(parts: Parts) -> Table:
             is_force = study.units[output_of(peak_name)] == "N"
             # A limit of NaN stands for none, so that a peak without limits has a row as well.
             verdicts = limits.get(peak_name, [(math.nan, "")])
+            record = farthest.get(peak_name, "")
             for label, factor in display_units(peak_name, unit, parts.structure, is_force=is_force):
-                cells = peak_cells(peak, factor, levels)
-                cells.append(farthest.get(peak_name, ""))
+                cells = [*peak_cells(peak, factor, levels), record]
                 for limit, verdict in verdicts:
                     limit_text = ""
                     if not math.isnan(limit):
                         limit_text = engineering(limit * factor, "")
                     rows.append([label + suffix, *cells, limit_text, verdict])
-                    # Further limits of the same peak do not repeat what is said of it.
+                    # Further limits and units of the same peak do not repeat what is said of it.
                     cells = [""] * len(cells)
+                    record = ""
     titles = [f"α = {alpha[level]:g}" for level in levels]
     # At α = 1 triangular numbers have one value, the nominal one, and so has each peak.
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):

@@ -12,7 +12,7 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import range_text
-from alphacut.frame import Decision, Peak
+from alphacut.frame import Decision, Peak, SuitePeaks
 from alphacut.frame.analyses.decision import LimitDecision
 from alphacut.fuzzy.result import Ends, Nature
 from alphacut.io.results import ResultsFolder
@@ -110,6 +110,19 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     assert rows[1][:4] == ("  % of storey", "0.2750", "0.262 … 0.288", "0.2592 … 0.3001")
     assert rows[2][:2] == ("a3, g", "0.2039")
     assert rows[4][:4] == ("  % of weight", "2.000", "1.00 … 3.00", "1.000 … 4.000")
+
+
+def test_the_record_that_moves_a_structure_farthest_is_named_once():
+    ends = ([0.010371, 0.0105, 0.011], [0.012004, 0.0115, 0.011])
+    parts = peaks_of(drift1=ends)
+    study = parts.envelopes["all"]
+    suite = SuitePeaks(
+        period_s=1.0, damping_ratio=0.05, alpha=study.alpha, by_record={}, statistics={},
+        units=study.units, peak=study.peak, farthest_record={"drift1": "kobe"},
+    )  # fmt: skip
+    head, rows = peak_table(replace(parts, envelopes={}, records=suite))
+    assert [row[0] for row in rows] == ["drift1, mm", "  % of storey"]
+    assert [row[head.index("record")] for row in rows] == ["kobe", ""]
 
 
 def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
