@@ -640,6 +640,8 @@ def _real_times(real: Array, coefficients: Array) -> Array:
 def _padded(part: Array, ndim: int) -> Array:
     """Return a part (monomials, *V) whose V has at least `ndim` axes, new ones on the left."""
     missing = max(ndim - (part.ndim - 1), 0)
+    if not missing:  # as in most products, of which there are many
+        return part
     return np.expand_dims(part, tuple(range(1, 1 + missing)))
 
 

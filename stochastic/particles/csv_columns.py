@@ -35,7 +35,8 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Ints, Array]:
 
     Raises:
         RefusedError: The file cannot be read or has no rows below the header, a column or its unit
-            is missing or unknown, a row has more fields than the header, or a field is no number.
+            is missing or unknown, a row has more fields than the header and none is empty, or a
+            field is no number.
     """
     header, *rows = fields(path)
     found = [_column(header.cells, name, path) for name in columns]
