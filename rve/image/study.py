@@ -202,7 +202,8 @@ class ImageStudy:
         """Size of the image and memory of its solution, in words.
 
         They read as "512 × 512 pixels (y, x), about 0.5 GB of memory". The memory is an estimate
-        for all α-levels. A volume has "voxels (z, y, x)".
+        for all α-levels. A volume has "voxels (z, y, x)". RefusedError if a phase has moduli that
+        are not allowed.
         """
         nominal = self.images(None, None)
         shape = nominal.shape

@@ -190,6 +190,7 @@ class PrismModel(CellModel):
             FoldedMeshError: An element folds where the grid follows the map.
             ConvergenceError: The linear solver did not reach its tolerance.
             CertificateError: A result violates a bound or symmetry by more than its error allows.
+            FailedError: The reference model, used with `estimate`, did not converge.
             RefusedError: The density of θ is zero at a quadrature point, PETSc does not use an
                 option, or the reference model, used with `estimate`, refuses the cell.
         """

@@ -327,6 +327,7 @@ class SliceProblem:
 
         Raises:
             RefusedError: PETSc does not use one of the options.
+            ConvergenceError: A factorisation failed though no option overrides the default.
         """
         preconditioner = _preconditioner(self.numbering, str(options))
         blocks = matrix.getPythonContext().level_blocks()

@@ -192,6 +192,8 @@ class ThetaPreconditioner:
 
         Raises:
             ValueError: There are more or fewer blocks than levels and mid-levels of this rank.
+            numpy.linalg.LinAlgError: The mass of the hats along θ is singular, since the density
+                is zero at too many points.
             PETSc.Error: A block cannot be factorised.
         """
         numbering = self._numbering
