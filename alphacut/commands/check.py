@@ -344,7 +344,7 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
         read_at_nodes = [name for name in linear.outputs if linear.unit_of(name) == "m/s^2"]
         if not read_at_nodes:
             return
-        linear = linear.elastic().with_outputs(read_at_nodes)
+        linear = linear.with_outputs(read_at_nodes).elastic()
     flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))  # the one structure without fuzzy inputs
     at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
