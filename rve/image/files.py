@@ -221,7 +221,10 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
         require(is_read, path.name, what, "one page of grey values", cure)
         # Many programs write equal resolutions whatever the pixels are, such as 0 and 0 in a BMP;
         # unlike ones are meant.
-        dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
+        try:
+            dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
+        except ZeroDivisionError:  # a fraction over 0 in a TIFF: the pixels are not stated
+            dpi_x = dpi_y = 1.0
         is_as_stated = not has_square_pixels or abs(dpi_x - dpi_y) <= 0.01 * dpi_y
         what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
         cure = "give cell.pixel = [width, height]"

@@ -68,6 +68,19 @@ def test_a_bmp_whose_resolution_is_zero_has_square_pixels(tmp_path):
     assert np.array_equal(read_grid(tmp_path / "a.bmp", (1, 1)), values[::-1])
 
 
+def test_a_tiff_whose_resolution_is_over_zero_states_no_pixels(tmp_path):
+    from PIL import Image, TiffImagePlugin
+
+    values = np.arange(64, dtype=np.uint8).reshape(8, 8)
+    tags = TiffImagePlugin.ImageFileDirectory_v2()
+    x_resolution, y_resolution, unit = 282, 283, 296
+    tags[x_resolution] = TiffImagePlugin.IFDRational(0, 0)
+    tags[y_resolution] = TiffImagePlugin.IFDRational(72, 1)
+    tags[unit] = 2  # inch
+    Image.fromarray(values).save(tmp_path / "a.tif", tiffinfo=tags)
+    assert np.array_equal(read_grid(tmp_path / "a.tif", (1, 1)), values[::-1])
+
+
 @pytest.mark.parametrize("kind", [np.uint32, np.int8])
 def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
     from PIL import Image
