@@ -15,6 +15,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import (
     RefusedError,
     checked_number,
+    is_number,
     require,
     require_choice,
     require_numbers,
@@ -108,7 +109,7 @@ class MatrixStructure(LinearSystem):
                 damping ratio is outside [0, 1), or there are neither none, one, nor one for each
                 mode.
         """
-        for name in ("parameters", "observed"):
+        for name in ("parameters", "observed", "row_factors"):
             value = getattr(self, name)
             is_table = isinstance(value, Mapping)
             require(is_table, name, value=type(value).__name__, allowed="a dict by name")
@@ -158,7 +159,8 @@ class MatrixStructure(LinearSystem):
                 value = self.parameters.get(ratio, np.nan)
             else:
                 value = ratio
-            is_allowed = is_allowed and Parameter("", range=RATIO).admits(value, value)
+            is_within = is_number(value) and Parameter("", range=RATIO).admits(value, value)
+            is_allowed = is_allowed and is_within
         allowed = f"one number or parameter, or one a mode, {RATIO}"
         require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
 
@@ -358,10 +360,14 @@ class MatrixStructure(LinearSystem):
             factor = factor.simplest
         if hasattr(value, "toarray"):
             value = value.toarray()
-        array = np.asarray(value)
-        size = np.shape(self.mass[0][1])[0]
         key = f"array of {kind}"
         cure = "all matrices have as many rows and columns as there are unknowns"
+        try:
+            array = np.asarray(value)
+        except ValueError:  # as NumPy refuses rows of different lengths
+            raise RefusedError(key, "of uneven rows", "a square array", cure) from None
+        require(array.ndim == 2, key, f"of shape {array.shape}", "a square array", cure)
+        size = np.shape(self.mass[0][1])[0]  # the first mass has been checked before all others
         is_square = array.shape == (size, size)
         require(is_square, key, f"of shape {array.shape}", f"({size}, {size})", cure)
         require_numbers(kind, array)

@@ -175,7 +175,7 @@ class StoreyFrame(LinearSystem):
             values = tuple(getattr(self, name)) or defaults.get(name, ())
             object.__setattr__(self, name, values)
         # frozen dataclasses are set by `object.__setattr__`, as in their own initialiser
-        names = self.outputs or [f"q{z + 1}" for z in range(n)]
+        names = tuple(self.outputs) or tuple(f"q{z + 1}" for z in range(n))
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
             self.quantity(output)
@@ -194,14 +194,19 @@ class StoreyFrame(LinearSystem):
 
         Raises:
             RefusedError: `masses` is empty; a list has another length or is no list of finite
-                numbers; a number is outside the range of its parameter, such as a mass that is not
-                positive; or the place of the dampers or the stiffness of Rayleigh's damping is none
-                of the two words allowed.
+                numbers; `rayleigh` is no list of two numbers, or `outputs` no list; a number is
+                outside the range of its parameter, such as a mass that is not positive; or the
+                place of the dampers or the stiffness of Rayleigh's damping is none of the two words
+                allowed.
         """
-        for name in ("masses", "stiffness", "lengths", "yield_force", "yield_drift"):
-            values = getattr(self, name)
-            if values is not None and not isinstance(values, str):
-                require_sequence(name, values, "one value a floor, from below")
+        lists = ["masses", "stiffness", "lengths", "columns", "dampers", "q0", "v0"]
+        lists += ["yield_force", "yield_drift", "hardening"]
+        for name in lists:
+            require_sequence(name, getattr(self, name), "one value a floor, from below")
+        allowed = "two numbers, of mass and of stiffness"
+        require_sequence("rayleigh", self.rayleigh, allowed)
+        require(len(self.rayleigh) == 2, "rayleigh", f"a list of {len(self.rayleigh)}", allowed)
+        require_sequence("outputs", self.outputs, "a list of names")
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         checked_number("gravity", self.gravity, least=0)
@@ -214,11 +219,13 @@ class StoreyFrame(LinearSystem):
             values = getattr(self, name)
             if values is None:
                 continue
-            is_single = np.ndim(values) == 0 or name == "modulus"
+            is_single = not hasattr(values, "__len__") or name == "modulus"
             if is_single:
                 checked_number(name, values)
             else:
                 require_numbers(name, values)
+                shape = np.shape(values)
+                require(len(shape) == 1, name, f"of shape {shape}", "a list of numbers")
             parameter = of_storey_frame(symbol.format(""))
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"

@@ -50,6 +50,12 @@ def matrices(**changes):
         (COLUMNS, {"stiffness": (1e6, 1e6)}, "modulus, second_moment.* either stiffness or what"),
         (SPRINGS, {"gravity": 500.0}, "storey 1 under P-Delta is 1e.06 N/m; .* it buckles"),
         (SPRINGS, {"gravity": 9.81, "lengths": ()}, "lengths is missing"),
+        (SPRINGS, {"masses": None}, "masses is NoneType"),
+        (SPRINGS, {"dampers": None}, "dampers is NoneType"),
+        (SPRINGS, {"q0": [[0.1], [0.2, 0.3]]}, r"q0 is \[0.1\]; allowed: finite numbers"),
+        (SPRINGS, {"v0": np.zeros((2, 2))}, r"v0 is of shape \(2, 2\); allowed: a list"),
+        (SPRINGS, {"rayleigh": (0.1,)}, "rayleigh is a list of 1; allowed: two numbers"),
+        (SPRINGS, {"outputs": 1}, "outputs is int; allowed: a list of names"),
     ],
 )  # fmt: skip
 def test_a_storey_frame_refuses(frame, changes, message):
@@ -75,6 +81,10 @@ MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q
         ({"observed": {"q": np.ones(3)}}, "observed: q is of shape"),
         ({"ratios": [0.1, 0.2, 0.3]}, "ratios is .*; allowed: one number or parameter"),
         ({"ratios": [1.0]}, "ratios is .*, 0 or greater"),
+        ({"ratios": [None]}, "ratios is .*, 0 or greater"),
+        ({"row_factors": 2.0}, "row_factors is float; allowed: a dict by name"),
+        ({"mass": [("m", 1.0)]}, r"array of mass is of shape \(\); allowed: a square array"),
+        ({"mass": [("m", [[1.0, 0.0], [1.0]])]}, "array of mass is of uneven rows"),
         ({"parameters": {"m": "1 kg", "k": 2.0}}, "parameter m is '1 kg'"),
         ({"parameters": {"m": 1.0, "k": 2.0, "k 3": 1.0}}, "name of a parameter is 'k 3'"),
         ({"observed": {"roof drift": EYE[0]}}, "name of an output is 'roof drift'; allowed: names"),
