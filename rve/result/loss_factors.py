@@ -52,6 +52,7 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
     Raises:
         RefusedError: The result has no energies, or `losses` is not given and the result has no
             cell whose phases could state them.
+        ValueError: `losses` is of another number of phases.
     """
     energies = result.energies
     if energies is None:

@@ -33,7 +33,7 @@ def reference_bounds(
     """Return the Hashin–Shtrikman bounds of a composite of isotropic phases.
 
     Args:
-        phases: The materials.
+        phases: The materials, one at least.
         fractions: Volume fraction of each phase; their sum is 1, which is not checked.
         space: Whether the composite is isotropic in space, and K that of three dimensions; else in
             the plane across fibres, and K that of plane strain.
