@@ -298,8 +298,8 @@ def usual_division(images: ModuliImages) -> int:
     """Return the number of finite elements along each side of a pixel or voxel, 1 or 2.
 
     It is 2 for images of up to 2¹⁹ pixels whose largest bulk and shear moduli are each at most 10
-    times the smallest. Of a voxel it is 1, since two elements take eight times as long and narrow
-    the bounds by half.
+    times the smallest, limits that are tuned. Of a voxel it is 1, since two elements take eight
+    times as long and narrow the bounds by half.
 
     Args:
         images: Lower and upper moduli, shape (2, y, x) or (2, z, y, x). With pores or rigid phases

@@ -132,6 +132,8 @@ def _max_bytes_per_byte(compression: int) -> float:
 def _pages_by_pillow(path: Path, dtype: np.dtype[Any]) -> Array:
     """Return the stored values of all pages of a TIFF file, read by Pillow.
 
+    It serves files that are compressed by LZW, for which tifffile would need another package.
+
     Args:
         path: The file, whose pages are alike.
         dtype: Type of the numbers by the heads.

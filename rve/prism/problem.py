@@ -168,7 +168,8 @@ def require_valid_elements(
             process alone.
 
     Raises:
-        FoldedMeshError: An element of any rank is inverted; the error is raised on all of them.
+        FoldedMeshError: An element of any rank is inverted, or nearly so around such an outline.
+            The error is raised on all ranks.
     """
     determinants = areas / slice_weights()
     means = determinants.mean(axis=(1, 2), keepdims=True)

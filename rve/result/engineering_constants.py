@@ -55,7 +55,8 @@ class EngineeringConstants:
             errors: Declared absolute errors of its entries, shape (3, 3), in Pa; NaN where unknown.
 
         Returns:
-            Values and absolute errors, which are of first order with a margin of a tenth.
+            `values` and absolute `errors`, shape (4,) each in this order, moduli in Pa. The errors
+            are of first order with a margin of a tenth.
 
         Raises:
             numpy.linalg.LinAlgError: C is singular.

@@ -131,10 +131,10 @@ class FourierPreconditioner:
             xp: Module of the library of the arrays that the inverse is applied to.
 
         Returns:
-            Real blocks of the inverse by wave number, shape (unknowns, unknowns, *waves), and the
-            phases of the unknowns that make them real, shape (unknowns, *waves); in double
-            precision for pixels, in single precision for voxels, where blocks are scaled by a power
-            of two.
+            Object with `inverse`, real blocks by wave number, shape (unknowns, unknowns, *waves),
+            and `phases` of the unknowns, which make them real, shape (unknowns, *waves). Both are
+            in double precision for pixels, and in single precision for voxels, where blocks are
+            multiplied by `scale`, a power of two.
         """
         waves = [2 * np.pi * np.fft.fftfreq(size) for size in shape[:-1]]
         waves.append(2 * np.pi * np.fft.rfftfreq(shape[-1]))
@@ -152,7 +152,8 @@ class FourierPreconditioner:
         half = *shape[:-1], waves[-1].size
         inverse = xp.empty((n, n, *half), dtype=real_type)
         phases = xp.empty((n, *half), dtype=complex_type)
-        # Six potentials in space are more than stresses need: some of their fields have none.
+        # Six potentials in space are more than stresses need: some fields of potentials have no
+        # stress, and so no energy.
         has_gauge = element.stress and element.dimension == 3
         for slab in slabs(inverse):
             slab_waves = [waves[0][slab], *waves[1:]]
