@@ -164,7 +164,7 @@ def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
     """Return the sentences of `doubts` on a case that is refused, as far as it can be read."""
     try:
         return list(doubts(content, rows, _structure_of_envelope(content)))
-    except RefusedError:
+    except (RefusedError, FailedError):
         return list(doubts(content, rows, None))
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands import check
 from alphacut.entry import main
 from alphacut.frame import propagation
@@ -102,6 +103,24 @@ def test_a_unit_that_may_be_wrong_is_told_before_what_is_refused(tmp_path, capfd
     doubt, *_, refusal = stiff[2].splitlines()
     assert "frame.second_moment is 300000 m^4, which is unusual: is its unit right?" in doubt
     assert "step is 0.01 s; allowed: up to" in refusal
+
+
+def test_a_material_that_is_not_found_hides_neither_doubts_nor_what_is_refused(
+    tmp_path, capfd, monkeypatch
+):
+    def refused(content):
+        raise RefusedError("mesh.file", "damaged", "a mesh")
+
+    def failed(content):
+        raise FailedError("the series does not converge")
+
+    monkeypatch.setattr(check, "require_runnable", refused)
+    monkeypatch.setattr(check, "foreseen_structure", failed)
+    tiny = "--set=frame.modulus=[22, 24, 26] Pa"
+    status, _, err = spoken(capfd, "check", written(tmp_path), tiny)
+    assert status == 2
+    assert "frame.modulus is 22.00 Pa" in err
+    assert err.splitlines()[-1].endswith("mesh.file is damaged; allowed: a mesh")
 
 
 def test_a_limit_beyond_all_structures_is_doubted(capfd):
