@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated
 
@@ -102,10 +102,30 @@ Term = Annotated[tuple[Monomial, Array], PlainValidator(_term)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
 
+def _si_unit(value: object, _: ValidationInfo) -> str:
+    """Return a unit of SI, or a word that is no known unit.
+
+    Rows act on unknowns in SI units, so that a multiple such as kN would make the output a thousand
+    times too large.
+
+    Raises:
+        RefusedError: The unit is a multiple of one of SI.
+    """
+    unit = str(value)
+    try:
+        number, si = parse_fuzzy_in_any_unit(f"1 {unit}")
+    except ValueError:
+        return unit
+    cure = f"write {si}; a limit may be in {unit}"
+    require(number.nominal == 1 or not si, "", unit, "SI units, as m, N or N*m", cure)
+    return unit
+
+
 class ObservedRow(Section):
     """One output of a structure from matrices: a row that acts on the unknowns."""
 
-    unit: str = Field(default="m", description="SI unit of the output, as m, N or N*m")
+    unit: Annotated[str, text(_si_unit)] = "m"
+    """SI unit of the output, as m, N or N*m"""
     row: dict[str, float] = Field(description='entries of the row by unknown, as {"5.x" = 1}')
     factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Monomial(1.0, ())
     """factor of the row, as "E*I*l^-2", 1 unless given"""
@@ -196,6 +216,21 @@ class MatricesSection(StructureSection):
             key = f"matrices: {error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
         return Structure(model, numbers)
+
+    def warnings(self, structure: Structure | None) -> Iterator[str]:
+        """Yield a sentence for each fuzzy parameter that no factor has.
+
+        Args:
+            structure: The structure, which is not looked at.
+        """
+        used = set[str]()
+        for factor, _ in (*self.mass, *self.stiffness, *self.damping):
+            used.update(dict(factor.powers))
+        for output in self.outputs.values():
+            used.update(dict(output.factor.powers))
+        for name, number in self.parameters.items():
+            if number.support.width > 0 and name not in used:
+                yield f"matrices.parameters.{name} is in no factor: is a name misspelt?"
 
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber

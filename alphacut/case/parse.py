@@ -129,10 +129,14 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
                 kind = "section"
             # A near key of the same section is shown by its last name alone.
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
-            if close:
+            names = ", ".join(_sibling_names(model, key))
+            if suggested[key] == key:  # as cell.matrix_modulus of a cell whose mesh is a file
+                yield RefusedError(key, f"a {kind} of another kind of section", names)
+            elif "." in close:  # of another section: it may be one of this section that is meant
+                yield RefusedError(key, f"an unknown {kind}", names, f"did you mean {close}?")
+            elif close:
                 yield RefusedError(key, f"an unknown {kind}", "", f"did you mean {close}?")
             else:
-                names = ", ".join(_sibling_names(model, key))
                 yield RefusedError(key, f"an unknown {kind}", names)
         elif key not in suggested.values():
             yield _refusal(model, key, detail)

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, cast
 
+import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, StoreyFrame, damping_from_loss, pendulum, read_record
 from alphacut.frame.structures.linear import LinearSystem, has_matrices
@@ -364,6 +366,7 @@ class Frame(StructureSection):
         if tallest > 100:  # m, ten times the height of a tall storey
             yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
             return
+        yield from self._size_warnings(tallest or 5.0)
         if self.gravity or self.lengths is None or structure is None:
             return
         # The coefficients are the largest in the supports of all parameters: if they are small,
@@ -371,6 +374,29 @@ class Frame(StructureSection):
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
         yield from self._weight_warnings(frame.stability_coefficients(ends))
+
+    def _size_warnings(self, height: float) -> Iterator[str]:
+        """Yield a sentence for each start, yield drift, yield force or gravity of an unusual size.
+
+        Args:
+            height: Height of the tallest storey in m, or a guess.
+        """
+        starts = [x.nominal for x in self.per_floor(self.displacements)]
+        drift = np.abs(np.diff(starts, prepend=0.0)).max()
+        # storeys stand drifts of some 5 % of their height, and yield below 2 %
+        if drift > height / 4:
+            yield f"frame.displacements shear a storey by {drift:.3g} m: is a unit wrong?"
+        yield_drifts = [x.nominal for x in self.yield_drift or ()]
+        if yield_drifts and max(yield_drifts) > height / 4:
+            yield f"frame.yield_drift is up to {max(yield_drifts):.3g} m: is its unit right?"
+        weight = STANDARD_GRAVITY * sum(x.nominal for x in self.per_floor(self.masses))
+        forces = [x.nominal for x in self.yield_force or ()]
+        # even isolators slide at some 2 % of the weight above them
+        if forces and max(forces) < 0.002 * weight:
+            fraction = max(forces) / weight
+            yield f"frame.yield_force is at most {fraction:.2g} of the weight: is its unit right?"
+        if self.gravity > 2 * STANDARD_GRAVITY:
+            yield f'frame.gravity is {self.gravity:g} m/s^2: write "1 g" or "9.81 m/s^2"'
 
     def _weight_warnings(self, coefficients: Array) -> Iterator[str]:
         """Yield a sentence for each storey whose weight should not be left out.

@@ -7,10 +7,11 @@ import inspect
 import itertools
 import math
 import textwrap
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self, TypeVar, cast
+from typing import Annotated, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -175,31 +176,35 @@ class Quantity:
         else:
             ends.append(number)
         is_inside = all(self._contains(end) for end in ends)
-        require(is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value))
+        require(
+            is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value, ends)
+        )
         return number
 
     def _contains(self, value: float) -> bool:
         """Return whether a value in SI lies in the range."""
         return self.above < value < self.below and self.minimum <= value <= self.maximum
 
-    def _cure_of_percentage(self, value: object) -> str:
+    def _cure_of_percentage(self, value: object, ends: Sequence[float]) -> str:
         """Return what to write for a ratio that is too large, but would fit as a percentage.
 
         Args:
             value: The refused value, of any type.
+            ends: The number, or the ends of its support.
 
         Returns:
-            For a number without a unit whose hundredth part is positive and in the range: 'write "5
+            For a value without a unit whose hundredth part is positive and in the range: 'write "5
             %" or 0.05'. Empty for all others, for quantities with a unit and for whole numbers.
         """
-        if self.si or self.is_integer or not is_number(value):
+        if self.si or self.is_integer or "%" in str(value):
             return ""
         # 5 for 5 % is the usual slip: it is named where the hundredth part would be allowed.
-        ratio = float(cast("float", value)) / 100
-        is_meant = ratio > 0 and self._contains(ratio)
+        is_meant = all(end > 0 and self._contains(end / 100) for end in ends)
         if not is_meant:
             return ""
-        return f'write "{value} %" or {ratio:g}'
+        if is_number(value):
+            return f'write "{value} %" or {ends[0] / 100:g}'
+        return f'write "{value} %"'
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
         """Return the quantity that a value states, in SI, whether or not it lies in the range.

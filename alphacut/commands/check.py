@@ -306,6 +306,11 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
     if not shortest <= first <= 10.0:
         text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
         text += " not exchanged?\n"
+    largest = float(modes.damping_ratios.max())
+    doubt = "are units of dampers, damping matrices and rayleigh factors right?"
+    # ratios of structures are .1 to 60 %, of an undamped one below the rounding of 1e-12
+    if largest > 1 or 1e-12 < largest < 1e-5:
+        text += f"warning: damping ratios are up to {largest:.2g} of critical: {doubt}\n"
     moved = modes.moved_mass
     fractions = modes.effective_masses / (moved or np.inf)
     # Building codes ask for the modes that have 90 % of the mass (EN 1998-1, 4.3.3.3.1).

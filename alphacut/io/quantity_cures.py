@@ -100,6 +100,8 @@ def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterabl
         r"^[\"”″]$": "write in for inches",
         r"^['’′]$": "write ft for feet",
     }
+    if si == "N" and re.fullmatch(r"(?i)(?:us |short |long |metric )?t(?:o|ons?|onnes?)?", unit):
+        return "write tf, the weight of 1000 kg, or kN"
     if cure := cure_of(unit.strip(), cures):
         return cure
     # A spelling is offered only where it fits the dimension: "KN" is kN for a force, and no hint

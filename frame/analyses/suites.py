@@ -12,7 +12,13 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require, require_choice
-from alphacut.base.number_text import Table, engineering, percent_text, range_text
+from alphacut.base.number_text import (
+    STANDARD_GRAVITY,
+    Table,
+    engineering,
+    percent_text,
+    range_text,
+)
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored, with_combined
@@ -180,11 +186,17 @@ def scaled_records(
             peak={},
         )
         ground = Accelerogram(record.step, factor * record.samples, name=name)
-        scaled.append(ScaledRecord(name, ground, facts, _warnings(name, record, facts)))
+        scaled.append(
+            ScaledRecord(
+                name, ground, facts, _warnings(name, record, facts, peak=ground.extremes[0])
+            )
+        )
     return tuple(scaled)
 
 
-def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str, ...]:
+def _warnings(
+    name: str, record: Accelerogram, facts: RecordPeaks, *, peak: float
+) -> tuple[str, ...]:
     """Return sentences on what is unusual in a record; none for an ordinary one.
 
     They are the remarks made when the record was read, the size of its mean if this is more than
@@ -194,10 +206,15 @@ def _warnings(name: str, record: Accelerogram, facts: RecordPeaks) -> tuple[str,
         name: Name of the record.
         record: The record before scaling; it is not zero throughout.
         facts: Length of the response, and the fraction of the Arias intensity after its end.
+        peak: Largest magnitude of the scaled record, in m/s^2.
     """
     warnings = [f"of record {name} {remark}" for remark in record.remarks]
-    peak, _ = record.extremes
-    mean_fraction = float(record.samples.mean()) / peak
+    unscaled_peak, _ = record.extremes
+    # No earthquake was recorded above some 4 g; a record above that tells itself.
+    if peak > 5 * STANDARD_GRAVITY >= unscaled_peak:
+        what = f"record {name} is scaled to {peak / STANDARD_GRAVITY:.3g} g"
+        warnings.append(f"{what}, more than the ground reaches: is records.scale meant so?")
+    mean_fraction = float(record.samples.mean()) / unscaled_peak
     # A larger mean hints at an offset of the instrument, whose displacement grows quadratically.
     if abs(mean_fraction) > 0.01:
         what = f"the mean of record {name} is {percent_text(mean_fraction)} of its peak"

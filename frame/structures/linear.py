@@ -444,6 +444,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     ratio = (squared / largest).min()
     what = f"such that a squared frequency is {ratio:.1e} of the largest"
     cure = "support what moves freely, join storeys that are too stiff, or give dampers"
+    if ratio < -1e-10:
+        cure = "a stiffness is negative: is a tolerance above 100 %, or the sign of a term wrong?"
     require(ratio > 1e-12, "stiffness", value=what, allowed="more than 1e-12 of it", cure=cure)
 
     number: Ints = np.zeros(squared.shape[-1], int)  # of the ratio of each mode

@@ -153,7 +153,7 @@ class MatrixStructure(LinearSystem):
             RefusedError: Their number is another one, a value is outside [0, 1), or no parameter
                 has the name.
         """
-        is_allowed = len(self.ratios) in (0, 1, len(self.massive))
+        is_allowed = True
         for ratio in self.ratios:
             if isinstance(ratio, str):
                 value = self.parameters.get(ratio, np.nan)
@@ -161,6 +161,10 @@ class MatrixStructure(LinearSystem):
                 value = ratio
             is_within = is_number(value) and Parameter("", range=RATIO).admits(value, value)
             is_allowed = is_allowed and is_within
+        n_modes = len(self.massive)
+        allowed = f"one for all modes, or {n_modes}, one for each"
+        is_count = len(self.ratios) in (0, 1, n_modes)
+        require(is_count, "ratios", f"{len(self.ratios)} damping ratios", allowed)
         allowed = f"one number or parameter, or one a mode, {RATIO}"
         require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
 
@@ -220,7 +224,12 @@ class MatrixStructure(LinearSystem):
         traces = np.trace(self.nominal_terms("mass"), axis1=1, axis2=2)
         if (traces < 0).any():
             cure = f"turn the sign of term {int(traces.argmin()) + 1}: it seems to be −M"
-        require(is_definite, "mass", value="not positive definite", allowed=allowed, cure=cure)
+        value = "not positive definite"
+        negative = np.flatnonzero(of_massive.diagonal() < 0)
+        if negative.size:
+            k = int(massive[negative[0]])
+            value = f"not positive definite: {mass[k, k]:g} at [{k}, {k}]"
+        require(is_definite, "mass", value, allowed=allowed, cure=cure)
         total = self.nominal_terms("stiffness").sum(axis=0)
         self._require_stable(total)
         # Condensation divides by K_bb. An eigenvalue below 1e-14 of the largest entry is the
@@ -395,7 +404,10 @@ class MatrixStructure(LinearSystem):
         nominal = np.array([list(self.parameters.values())], float)
         try:
             value = _value_of(factor, variables(nominal, names, names[:1]))
-        except (KeyError, TypeError, AttributeError, ValueError) as failure:
+        except KeyError as failure:
+            name = str(failure.args[0])
+            raise RefusedError(f"factor of {kind}", name, ", ".join(names)) from None
+        except (TypeError, AttributeError, ValueError) as failure:
             value = failure
         allowed = f"arithmetic to one number, of {', '.join(names)}"
         is_number = isinstance(value, Jet | float | int | np.number)

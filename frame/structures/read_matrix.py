@@ -180,6 +180,7 @@ def _cure_of_row(row: str) -> str:
     # The first pattern that is found gives the hint: commas before blanks are looked for before
     # empty cells, and names of units last, since many texts contain their letters.
     cures = {
+        r"\d[.,]\d{3}[.,]\d{3}\b": "write thousands without separators",
         r"[\[\]()]": "write numbers without brackets",
         r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
         r"^\s*%%": "a file of Matrix Market is NAME.mtx",

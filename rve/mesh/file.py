@@ -275,7 +275,8 @@ def _require_filled(grid: PrismGrid) -> None:
     if (determinants <= 0).any():
         x, y, theta = prisms[np.argmin(determinants.min(axis=1)), 0]
         what = f"the prism at ({x:.4g}, {y:.4g}, θ = {theta:.4g}) is folded"
-        cure = "put middle nodes near the middles of their edges: Mesh.HighOrderOptimize = 2"
+        cure = "move corners of prisms back, and middle nodes near the middles of their edges"
+        cure += " (Mesh.HighOrderOptimize = 2)"
         raise MeshError(what, cure)
     low, high = grid.fixed.min(axis=0), grid.fixed.max(axis=0)
     filled = float((determinants @ weights).sum() / np.prod(high - low))

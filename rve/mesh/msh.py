@@ -265,7 +265,7 @@ def _sections(content: bytes) -> dict[bytes, bytes]:
     file without sections gives an empty dictionary.
 
     Raises:
-        DamagedMeshError: A section does not end.
+        DamagedMeshError: A section does not end, or there are two of nodes.
     """
     sections: dict[bytes, bytes] = {}
     begins = re.compile(rb"^\$(\w+)[ \t\r]*\n", re.MULTILINE)
@@ -274,6 +274,8 @@ def _sections(content: bytes) -> dict[bytes, bytes]:
         end = content.find(b"$End" + match[1], match.end())
         if end < 0:
             raise DamagedMeshError(f"cut off inside ${match[1].decode('latin-1')}")
+        if match[1] == b"Nodes" and b"Nodes" in sections:
+            raise DamagedMeshError("two meshes in one file: $Nodes stands twice")
         sections.setdefault(match[1], content[match.end() : end])
         place = end + len(match[1]) + 4
     return sections

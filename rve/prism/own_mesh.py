@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import ClassVar, cast
 
-from alphacut.base.errors import RefusedError
+from alphacut.base.errors import RefusedError, require
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import from_first_rank
@@ -157,8 +157,9 @@ class MeshModel(_NamedModel):
     refine: bool = False
 
     def __post_init__(self) -> None:
-        """RefusedError unless `petsc` is a table of options without dash and prefix."""
+        """RefusedError unless `petsc` is a table of options without dash, and `refine` a bool."""
         require_petsc(self.petsc)
+        require(isinstance(self.refine, bool), "refine", repr(self.refine), "True or False")
 
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]

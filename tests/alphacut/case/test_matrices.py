@@ -109,6 +109,7 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ("roof =", '"" =', "matrices.outputs is ''"),
         ('m = "20 t"', 'm = "20 t"\n"k 3" = 1', "matrices.parameters is 'k 3'"),
         ('unit = "N"', 'unit = "N\\u001b[2J"', "unit of shear is 'N\\x1b[2J'"),
+        ('unit = "N"', 'unit = "kN"', "unit is kN; allowed: SI units, as m, N or N*m; write N;"),
         ('{ row = { "2.x" = 1.0 } }', "{ }", "matrices.outputs.roof.row is missing"),
     ],
 )
@@ -117,6 +118,12 @@ def test_what_makes_no_structure_is_one_line(folder, old, new, message):
         loaded(folder, old, new)
     lines = str(caught.value).splitlines()
     assert any(message in line for line in lines), lines
+
+
+def test_a_fuzzy_parameter_in_no_factor_is_doubted(folder):
+    section = loaded(folder, 'm = "20 t"', 'm = "20 t"\nmr = "1 ± 10 %"').structure_section
+    (doubt,) = section.warnings(None)
+    assert doubt.startswith("matrices.parameters.mr is in no factor")
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,7 @@ WRONG = [
     ("20 ton", "kg", "write t"),
     ("20 tons", "kg", "write t"),
     ("5 percent", "", "write %"),
+    ("80 tons", "N", "write tf"),
     ("5 per cent", "", "write %"),
     ("20 kN", "kg", "a weight over 9.80665"),
     ("25,000 N/m", "N/m", "thousands without a separator"),

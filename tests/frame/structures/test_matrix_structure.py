@@ -84,7 +84,7 @@ def signed_structure(*, mass, stiffness):
 
 
 def test_a_matrix_of_the_other_sign_is_told_to_turn_it():
-    with pytest.raises(RefusedError, match=r"mass is not positive definite; .* seems to be −M"):
+    with pytest.raises(RefusedError, match=r"mass is not positive definite: .* seems to be −M"):
         signed_structure(mass=-1.0, stiffness=0.0)
     with pytest.raises(RefusedError, match=r"negative diagonal in term 2; .* it seems to be −K"):
         signed_structure(mass=1.0, stiffness=-3.0)

@@ -326,6 +326,7 @@ $EndElements
         ("0 0 0\n$End", "0 0,5 0\n$End", "decimal commas: write points"),
         ("$EndElements", "", "cut off inside .Elements"),
         ("$Nodes", "$Knots", "cut off inside .Knots"),
+        ("$EndNodes\n", "$EndNodes\n$Nodes\n0\n$EndNodes\n", "two meshes in one file"),
     ],
 )  # fmt: skip
 def test_a_mesh_that_contradicts_itself_is_refused(tmp_path, old, new, message):
@@ -390,3 +391,8 @@ def test_each_file_is_made_again_by_its_script(tmp_path, script):
 
 def centres(grid):
     return grid.fixed[grid.cells].mean(axis=1)
+
+
+def test_refine_is_a_bool():
+    with pytest.raises(RefusedError, match="refine is 'no'; allowed: True or False"):
+        MeshModel("own.msh", refine="no")
