@@ -4,13 +4,29 @@ An output is Σ_k r_k c_k e(λ_k) over modes k of unit modal mass: r_k is the ou
 mode shape, c_k the mode's participation factor for a source, and e the response of its oscillator.
 Computed modes X and λ are the exact ones of a pencil nearby: Xᵀ K X = diag λ + E and Xᵀ M X = I +
 F, where the entries of E and F are bounded by the computed residuals and their γ_n (Higham 2002,
-section 3.5). With G = |E| + |F| diag λ the outputs are off, to first order, by at most
+section 3.5). With G = |E| + |F| diag λ the outputs are off by at most
 
-    Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k|,
+    Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k| + terms of second order,
 
 where e[·, ·] is a divided difference; this holds for close modes too. The entry of the slowest mode
 in G is some n ε ω_max², so that its frequency has a relative error of n ε (ω_max/ω₁)². Rounding of
 the response itself comes from the recursion over the record.
+
+Terms of second order. In the basis X the pencil is Λ + E, N = 1 + F, and the output r e(A) c′ with
+A = N⁻¹ (Λ + E) = Λ + B and c′ = N⁻¹ c, in place of r e(Λ) c. With Frobenius norms φ of F and b of
+B, b ≤ ‖G‖/(1 − φ):
+
+1. c′ − c is −F c but for φ²/(1 − φ) |c|, and B is E − F Λ but for φ b.
+2. If all modes have one damping ratio, e is one function. Column k of e(A) − e(Λ) is g_k(A) B_k
+   with g_k(x) = e[x, λ_k], since (A − λ_k) times the unit vector k is B_k. Likewise column j of
+   g_k(A) − g_k(Λ) is h(A) B_j with h(x) = e[x, λ_j, λ_k]. So r (e(A) − e(Λ)) c′ is Σ r_j
+   e[λ_j, λ_k] B_jk c′_k but for Σ_jk r h(A) B_j B_jk c′_k. As N^½ A N^-½ is symmetric, the latter
+   is at most √((1 + φ)/(1 − φ)) |r| b² |c′| sup |e″|/2 over all eigenvalues and between them.
+3. If not, the response is Σ_k e_k(μ_k) r P_k c′ with the eigenvalues μ_k and projectors P_k of A.
+   Let d_k be the distance of λ_k from all others and θ_k = 2 b/d_k < 1. Neumann's series of the
+   resolvent on the circle of radius d_k/2 about λ_k (Kato 1966, chapter 2) bounds what is of second
+   order in P_k by θ_k²/(1 − θ_k), P_k − P_k(Λ) by θ_k/(1 − θ_k), and μ_k − λ_k − B_kk by n b
+   θ_k/(1 − θ_k); and |μ_k − λ_k| ≤ b (Bauer, Fike 1960).
 """
 
 from __future__ import annotations
@@ -53,11 +69,6 @@ class PointModes:
     output_rows: Array  # rows of all outputs on the state, (S, m, 2 n)
     structure: ClassicalStructure  # the structure over the box
     entry_roundings: int  # of an entry of M, K and of output rows; see `LinearSystem`
-
-    @property
-    def sigma_slope(self) -> Array:
-        """Bound of |dσ/dλ|, shape (S, n), in s; see `truncated_modes.response_slopes`."""
-        return np.asarray(1 / (2 * self.sigma.imag))
 
     def output_coefficients(self, point: Ints, output: Ints) -> RoundedValues:
         """Return the coefficients r of n modes in one output at one point for each of N rows.
@@ -226,7 +237,8 @@ def outputs_at(
 
     Returns:
         `value` in the units of the outputs and `error`, a bound of its rounding, shape (N,) each.
-        Where rounding may shift the phase of a mode by a radian, the bound is huge.
+        Where rounding may shift an eigenvalue by a hundredth of the smallest one, the bound is
+        1e300, which stands for infinity.
     """
     sigma = modes.sigma[point]
     t = time[:, np.newaxis]
@@ -248,10 +260,8 @@ def outputs_at(
         participation = RoundedValues(of_source.value[point], of_source.error[point])
         total += (coefficients.value * participation.value * response.value).sum(axis=-1)
         error += _superposition_error(modes, point, coefficients, participation, response)
-    # Terms of second order in the residuals are at most this fraction of those of first order.
-    diagonal = np.einsum("skk->sk", modes.stiffness_error[point])
-    fraction = (diagonal * modes.sigma_slope[point] * t).max(axis=-1)
-    return RoundedValues(total, error / np.maximum(1 - fraction, 1e-300))
+    # the rounding of the bounds themselves
+    return RoundedValues(total, (1 + 1e-9) * error)
 
 
 class _ModeResponses(NamedTuple):
@@ -261,6 +271,9 @@ class _ModeResponses(NamedTuple):
     error: Array  # bound of its rounding
     slope: Array  # bound of |de/dλ| at the eigenvalue of the mode
     slope_anywhere: Array  # bound of |de/dλ| at any eigenvalue of the same damping
+    # bound of |d²e/dλ²| at all eigenvalues of the structure and between them, the same for all
+    # modes, (N, 1)
+    curvature: Array
 
 
 def _mode_responses(
@@ -281,7 +294,7 @@ def _mode_responses(
     Returns:
         `value` of e, `error`, a bound of its rounding, and bounds of |de/dλ| by the eigenvalue λ =
         |σ|²: `slope` at the mode itself and `slope_anywhere` at any eigenvalue of the same damping;
-        shape (N, n) each.
+        shape (N, n) each. And `curvature`, a bound of |d²e/dλ²|, shape (N, 1).
     """
     omega = sigma.imag
     magnitude = np.abs(sigma)
@@ -305,12 +318,64 @@ def _mode_responses(
 
     impulse = load.impulse[:, np.newaxis]
     error = error * (1 + quotient) if source == "start" else error / omega
+    slope_anywhere = slope_bound(impulse, time * impulse)
+    # ρ′ is rounded in each interval of the load by some (12 + |σ h|) u of at most t ∫ |f|: together
+    # less than a millionth of it for 1e8 intervals.
+    slope = slope_bound(np.abs(load.rho[0]), np.abs(load.rho[1])) + 1e-6 * slope_anywhere
     return _ModeResponses(
         value=read_response(source, sigma, G) + feedthrough,
         error=error + gamma(8) * np.abs(feedthrough),
-        slope=slope_bound(np.abs(load.rho[0]), np.abs(load.rho[1])),
-        slope_anywhere=slope_bound(impulse, time * impulse),
+        slope=slope,
+        slope_anywhere=slope_anywhere,
+        curvature=_curvature_bound(source, sigma, order, impulse, time),
     )
+
+
+EIGENVALUE_SHIFT = 0.01
+"""Largest shift of an eigenvalue by rounding, over the smallest one, for which errors are bounded;
+far above any shift by which a response would be of use."""
+
+
+def _curvature_bound(source: str, sigma: Array, order: Array, impulse: Array, time: Array) -> Array:
+    """Bound |d²e/dλ²| over the eigenvalues of a structure at N points, shape (N, 1).
+
+    With the decay g = (a + b λ)/2 + ζ √λ and q = g/ω one has λ g′ ≤ g, 4 λ² |g″| ≤ g and λ = ω²
+    (1 + q²). From ω² = λ − g² follow 2 ω |ω′| ≤ 1 (see `truncated_modes.response_slopes`), ω³ |ω″|
+    ≤ 9/16 and ω³ |σ″| ≤ 0.6 for σ = −g + iω. Hence for G = σ^ν ρ as a function of σ
+
+        |(G/ω)″| ≤ |G_σσ|/(4 ω³) + 1.1 |G_σ|/ω⁴ + 1.1 |G|/ω⁵,
+        |G″| ≤ |G_σσ|/(4 ω²) + 0.6 |G_σ|/ω³,  2 ω² |q′| ≤ q,  ω⁴ |q″| ≤ 0.6 + 1.1 q.
+
+    With |ρ| ≤ I, |ρ′| ≤ t I and |ρ″| ≤ t² I these bounds do not rise with ω at constant q for ν ≤
+    2. So the smallest ω and the largest q of all eigenvalues are taken. g/√λ is convex in √λ, and
+    thus largest at the smallest or largest λ. Eigenvalues off by `EIGENVALUE_SHIFT` times the
+    smallest one are included.
+
+    Args:
+        source: Name of the source; "start" for initial displacements.
+        sigma: σ of n modes at each point, shape (N, n), in 1/s.
+        order: ν, shape (N, 1).
+        impulse: I, a bound of ∫ |f| of the load up to the time, shape (N, 1).
+        time: t, shape (N, 1), in s.
+    """
+    magnitude = np.abs(sigma)
+    # the largest g/√λ, which changes by less than the square root of the eigenvalue
+    ratio = (1 + EIGENVALUE_SHIFT) * (-sigma.real / magnitude).max(axis=-1, keepdims=True)
+    is_oscillating = ratio < 1
+    root = np.sqrt(np.where(is_oscillating, 1 - ratio**2, 1.0))
+    q = ratio / root
+    omega = np.sqrt(1 - EIGENVALUE_SHIFT) * magnitude.min(axis=-1, keepdims=True) * root
+    s = omega * np.sqrt(1 + q**2)  # |σ|
+    G = s**order * impulse
+    G_slope = (order * s ** np.maximum(order - 1, 0) + s**order * time) * impulse
+    G_curvature = order * (order - 1) + 2 * order * s ** np.maximum(order - 1, 0) * time
+    G_curvature = (G_curvature + s**order * time**2) * impulse
+    if source == "start":  # e = Re G + q Im G
+        bound = (1 + q) * (G_curvature / (4 * omega**2) + 0.6 * G_slope / omega**3)
+        bound += q * G_slope / (2 * omega**3) + (0.6 + 1.1 * q) * G / omega**4
+    else:  # e = ± Im G/ω
+        bound = G_curvature / (4 * omega**3) + 1.1 * (G_slope / omega**4 + G / omega**5)
+    return np.asarray(np.where(is_oscillating, bound, np.inf))
 
 
 def _superposition_error(
@@ -323,7 +388,8 @@ def _superposition_error(
     """Bound the rounding of Σ_k r_k c_k e_k, shape (N,), which computed modes and products cause.
 
     Computed modes are exact for a stiffness and a mass nearby, whose differences couple modes j and
-    k by |r_j| G_jk |e[λ_j, λ_k]| |c_k| and |r_j e_j| |F_jk| |c_k|, e[·, ·] a divided difference.
+    k by |r_j| G_jk |e[λ_j, λ_k]| |c_k| and |r_j e_j| |F_jk| |c_k|, e[·, ·] a divided difference,
+    and by terms of second order (see the head of this file).
 
     Args:
         modes: Modes at all points, with G, F and the eigenvalues λ.
@@ -332,9 +398,10 @@ def _superposition_error(
         participation: c of the source, with rounding, shape (N, n).
         response: e with rounding, and bounds of |de/dλ|, shape (N, n).
     """
-    r = np.abs(coefficients.value)
-    c = np.abs(participation.value)
-    e = np.abs(response.value)
+    # Magnitudes with their rounding, so that no products of errors are left out.
+    r = np.abs(coefficients.value) + coefficients.error
+    c = np.abs(participation.value) + participation.error
+    e = np.abs(response.value) + response.error
     n = e.shape[-1]
     error = r * c * response.error
     error += (coefficients.error * c + r * participation.error) * e
@@ -349,13 +416,43 @@ def _superposition_error(
     by_gap = np.divide(sums, gaps, out=np.full_like(gaps, np.inf), where=gaps > 0)
     anywhere = response.slope_anywhere
     by_slope = np.maximum(anywhere[:, :, np.newaxis], anywhere[:, np.newaxis])
-    has_one_ratio = modes.has_one_ratio[point][:, np.newaxis, np.newaxis]
-    by_slope = np.where(has_one_ratio, by_slope, np.inf)
+    has_one_ratio = modes.has_one_ratio[point]
+    by_slope = np.where(has_one_ratio[:, np.newaxis, np.newaxis], by_slope, np.inf)
     is_diagonal = np.eye(n, dtype=bool)
     of_mode = response.slope[:, np.newaxis]
     divided_differences = np.where(is_diagonal, of_mode, np.minimum(by_gap, by_slope))
 
-    couplings = modes.stiffness_error[point] * divided_differences
-    error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
-    error += np.einsum("sj,sjk,sk->s", r * e, modes.mass_error[point], c, optimize=True)
-    return np.asarray(error)
+    G = modes.stiffness_error[point]
+    F = modes.mass_error[point]
+    error += np.einsum("sj,sjk,sk->s", r, G * divided_differences, c, optimize=True)
+    error += np.einsum("sj,sjk,sk->s", r * e, F, c, optimize=True)
+
+    # Terms of second order, with the norms φ of F and b of B ≤ G/(1 − φ).
+    phi = np.linalg.norm(F, axis=(1, 2))
+    is_small = phi < EIGENVALUE_SHIFT
+    phi = np.where(is_small, phi, 0.0)
+    b = np.linalg.norm(G, axis=(1, 2)) / (1 - phi)
+    is_small &= b <= EIGENVALUE_SHIFT * eigenvalues[:, 0]
+    curvature = response.curvature[:, 0]
+    of_mass = e.max(axis=-1) * phi**2 / (1 - phi)
+    largest = divided_differences.max(axis=(1, 2))
+    of_both = largest * phi * b * (1 + 1 / (1 - phi))
+    of_one_function = np.sqrt((1 + phi) / (1 - phi)) * b**2 * curvature / 2 / (1 - phi)
+
+    distances = np.where(is_diagonal, np.inf, gaps).min(axis=-1)  # d
+    theta = 2 * b[:, np.newaxis] / np.maximum(distances, 1e-300)
+    is_apart = theta < 1
+    theta = np.where(is_apart, theta, 0.0)
+    of_projector = theta / (1 - theta)
+    shift = b[:, np.newaxis]
+    change = response.slope * shift + response.curvature * shift**2 / 2  # of e_k by μ_k − λ_k
+    of_each = e * theta * of_projector + response.slope * n * shift * of_projector
+    of_each += response.curvature * shift**2 / 2 + change * of_projector
+    of_functions = of_each.sum(axis=-1) / (1 - phi)
+    of_stiffness = np.where(has_one_ratio, of_one_function, of_functions)
+    is_small &= has_one_ratio | is_apart.all(axis=-1)
+
+    r_norm = np.linalg.norm(r, axis=-1)
+    c_norm = np.linalg.norm(c, axis=-1)
+    error += r_norm * c_norm * (of_mass + of_both + of_stiffness)
+    return np.asarray(np.where(is_small & np.isfinite(error), error, 1e300))

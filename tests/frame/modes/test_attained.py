@@ -1,5 +1,7 @@
 """Exact motions at single inputs agree with forty digits, and their rounding with its bound."""
 
+from dataclasses import replace
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -7,8 +9,10 @@ import pytest
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.modes.superposition import modes_at
+from alphacut.frame.modes import superposition
+from alphacut.frame.modes.superposition import _curvature_bound, modes_at
 from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.structures.linear import undamped_modes
 from alphacut.fuzzy import Interval
 from tests.frame.bounds.test_remainders import masses_on_springs
 from tests.frame.calculus.test_taylor_model import exact_value
@@ -113,7 +117,91 @@ def test_eigenvalues_move_with_squared_frequencies_as_far_as_stated():
     unit = np.array([[-1e-5], [0.0], [1e-5]])
     found = modes_at(frame, box.structure, ("k1",), box.inputs(unit), unit)
     slope = np.abs(np.ptp(found.sigma.real) / np.ptp(found.eigenvalues))
-    assert slope <= found.sigma_slope[1, 0] * (1 + 1e-6) <= 1.001 * slope
+    stated = 1 / (2 * found.sigma.imag[1, 0])
+    assert slope <= stated * (1 + 1e-6) <= 1.001 * slope
+
+
+@pytest.mark.parametrize("source", ["velocity", "start"])
+def test_responses_bend_with_eigenvalues_as_far_as_stated(source, rng):
+    """Against differences of forty digits, with all three kinds of damping, heavy ones too."""
+    reached = 0.0
+    with mp.workdps(40):
+        for _ in range(300):
+            order, time = int(rng.integers(0, 3)), mp.mpf(rng.uniform(0, 3))
+            eigenvalue = 10 ** rng.uniform(-1, 3)
+            damping = rng.dirichlet(np.ones(4))[:3] * rng.uniform(0, 1.2) ** 2
+            a, b, zeta = damping * [2 * eigenvalue**0.5, 2 / eigenvalue**0.5, 1.0]
+
+            def response(x, a=a, b=b, zeta=zeta, order=order, time=time):
+                decay = (a + b * x) / 2 + zeta * mp.sqrt(x)
+                sigma = mp.mpc(-decay, mp.sqrt(x - decay**2))
+                G = sigma**order * mp.exp(sigma * time)
+                if source == "start":
+                    return G.real + decay / sigma.imag * G.imag
+                return G.imag / sigma.imag
+
+            decay = (a + b * eigenvalue) / 2 + zeta * eigenvalue**0.5
+            if decay**2 >= 0.95 * eigenvalue:
+                continue
+            step = mp.mpf(eigenvalue) * mp.mpf(10) ** -10
+            below, at, above = (response(mp.mpf(eigenvalue) + k * step) for k in (-1, 0, 1))
+            bend = float(abs(above - 2 * at + below) / step**2)
+            sigma = np.array([[-decay + 1j * np.sqrt(eigenvalue - decay**2)]])
+            given = [np.array([[x]]) for x in (order, 1.0, float(time))]
+            bound = _curvature_bound(source, sigma, *given)[0, 0]
+            assert bend <= bound
+            reached = max(reached, bend / bound)
+    assert reached > 0.5
+
+
+def shifted(shift, turn=0.0, rng=None):
+    """A function for `undamped_modes` whose eigenvalues and shapes are wrong by these fractions."""
+
+    def modes(M, K):
+        eigenvalues, shapes = undamped_modes(M, K)
+        if turn:
+            n = M.shape[-1]
+            shapes = shapes @ (np.eye(n) + turn * rng.normal(size=(n, n)))
+        return eigenvalues * (1 + shift), shapes
+
+    return modes
+
+
+def test_what_wrong_modes_do_to_second_order_is_in_the_error(monkeypatch):
+    """Of two pulses the slope by the eigenvalue cancels, and the curvature does not."""
+    omega, h = 32 * np.pi, 2.0**-7
+    quarter = 2.0**-6  # a quarter of the period
+    samples = np.zeros(400)
+    samples[[64, 64 + 128]] = -(1 + quarter), 2 + quarter
+    frame = StoreyFrame([1.0], stiffness=[omega**2], ground=Accelerogram(h, samples))
+    end = h * 64 + 2 + quarter
+    time, centre = np.array([0.0, end]), np.array([omega**2])
+    box = Box(frame, ("k1",), time, 0.9 * centre, 1.1 * centre)
+    given = np.zeros((1, 1)), np.ones(1, int), np.zeros(1, int)
+    exact = box.exact_values(*given).value
+    monkeypatch.setattr(superposition, "undamped_modes", shifted(1e-5))
+    value, error = box.exact_values(*given)
+    off = np.abs(value - exact)
+    assert (off <= error).all()
+    assert (off >= 0.5 * error).all()
+
+
+@pytest.mark.parametrize("ratios", [0.02, (0.02, 0.03, 0.05)], ids=["one ratio", "three"])
+@pytest.mark.parametrize("turn", [1e-10, 1e-7, 1e-5])
+@pytest.mark.parametrize("ground", [None, RECORD], ids=["free", "record"])
+def test_modes_that_are_wrong_on_purpose_are_off_by_their_error_at_most(
+    turn, ratios, ground, monkeypatch, rng
+):
+    frame, box, _ = drawn(3, 1, ground, **(STARTED if ground is None else {}))
+    frame = replace(frame, damping_ratio=ratios)
+    box = replace(box, system=frame)
+    unit = rng.uniform(-1, 1, (16, 6))
+    node, output = rng.integers(1, 61, 16), np.arange(16) % 4
+    exact = box.exact_values(unit, node, output).value
+    monkeypatch.setattr(superposition, "undamped_modes", shifted(turn, turn, rng))
+    value, error = box.exact_values(unit, node, output)
+    shares = np.abs(value - exact) / error
+    assert 1e-3 <= shares.max() <= 1
 
 
 def test_equal_frequencies_do_not_lift_the_rounding():
