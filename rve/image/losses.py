@@ -63,9 +63,9 @@ def energy_fractions(
 
     Args:
         model: Model by which `solution` was made and by which the changed images are solved.
-        solution: Solution of an image without pores and rigid phases, whose upper and lower moduli
-            are the same. The lower bounds of its constants are positive, which is not checked. Its
-            stresses are the first guess.
+        solution: Solution of an image whose upper and lower moduli are the same. Its pores do not
+            percolate and no phase is rigid, so that both bounds of its constants are finite and
+            positive; this is not checked. Its stresses are the first guess.
         images: Moduli of that image.
         phase: Number from 0 of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
         n_phases: Number of phases.
@@ -109,7 +109,7 @@ def _lower_bounds_with(
         changed_phase: Number of the phase.
         model: Model by which the changed image is solved.
         solution: Solution of the unchanged image, whose stresses are the first guess.
-        images: Moduli of the unchanged image, without pores.
+        images: Moduli of the unchanged image, whose pores do not percolate.
         phase: Number of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
 
     Returns:
@@ -122,7 +122,7 @@ def _lower_bounds_with(
     factors = np.where(phase == changed_phase, factor, 1.0)
     # Only the lower bound is needed, which stresses give: half the work of both sides.
     stresses = model.solve_side(factors * images.lower, stress=True, start=solution.lower)
-    assert stresses is not None  # None beside pores alone
+    assert stresses is not None  # None beside pores that percolate alone
     stiffness = inverse_below(stresses.energy.upper)
     bounds = concave_constants(StiffnessBounds(stiffness, stiffness), model.average)
     return {name: ends.lower for name, ends in bounds.items()}

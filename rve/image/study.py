@@ -33,6 +33,7 @@ from alphacut.fuzzy.sets.claimed import widest_cut
 from alphacut.fuzzy.sets.numbers import checked_levels
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
+from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import read_grid
 from alphacut.rve.image.losses import energy_fractions, loss_of_young, mean_loss
@@ -593,8 +594,8 @@ def solve_study(
 
     Raises:
         RefusedError: The levels do not rise within [0, 1], a value is not allowed, all phases are
-            pores or rigid at a level, only some have loss factors, or the image does not fit into
-            memory.
+            pores or rigid at a level, only some have loss factors, all have them beside pores that
+            percolate or a rigid phase, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
@@ -604,6 +605,7 @@ def solve_study(
     model = study.model(average=average, device=device)
     nominal = study.images(None, None)  # at nominal thresholds and moduli
     solution = model.solve(nominal)
+    _require_losses(study.phases, solution.bounds)
     # Progress is counted by solutions, which take about the same time.
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
@@ -678,13 +680,32 @@ def _widths_by_cause(
     return dict(sorted(widths.items(), key=lambda item: -item[1]))
 
 
+def _require_losses(phases: Sequence[ImagePhase], bounds: StiffnessBounds) -> None:
+    """Refuse loss factors of some phases alone, and of a stiffness without both of its bounds.
+
+    Args:
+        phases: The phases of the image. Without loss factors all are allowed.
+        bounds: Bounds of the stiffness at nominal moduli, for which loss factors are computed.
+
+    Raises:
+        RefusedError: Some phases have a loss factor and others none, or all have one and pores
+            percolate or a phase is rigid.
+    """
+    count = sum(phase.loss is not None for phase in phases)
+    require(count in (0, len(phases)), "loss", f"of {count} phases", "each, 0 for none")
+    has_both = bounds.has_lower and bounds.has_upper
+    cure = "pores in one material leave its loss factor; else take a small modulus for pores"
+    allowed = "none beside pores that percolate or a rigid phase"
+    require(count == 0 or has_both, "loss", "there", allowed, cure)
+
+
 def _proved_losses(
     study: ImageStudy, model: ImageModel, solution: ImageSolution, alpha: Sequence[float]
 ) -> dict[str, Array]:
     """Return bounds of the loss factors of an image at nominal moduli, to first order.
 
     Args:
-        study: The image; its phases have loss factors, fuzzy or not, or none.
+        study: The image. All phases have loss factors, fuzzy or not, or none has one.
         model: Model of `solution`.
         solution: Solution at the nominal values, with both bounds of the stiffness.
         alpha: α-levels of the loss factors of the phases.
@@ -694,16 +715,13 @@ def _proved_losses(
         "E_x", "E_y" and, of a volume, "E_z". Empty where no phase has a loss factor.
 
     Raises:
-        RefusedError: Some phases have a loss factor, and others have none.
         FailedError: The solver does not converge.
     """
-    phases = study.phases
-    losses = [phase.loss for phase in phases if phase.loss is not None]
+    losses = [phase.loss for phase in study.phases if phase.loss is not None]
     if not losses:
         return {}
-    require(len(losses) == len(phases), "loss", f"of {len(losses)} phases", "each, 0 for none")
     fractions = energy_fractions(
-        model, solution, study.images(None, None), study.nominal_phase, len(phases)
+        model, solution, study.images(None, None), study.nominal_phase, len(losses)
     )
     # each cut holds the lowest and the highest loss factor of each phase
     loss_cuts = phase_loss_cuts(losses, alpha)

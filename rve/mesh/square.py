@@ -157,8 +157,8 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
         cells, phases = [], []
         for phase, surface in phase_surfaces.items():
             # 2 is Gmsh's number of the type of three-node triangles.
-            vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)[1].astype(np.int64)
-            cells.append(number[vertex_tags].reshape(-1, 3))
+            _, vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)
+            cells.append(number[vertex_tags.astype(np.int64)].reshape(-1, 3))
             phases.append(np.full(len(cells[-1]), phase))
     # The centres of arcs are points without triangles.
     used, compact = np.unique(np.concatenate(cells), return_inverse=True)

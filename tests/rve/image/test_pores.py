@@ -247,6 +247,24 @@ def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
 
 
+@pytest.mark.parametrize(
+    ("modulus", "loss", "message"),
+    [
+        (0.0, 0.01, "none beside pores that percolate or a rigid phase"),
+        (1e18, 0.01, "none beside pores that percolate or a rigid phase"),
+        (2e9, None, "loss is of 1 phases; allowed: each"),
+    ],
+)
+def test_loss_factors_without_both_bounds_of_the_stiffness_are_refused(modulus, loss, message):
+    image = GreyImage(np.kron([[0, 1], [0, 1]], np.ones((4, 4))), (1e-3, 1e-3))
+    phases = [{"modulus": x, "poisson": 0.3} for x in (1e9, modulus)]
+    phases[0]["loss"] = 0.02
+    if loss is not None:
+        phases[1]["loss"] = loss
+    with pytest.raises(RefusedError, match=message):
+        fuzzy_image_stiffness(image, phases, labels=(0, 1), progress=False)
+
+
 def test_a_measured_loss_factor_is_taken_on_levels_that_its_values_decide():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     loss = from_data([0.01, 0.015, 0.02, 0.03], "median")
