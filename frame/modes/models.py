@@ -89,7 +89,8 @@ class ModalResponseModels:
                 modes are enclosed, as precisely as possible, unless it is given.
 
         Raises:
-            UnprovedError: None of its modes can be enclosed.
+            UnprovedError: None of its modes can be enclosed, or the mode shapes at the midpoint of
+                the box are ill conditioned.
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
         to_centred = inverse_with_rounding(centre.basis, like=structure.initial_state)
@@ -143,23 +144,29 @@ class ModalResponseModels:
 def inverse_with_rounding(basis: Array, *, like: TaylorModel) -> TaylorModel:
     """Return the inverse of a matrix of numbers with a bound of its rounding, shape (n, n).
 
-    The matrix must be well conditioned: the bound takes the rounding error of the inverse to be far
-    below 1 in comparison with the inverse.
-
     Args:
         basis: Shape (n, n).
         like: A Taylor model of the inputs that the result, a constant, is given as a function of.
 
     Raises:
+        UnprovedError: The matrix is so ill conditioned that the error is not bounded.
         numpy.linalg.LinAlgError: The matrix is singular.
     """
     found = np.linalg.inv(basis)
     n = len(basis)
     residual = np.abs(np.eye(n) - basis @ found)
     residual += gamma(n + 1) * (np.abs(basis) @ np.abs(found))
-    # With the computed inverse C, B⁻¹ − C = C (I − B C) + C (I − B C)² + …, where the terms beyond
-    # the first are far below a tenth of it.
-    return like.like(found).widened(1.1 * np.abs(found) @ residual)
+    # With the computed inverse C and R = I − B C, B⁻¹ − C = C R + C R² + …. If ρ, the largest sum
+    # of a row of |R|, is below 1, the series converges. Entries of |x R| for a row x add up to at
+    # most ρ times those of |x|, so that the terms beyond the first are at most ρ/(1 − ρ) times the
+    # sum of a row of |C| |R|.
+    rho = float(residual.sum(axis=1).max())
+    if not rho < 1:
+        what = "the mode shapes at the midpoint of the box are ill conditioned"
+        raise UnprovedError(what, "take masses of less different magnitudes")
+    first = np.abs(found) @ residual
+    others = first.sum(axis=1, keepdims=True) * rho / (1 - rho)
+    return like.like(found).widened((1 + gamma(8 * n + 8)) * (first + others))
 
 
 @dataclass(frozen=True, eq=False)

@@ -336,7 +336,7 @@ EIGENVALUE_SHIFT = 0.01
 far above any shift by which a response would be of use."""
 
 
-def _curvature_bound(source: str, sigma: Array, order: Array, impulse: Array, time: Array) -> Array:
+def _curvature_bound(source: str, sigma: Array, order: Ints, impulse: Array, time: Array) -> Array:
     """Bound |d²e/dλ²| over the eigenvalues of a structure at N points, shape (N, 1).
 
     With the decay g = (a + b λ)/2 + ζ √λ and q = g/ω one has λ g′ ≤ g, 4 λ² |g″| ≤ g and λ = ω²

@@ -1,11 +1,15 @@
 """Blocks of modes, what couples them and what the others add: nothing leaves the bounds."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
 
 from alphacut.frame import MatrixStructure
 from alphacut.frame.bounds.box import over_box, sources
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes import truncated_modes
 from alphacut.frame.modes.blocks import SubspaceEquations
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -359,3 +363,40 @@ def test_right_sides_of_a_subspace_are_bounded_and_so_is_how_fast_they_change(ki
         largest = np.abs(exact).max(0)
         assert (largest <= bound * (1 + 1e-9)).all()
         assert (largest >= 0.8 * bound).all()
+
+
+def exact_inverse(matrix):
+    """The inverse by Gauss and Jordan with fractions, rows of fractions."""
+    n = len(matrix)
+    rows = [
+        [Fraction(float(x)) for x in row] + [Fraction(i == j) for j in range(n)]
+        for i, row in enumerate(matrix)
+    ]
+    for i in range(n):
+        pivot = max(range(i, n), key=lambda k: abs(rows[k][i]))
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        rows[i] = [x / rows[i][i] for x in rows[i]]
+        for k in range(n):
+            if k != i:
+                rows[k] = [x - rows[k][i] * y for x, y in zip(rows[k], rows[i], strict=True)]
+    return [row[n:] for row in rows]
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.7])
+def test_an_inverse_is_off_by_its_rounding_or_by_what_it_is_wrong(factor, rng, monkeypatch):
+    """Of an inverse that is too small by 30 %, the residual and its powers give the error."""
+    matrix, inverse = rng.normal(size=(4, 4)) + 4 * np.eye(4), np.linalg.inv
+    monkeypatch.setattr(np.linalg, "inv", lambda x: factor * inverse(x))
+    found = inverse_with_rounding(matrix, like=TaylorModel.constant(np.zeros(1), 1))
+    off = [
+        [abs(float(Fraction(float(x)) - y)) for x, y in zip(*rows, strict=True)]
+        for rows in zip(found.value, exact_inverse(matrix), strict=True)
+    ]
+    shares = np.array(off) / found.remainder
+    assert 1e-3 <= shares.max() <= 1
+
+
+def test_an_ill_conditioned_basis_is_refused():
+    hilbert = 1 / (np.arange(12)[:, np.newaxis] + np.arange(12) + 1.0)
+    with pytest.raises(UnprovedError, match="ill conditioned"):
+        inverse_with_rounding(hilbert, like=TaylorModel.constant(np.zeros(1), 1))
