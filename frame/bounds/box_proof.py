@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,6 +40,15 @@ class Goal:
     tick: Callable[[float], None]  # called with the completed fraction
 
 
+class PrunedPeaks(NamedTuple):
+    """What pruning leaves of a sub-box of n inputs for each peak, and bounds over all else."""
+
+    # lower and upper ends of the part that may contain each peak, (2, m, 2, n), in SI units
+    remaining: Array
+    # upper bounds over what is not `remaining`, for each peak, (T, m, 2)
+    upper: Array
+
+
 @dataclass(frozen=True, eq=False)
 class BoxBounds:
     """Bounds of (−q, q) over one level of a sub-box of n inputs."""
@@ -57,11 +66,7 @@ class BoxBounds:
     gap_fractions: Array
     # what the exact trajectory at `attained_at` may exceed `attained` by, (T, m)
     attained_error: Array | float = 0.0
-    # lower and upper ends of the part of the sub-box that may contain each peak, (2, m, 2, n), in
-    # SI units; None for all of the sub-box
-    remaining: Array | None = None
-    # upper bounds over what is not `remaining`, for each peak, (T, m, 2)
-    pruned_upper: Array | None = None
+    pruned: PrunedPeaks | None = None  # None if nothing is pruned
     # For each output q, a lower bound of the smallest max |q| over time in the sub-box, and the
     # max |q| of one trajectory that has a small one, (m,) each, between nodes too. None for what
     # the bounds at nodes say.

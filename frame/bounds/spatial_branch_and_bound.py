@@ -419,16 +419,16 @@ class Queue:
 
         Args:
             box: The sub-box that has just been bounded.
-            answers: For each level of it the proof's bounds, or an error. `remaining` is the part
-                of the sub-box that may contain each peak, lower and upper ends, shape (2, m, 2,
-                inputs), in SI units; None for all of it.
+            answers: For each level of it the proof's bounds, or an error. In `pruned`, `remaining`
+                is the part of the sub-box that may contain each peak, lower and upper ends, shape
+                (2, m, 2, inputs), in SI units, and `upper` the bounds over all else.
         """
         for k, bounds in enumerate(answers):
-            if isinstance(bounds, UnprovedError) or bounds.remaining is None or box.is_wide[k]:
+            if isinstance(bounds, UnprovedError) or bounds.pruned is None or box.is_wide[k]:
                 continue
             parent = box.boxes.on_levels([k])
             for output, side in np.argwhere(box.peaks[k]):
-                low, high = bounds.remaining[:, output, side]
+                low, high = bounds.pruned.remaining[:, output, side]
                 child = box.on_levels(np.array([k]), parent.intersect(low, high))
                 has_width = parent.radius > 0
                 parent_radius = np.where(has_width, parent.radius, 1.0)
@@ -438,8 +438,7 @@ class Queue:
                     continue
                 child.peaks[:] = False
                 child.peaks[0, output, side] = True
-                if bounds.pruned_upper is not None:
-                    self.hull.close(box.levels[k], child.peaks[0], bounds.pruned_upper)
+                self.hull.close(box.levels[k], child.peaks[0], bounds.pruned.upper)
                 box.peaks[k, output, side] = False
                 if pruned_fraction >= numbers.NARROWED:
                     yield child

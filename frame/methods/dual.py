@@ -22,7 +22,7 @@ from alphacut.base.progress_bar import Progress, nth_subprogress, subprogress
 from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal
+from alphacut.frame.bounds.box_proof import Answer, BoxBounds, Goal, PrunedPeaks
 from alphacut.frame.bounds.least_peaks import call_bound_cell, least_peak
 from alphacut.frame.bounds.level import LevelModels, OutputBounds, improve_all
 from alphacut.frame.bounds.node_bounds import call_bound_nodes
@@ -215,7 +215,7 @@ class DualProof:
             fractions = np.zeros(shape)
             remaining = np.empty((2, *shape))
             remaining[:] = np.stack([box.low, box.high])[:, np.newaxis, np.newaxis]
-            pruned = upper.copy()
+            pruned_upper = upper.copy()
             jobs = []
             for (o, s), problem in problems.items():
                 above = problem.nodes_above_peak(np.flatnonzero(needed[nodes, o, s]))
@@ -226,7 +226,7 @@ class DualProof:
                 found = job.result()
                 fractions[o, s, box.active] = found.gap_fractions
                 remaining[:, o, s] = box.inputs(np.stack([found.low, found.high]))
-                pruned[nodes_above, o, s] = found.upper
+                pruned_upper[nodes_above, o, s] = found.upper
 
             # 4. Bound the smallest peaks.
             between = np.zeros(needed.shape[:2])
@@ -241,8 +241,7 @@ class DualProof:
             between_nodes=between,
             gap_fractions=fractions,
             attained_error=attained_error,
-            remaining=remaining,
-            pruned_upper=pruned,
+            pruned=PrunedPeaks(remaining, pruned_upper),
             least_peaks=least_peaks,
             facts={"single_modes": len(level.models.oscillators)},
         )
