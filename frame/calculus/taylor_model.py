@@ -295,15 +295,7 @@ class TaylorModel:
         """
         midpoint = (low + high) / 2
         radius = (high - low) / 2
-        # Taylor's formula: p(midpoint + v) = Σ_k (midpoint·∇)^k p(v) / k!, of which the k-th term
-        # turns a part of degree m into one of degree m − k
-        shifted = [np.zeros_like(part) for part in self.parts]
-        for degree, part in enumerate(self.parts):
-            term = part
-            for k in range(degree + 1):
-                shifted[degree - k] = shifted[degree - k] + term
-                if k < degree:
-                    term = derivative(term, degree - k, midpoint) / (k + 1)
+        shifted = self.shifted_parts(midpoint)
         # v_i = radius_i w_i
         parts = []
         for degree, part in enumerate(shifted):
@@ -315,6 +307,27 @@ class TaylorModel:
         roundings = (len(self.parts) + 1) * (self.inputs + 4)
         rounding = gamma(roundings) * np.sum(self.part_magnitudes(), 0)
         return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
+
+    def shifted_parts(self, point: Array) -> list[Array]:
+        """Return the coefficients of the polynomials p(point + v) in v, by degree.
+
+        The remainder is left out, and so is the rounding of the coefficients. Where those of p and
+        the point are not negative, nothing cancels, and they have a relative error of at most γ_n
+        with n = (order + 2) (d + 4).
+
+        Args:
+            point: Any point, in the unit box or not, shape (d,).
+        """
+        # Taylor's formula: p(point + v) = Σ_k (point·∇)^k p(v) / k!, of which the k-th term turns a
+        # part of degree m into one of degree m − k
+        shifted = [np.zeros_like(part) for part in self.parts]
+        for degree, part in enumerate(self.parts):
+            term = part
+            for k in range(degree + 1):
+                shifted[degree - k] = shifted[degree - k] + term
+                if k < degree:
+                    term = derivative(term, degree - k, point) / (k + 1)
+        return shifted
 
     def reshaped(self, *shape: int) -> TaylorModel:
         """Return the same functions with another shape V."""

@@ -17,6 +17,7 @@ from alphacut.frame.bounds.branch_and_bound import (
 from alphacut.frame.bounds.kernel import stays_below
 from alphacut.frame.bounds.model_error import (
     largest_growth,
+    majorant_parts,
     proved_error,
     remainder_bounds,
     response_parts,
@@ -54,6 +55,15 @@ def test_remainder_of_the_quadratic_model_is_that_of_a_late_oscillation(rng) -> 
         ratio = bound[node] / np.abs(np.stack([*ends], 1) / (2 * h)).max(0)
         assert (ratio >= 1).all()
         assert (ratio <= 2.5).all()
+
+
+@pytest.mark.parametrize("reach", [3e-9, 1.0, 2.0])
+def test_majorants_are_exact_in_narrow_boxes_and_beyond_the_unit_box(reach) -> None:
+    """The derivatives of 2 u³ are 6 u², 12 u and 12; coefficients are these over 1, 2 and 6."""
+    cubic = polynomials(np.array([0, 0, 0, -2.0])[:, None])
+    found = [float(part.item()) for part in majorant_parts(cubic, np.full(1, reach))]
+    exact = [2 * reach**3, 6 * reach**2, 6 * reach, 2.0]
+    np.testing.assert_allclose(found, exact, rtol=1e-14)
 
 
 def test_remainder_at_the_start_is_that_of_a_force_over_an_uncertain_mass() -> None:
