@@ -301,7 +301,8 @@ def fuzzy_stiffness(
         method: Plan of the samples; `General()` if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         average: Average of a plane stiffness that E and ν are of, "axes" (eq. 16) or "isotropic";
-            that of the model's results if not given.
+            that of the model's results if not given. Of spheres it is Hill's average in space,
+            whatever is given.
         campaign: Further arguments of `propagate`: workers, executor, store, identity, progress.
 
     Raises:
@@ -345,10 +346,14 @@ def fuzzy_stiffness(
         # A proof is tested by solutions of another resolution.
         coarse = replace(function, model=sample_model.coarser())
         require_consistent(bounds, coarse, error=sum(error.values()))
+    words = model.convention
+    # Spheres have Hill's average in space, whatever average of a plane stiffness is asked for.
+    if average is not None and words in AVERAGES.values():
+        words = AVERAGES[average]
     return FuzzyStiffness(
         bounds=bounds,
         theta=function.theta,
-        average=model.convention if average is None else AVERAGES[average],
+        average=words,
         model=model.name,
         error=error,
         checks=_largest_by_name(bounds, kind="check"),

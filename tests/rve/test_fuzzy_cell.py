@@ -89,6 +89,20 @@ def test_an_input_that_is_no_number_is_refused_by_its_name(value):
         fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, {"a2": value}, progress=False)
 
 
+def test_spheres_keep_hill_s_average_whatever_average_of_a_plane_is_asked_for():
+    stiffness = fuzzy_stiffness(
+        SpheresModel(),
+        RADIUS,
+        PHASES,
+        {"a2": 0.1},
+        Reduced(),
+        average="axes",
+        alpha=[1],
+        progress=False,
+    )
+    assert stiffness.average == "Hill's isotropic average"
+
+
 def test_an_average_of_another_name_is_refused_before_samples_are_solved():
     with pytest.raises(RefusedError, match="average is voigt; allowed: axes or isotropic"):
         fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, INPUTS, average="voigt", progress=False)
