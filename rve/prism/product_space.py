@@ -19,7 +19,7 @@ from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import MeshModel, mesh_law
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
-from alphacut.rve.solver.krylov import Solutions, SolverOptions, solve
+from alphacut.rve.solver.krylov import Solutions, SolverOptions, require_petsc, solve
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaDistribution
 
@@ -128,12 +128,15 @@ class ProductSpace:
             residual.
 
         Raises:
-            RefusedError: The matrix is not symmetric, or PETSc does not use an option.
+            RefusedError: The matrix is not symmetric, `petsc_options` is no table of options, or
+                PETSc does not use an option.
             ConvergenceError: The tolerance was not reached.
         """
         require_symmetric(matrix)
-        options = SolverOptions(self._petsc if petsc_options is None else petsc_options)
-        return solve(self._problem.solver(options, matrix), loads)
+        if petsc_options is None:
+            petsc_options = self._petsc
+        require_petsc(petsc_options)
+        return solve(self._problem.solver(SolverOptions(petsc_options), matrix), loads)
 
     def _compiled(self, form: ufl.Form, *, num_arguments: int) -> fem.Form:
         """Return a form compiled by DOLFINx, after a check; it is kept for the next call.

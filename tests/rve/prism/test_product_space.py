@@ -116,6 +116,12 @@ def test_an_operator_without_symmetry_is_refused_and_not_solved_wrongly(cell, el
         cell.solve(matrix, [matrix.createVecLeft()])
 
 
+def test_options_in_a_text_are_refused_with_the_table_that_they_mean(cell, elastic):
+    matrix = cell.assemble_matrix(elastic)
+    with pytest.raises(RefusedError, match='"ksp_type": "gmres"'):
+        cell.solve(matrix, [matrix.createVecLeft()], "-ksp_type gmres")
+
+
 def test_the_preconditioner_serves_a_solver_of_the_user(cell, elastic, rng):
     matrix = cell.assemble_matrix(elastic)
     load, solution = matrix.createVecs()
