@@ -75,6 +75,7 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
             `radius` is not positive or the particle reaches 0.9995 of half the side, so that
             elements between it and its images would have no end; or the outline is so sharp that
             triangles fold at the shortest edges that are tried.
+        MissingLibraryError: Gmsh is not installed, and the mesh is not in the user's cache.
     """
     require_mesh_size(size)
     # Nearer to its images, at 0.9995 of half the side, elements in the gap would have no end.

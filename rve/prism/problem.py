@@ -322,8 +322,8 @@ class PrismProblem:
         """
         points, _ = prism_rule()
         shapes: Array = wedge(1).tabulate(0, points)[0].reshape(-1, 15)
-        corners = positions[self.grid.cells[self.wedge]]
-        values = level_set.values(np.einsum("qn,cnd->cqd", shapes, corners))
+        nodes = positions[self.grid.cells[self.wedge]]
+        values = level_set.values(np.einsum("qn,cnd->cqd", shapes, nodes))
         # A rank may have no prisms, or those of one phase alone.
         lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
         highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
