@@ -18,6 +18,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
+from alphacut.frame.records.stated_timing import require_timing, timing_in_text
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 from alphacut.frame.records.units import acceleration_factor
 
@@ -167,7 +168,8 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     peak = float(header[63])  # entry 64 of the format's description, which counts from 1
     to_si = acceleration_factor(unit)
     if peak != -999 and to_si is not None:  # -999 stands for an entry that is not known
-        stated.append(StatedPeak(to_si * abs(peak)))
+        time = max(float(header[64]), 0.0)  # -999 as well
+        stated.append(StatedPeak(to_si * abs(peak), time=time))
     step = _cosmos_step(file, channel.reals, header, count=count, duration=duration)
     return recording_in_si(
         file.location(channel.line),
@@ -185,9 +187,9 @@ HEADER_WORDS = "a real header whose entry 62 or 34 agrees with the duration"
 
 
 def _real_header(file: TextFile, line: int) -> Array:
-    """Return the numbers of the real header of a channel of COSMOS, followed by 64 zeros.
+    """Return the numbers of the real header of a channel of COSMOS, followed by 65 zeros.
 
-    The zeros stand for entries that a short header does not have, so that each of its first 64
+    The zeros stand for entries that a short header does not have, so that each of its first 65
     entries can be taken.
 
     Args:
@@ -196,7 +198,7 @@ def _real_header(file: TextFile, line: int) -> Array:
             Format= (5F15.6)"; -1 if the file has none.
 
     Returns:
-        Array of shape (numbers + 64,), in the units of the format.
+        Array of shape (numbers + 65,), in the units of the format.
 
     Raises:
         RefusedError: `line` is -1 or is no such line, or a word of the header is no finite number.
@@ -208,7 +210,7 @@ def _real_header(file: TextFile, line: int) -> Array:
         cure = "load the file anew"
         raise file.refusal(max(line, 0), "without a real header", allowed, cure)
     values = file.numbers(line + 1, line + 1 + int(match[2]), width=int(match[4]))
-    return np.append(values, np.zeros(64))
+    return np.append(values, np.zeros(65))
 
 
 def _cosmos_step(file: TextFile, line: int, header: Array, *, count: int, duration: float) -> float:
@@ -291,9 +293,9 @@ def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
         compared with them.
 
     Raises:
-        RefusedError: The headers do not tell the series; samples are missing or are no numbers; no
-            unit of acceleration is stated; the step is not from 4e-5 s to below 0.5 s; or the
-            samples have another peak than the head.
+        RefusedError: The headers do not tell the series, or state another count or step above it;
+            samples are missing or are no numbers; no unit of acceleration is stated; the step is
+            not from 4e-5 s to below 0.5 s; or the samples have another peak than the head.
     """
     # Groups: 1 the count of samples, 2 the step in s, 3 or 4 the unit behind "in" or "units", 5 the
     # numbers in a line, 6 the characters of a number. All from the unit on may be missing.
@@ -313,11 +315,14 @@ def _read_csmip(file: TextFile, channel: _Channel, unit: str) -> Recording:
                 width=int(match[6] or 10),
                 head=line,
             )
+            step = float(match[2])
+            timing = timing_in_text(file, channel.line, line)
+            require_timing(file, line, timing, count=len(samples), step=step)
             return recording_in_si(
                 file.location(line),
                 "CSMIP",
                 own_unit,
-                float(match[2]),
+                step,
                 samples,
                 " ".join(channel.names),
                 stated=peaks_in_text(file.lines[channel.line : line], own_unit),
@@ -352,8 +357,9 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
     integers_line = channel.line + 13
     reals_line = integers_line + 7
     line = reals_line + 7  # of the first sample, or of a text above it
-    integers = file.numbers(integers_line, reals_line, width=5)
-    reals = file.numbers(reals_line, line, width=10)
+    layout = "13 lines of text, 7 of integers and 7 of reals, as in CSMIP's volume 1"
+    integers = file.head_numbers(integers_line, 7, width=5, layout=layout)
+    reals = file.head_numbers(reals_line, 7, width=10, layout=layout)
     if len(integers) < 33 or len(reals) < 3 or line >= channel.end:
         allowed = "the headers of CSMIP's volume 1, or a line such as 1200 points of accel data …"
         raise file.refusal(channel.line, "without a series", allowed, "load the file anew")

@@ -2,7 +2,8 @@
 
 A component has 16 lines of text, 4 lines of integers and 6 of reals, ten to a line of 8 columns
 each, then accelerations in mm/s², velocities and displacements in the same columns. Integers 34,
-35 and 36 count them; real 26 is their step in s, real 36 the peak of the accelerations.
+35 and 36 count them; real 24 is their duration and real 26 their step in s, real 36 the peak of
+the accelerations and real 37 its time.
 """
 
 from __future__ import annotations
@@ -16,6 +17,11 @@ from typing import ClassVar
 from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
+from alphacut.frame.records.stated_timing import (
+    StatedTiming,
+    require_timing,
+    timing_in_text,
+)
 from alphacut.frame.records.text_file import TextFile, choose_channel, recording_in_si
 
 # The first line of a component; the group is "UN" or None.
@@ -44,11 +50,12 @@ class _Component:
     end: int
     count: int
     name: str
-    # The format GeoNet V2A fixes these three: lines of text, numbers in a line, and characters of a
-    # number.
+    # The format GeoNet V2A fixes these four: lines of text, numbers in a line, characters of a
+    # number, and the lines of the head, for messages.
     text_lines: ClassVar[int] = 16
     per_line: ClassVar[int] = 10
     width: ClassVar[int] = 8
+    layout: ClassVar[str] = "16 lines of text, 4 of integers and 6 of reals, as in GeoNet's V2A"
 
     @classmethod
     def of(cls, file: TextFile, start: int) -> _Component:
@@ -68,7 +75,7 @@ class _Component:
             RefusedError: The integers do not count two accelerations or more, or are no numbers.
         """
         first = start + cls.text_lines
-        integers = file.numbers(first, first + 4, width=cls.width)
+        integers = file.head_numbers(first, 4, width=cls.width, layout=cls.layout)
         counts = [int(number) for number in integers[33:36]]
         if len(counts) < 3 or counts[0] < 2 or min(counts) < 0:
             allowed = "40 integers, of which 34 to 36 count samples"
@@ -98,8 +105,8 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
 
     Raises:
         RefusedError: The file is not corrected; there is no such component; a head does not tell
-            counts and step; samples are missing or are no numbers; the step is not from 4e-5 s to
-            below 0.5 s; or the samples have another peak than the head.
+            counts and step, or states others elsewhere; samples are missing or are no numbers; the
+            step is not from 4e-5 s to below 0.5 s; or the samples have another peak than the head.
     """
     match = MARK.match(file.lines[0])  # its group is UN in "UNCORRECTED ACCELEROGRAM"
     if match is not None and match[1]:
@@ -120,15 +127,20 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
         width=component.width,
         head=component.start + component.text_lines,
     )
+    # The places are counted from 0, the numbers of the format's description from 1.
+    step = float(reals[25])
+    timing = list(timing_in_text(file, component.start, component.samples - 10))
+    timing.append(StatedTiming(component.samples - 4, duration=float(reals[23])))
+    require_timing(file, component.samples - 7, timing, count=component.count, step=step)
     return recording_in_si(
         file.location(component.samples - 6),
         "GeoNet V2A",
         "mm/s/s",
-        float(reals[25]),  # number 26 of the reals: the step in s
+        step,
         samples,
         " ".join(names[chosen]),
-        # Number 36 of the reals is the peak in mm/s².
-        stated=[StatedPeak(1e-3 * abs(float(reals[35])))],
+        # The peak in mm/s² and its time in s.
+        stated=[StatedPeak(1e-3 * abs(float(reals[35])), time=float(reals[36]))],
     )
 
 
@@ -143,7 +155,7 @@ def _components(file: TextFile) -> Iterator[_Component]:
 
 def _reals(file: TextFile, first: int) -> Array:
     """Return the 60 reals of a head from their first line on, or raise RefusedError."""
-    reals = file.numbers(first, first + 6, width=_Component.width)
+    reals = file.head_numbers(first, 6, width=_Component.width, layout=_Component.layout)
     if len(reals) != 60:
         allowed = "60 reals, of which 26 is the step"
         raise file.refusal(first, f"{len(reals)} reals", allowed, "load the file anew")

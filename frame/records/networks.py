@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import ClassVar, NamedTuple
-
-import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
+from alphacut.frame.records.stated_timing import StatedTiming, require_timing
 from alphacut.frame.records.text_file import (
     ACCELERATION_UNITS,
     NUMBER,
@@ -233,8 +233,8 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     """Return the recording in a file of ESM or ITACA: lines ``KEY: value``, then one sample a line.
 
     SAMPLING_INTERVAL_S, the step in s, and NDATA, the count of samples, must be there. UNITS,
-    DATA_TYPE (an acceleration if it is missing), STREAM (the channel) and PGA_CM/S^2 (the peak) may
-    be missing.
+    DATA_TYPE (an acceleration if it is missing), STREAM (the channel), DURATION_S, PGA_CM/S^2 (the
+    peak) and TIME_PGA_S may be missing.
 
     Args:
         file: The file.
@@ -247,7 +247,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
         RefusedError: The step or the count is missing or not above 0; the data are no
             accelerations, or no unit is stated; a sample is no finite number, or there are more or
             fewer than stated; the step is not from 4e-5 s to below 0.5 s; or the samples have
-            another peak than the head.
+            another duration or peak than the head states.
     """
     head = dict[str, _EsmField]()
     for row, line in enumerate(file.lines):
@@ -273,8 +273,14 @@ def read_esm(file: TextFile, unit: str) -> Recording:
     # Comments without a colon may stand among the keys: samples begin behind the last key.
     samples = file.numbers(1 + max(field.line for field in head.values()), len(file.lines))
     file.require_count(samples, int(count), head["NDATA"].line)
-    own_unit = head.get("UNITS", _EsmField(unit, head["SAMPLING_INTERVAL_S"].line))
+    step_line = head["SAMPLING_INTERVAL_S"].line
+    duration = head.get("DURATION_S", _EsmField("", 0))
+    if NUMBER.fullmatch(duration.text):
+        stated = [StatedTiming(duration.line, duration=float(duration.text))]
+        require_timing(file, step_line, stated, count=int(count), step=step)
+    own_unit = head.get("UNITS", _EsmField(unit, step_line))
     peak = head.get("PGA_CM/S^2", _EsmField("", 0)).text
+    peak_time = head.get("TIME_PGA_S", _EsmField("", 0)).text
     return recording_in_si(
         file.location(own_unit.line),
         "ESM",
@@ -282,7 +288,7 @@ def read_esm(file: TextFile, unit: str) -> Recording:
         step,
         samples,
         head.get("STREAM", _EsmField("", 0)).text,
-        stated=peaks_in_text([f"PGA: {peak} cm/s^2"], "cm/s^2"),
+        stated=peaks_in_text([f"PGA: {peak} cm/s^2 at {peak_time} s"], "cm/s^2"),
     )
 
 
@@ -293,7 +299,8 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     of 50 reals in columns of 15 characters. Behind it stand as many lines of comments as the head
     says, and then the samples, 8 in a line of columns of 10 characters. Integer 13 is the angle of
     the sensor from the vertical in degrees, 16 counts the comments and 17 the samples; real 2 is
-    the count of samples in a second, and reals 30 and 32 are the extremes. All are counted from 1.
+    the count of samples in a second; reals 30 and 32 are the extremes, 29 and 31 their times. All
+    are counted from 1.
 
     Args:
         file: The file, whose first line is not empty.
@@ -304,9 +311,10 @@ def read_smc(file: TextFile, unit: str) -> Recording:
 
     Raises:
         RefusedError: The first line does not begin with 1 or 2, the numbers of accelerograms; the
-            head has more or fewer numbers, or counts fewer than two samples or a rate that is not
-            above 0; samples are missing or are no numbers; the step is not from 4e-5 s to below 0.5
-            s; or the samples have another peak than the head.
+            head has more or fewer lines or numbers; it counts other comments than there are, fewer
+            than two samples, or a rate that is not above 0; samples are missing or are no numbers;
+            the step is not from 4e-5 s to below 0.5 s; or the samples have another peak than the
+            head.
     """
     if file.lines[0].split()[0] not in ("1", "2"):
         allowed = "1 UNCORRECTED or 2 CORRECTED ACCELEROGRAM"
@@ -314,28 +322,37 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     integers_line = 11
     reals_line = 17
     comments_line = 27
-    integers = file.numbers(integers_line, reals_line, width=10)
-    reals = file.numbers(reals_line, comments_line, width=15)
+    layout = "11 lines of text, 6 of integers and 10 of reals, as in SMC"
+    integers = file.head_numbers(integers_line, 6, width=10, layout=layout)
+    reals = file.head_numbers(reals_line, 10, width=15, layout=layout)
     if len(integers) != 48 or len(reals) != 50:
         value = f"{len(integers)} integers and {len(reals)} reals"
         raise file.refusal(integers_line, value, "48 and 50, as in SMC", "load the file anew")
     # The places below are counted from 0, those of the format's description from 1.
     is_vertical = integers[12] in (0, 180)
-    n_comments = int(integers[15])
+    n_comments = max(int(integers[15]), 0)  # the format's number for none is -32768
+    comments = file.lines[comments_line:]
+    n_marked = len(list(takewhile(lambda line: line.startswith("|"), comments)))
+    if n_marked != n_comments:
+        what = f"{n_comments} lines of comments, and {n_marked} with | follow"
+        allowed = "as many comments as integer 16 of the head states"
+        raise file.refusal(
+            integers_line + 1, what, allowed, "load the file anew, or mend integer 16"
+        )
     count = int(integers[16])
     rate = float(reals[1])
     if not (count > 1 and rate > 0):
         value = f"{count} samples, {rate:g} in a second"
         raise file.refusal(reals_line, value, "two or more, at a rate above 0")
     samples = file.fixed_columns(
-        comments_line + max(n_comments, 0),
+        comments_line + n_comments,
         count=count,
         per_line=8,
         width=10,
         head=integers_line,
     )
     stated = list(peaks_in_text(file.lines[:integers_line], "cm/s^2"))
-    stated.append(_smc_peak(reals))
+    stated += _smc_peaks(reals)
     return recording_in_si(
         file.location(reals_line),
         "SMC",
@@ -347,11 +364,18 @@ def read_smc(file: TextFile, unit: str) -> Recording:
     )
 
 
-def _smc_peak(reals: Array) -> StatedPeak:
-    """Return the peak in the reals of an SMC file; 0, which counts as none, if it states none."""
-    extremes = np.abs(reals[[29, 31]])  # the largest and the smallest sample, in cm/s²
-    is_stated = extremes < 1e38  # the format's number for none is 1.7e38
-    return StatedPeak(0.01 * float(extremes[is_stated].max(initial=0.0)))
+def _smc_peaks(reals: Array) -> list[StatedPeak]:
+    """Return the peak in the reals of an SMC file with its time; none if it states none."""
+    # Places counted from 0: the largest and the smallest sample in cm/s², behind their times in s.
+    # The format's number for none is 1.7e38.
+    extremes = [(abs(float(reals[place])), float(reals[place - 1])) for place in (29, 31)]
+    stated = [(magnitude, time) for magnitude, time in extremes if magnitude < 1e38]
+    if not stated:
+        return []
+    magnitude, time = max(stated)
+    if not 0 < time < 1e38:
+        time = 0.0
+    return [StatedPeak(0.01 * magnitude, time=time)]
 
 
 # How a line of a file of each format begins, in how many first lines, and its reader. The formats
@@ -360,7 +384,10 @@ def _smc_peak(reals: Array) -> StatedPeak:
 FORMATS = (
     (re.compile("Origin Time"), 1, read_knet),
     (
-        re.compile(r"\s*[1-4]\s+(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"),
+        re.compile(
+            r"\s*[1-6]\s+(?:(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"
+            r"|(?:RESPONSE|FOURIER)\b.*\bSPECTR)"
+        ),
         1,
         read_smc,
     ),

@@ -115,6 +115,8 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"
         raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)
     cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'
+    if any(re.search(r"\bspectr(?:a|um)\b", line, re.IGNORECASE) for line in file.lines[:3]):
+        cure = "this seems to be a file of spectra: take the record of the acceleration over time"
     raise RefusedError(path.name, "of no format that is read", allowed, cure)
 
 

@@ -756,7 +756,9 @@ def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
         cure = f"this time alone is wrong: {time[wrong - 1] + usual:.9g} s fits"
     elif falls.size:
         wrong = 1 + int(falls[0])
-        pair = f"line {lines[wrong - 1] + 1} and line {lines[wrong] + 1}"
+        pair = (
+            f"line {file.line_number(lines[wrong - 1])} and line {file.line_number(lines[wrong])}"
+        )
         cure = f"times must rise, and fall between {pair}: sort the rows"
         if falls.size == steps.size:
             cure = "times must rise, and these fall: turn the order of the rows round"

@@ -30,10 +30,17 @@ MAX_STEP = 0.5
 
 @dataclass(frozen=True)
 class TextFile:
-    """The lines of a text file, without their ends; its name is for messages."""
+    """The lines of a text file from the first one on that is not empty, without their ends.
+
+    Args:
+        name: Its name, for messages.
+        lines: The lines.
+        skipped: Number of empty lines before them, which messages count as well.
+    """
 
     name: str
     lines: tuple[str, ...]
+    skipped: int = 0
 
     @classmethod
     def from_bytes(cls, name: str, content: bytes) -> Self:
@@ -41,11 +48,11 @@ class TextFile:
 
         Args:
             name: Name of the file, for messages.
-            content: The bytes of the file. Lines may end as on any system (CR LF, LF or CR).
+            content: The bytes of the file. Lines may end as on any system (CR LF, LF or CR). Where
+                a spreadsheet has set a whole line in quotes, these are left out.
 
         Returns:
-            The file with its lines, without their ends; there is always one at least, which may be
-            empty.
+            The file with its lines; there is always one at least, which may be empty.
 
         Raises:
             RefusedError: The content has zero bytes, as binary files do, with a hint for workbooks,
@@ -64,16 +71,24 @@ class TextFile:
         start = content[:100].decode("latin-1")
         cure = cure_of(start, cures, "load it anew, or export its record as text")
         require(b"\0" not in content, name, "no text", "a text file with a record", cure)
-        file = cls(name, tuple(re.split(r"\r\n|\r|\n", decoded(content))))
+        lines = re.split(r"\r\n|\r|\n", decoded(content))
+        first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+        # A spreadsheet may put separators of empty cells behind the quotes.
+        unquoted = (re.sub(r'^"([^"]*)"[,;\s]*$', r"\1", line) for line in lines[first:])
+        file = cls(name, tuple(unquoted), skipped=first)
         # Searches in a line take the square of its length; formats have about 80 letters a line.
         length, longest = max((len(line), number) for number, line in enumerate(file.lines))
         if length > 10_000:
             raise file.refusal(longest, f"{length:,} letters long", "lines of up to 10,000 letters")
         return file
 
+    def line_number(self, line: int) -> int:
+        """Return the number of a line in the file, from 1 on; `line` is its index in `lines`."""
+        return line + 1 + self.skipped
+
     def location(self, line: int) -> str:
         """Return the name of a line, counted from 0, for messages."""
-        return f"{self.name}, line {line + 1}"
+        return f"{self.name}, line {self.line_number(line)}"
 
     def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
         """Return the error about a line, counted from 0."""
@@ -99,11 +114,7 @@ class TextFile:
         # line and the word that is wrong.
         values: list[float] = []
         for row in range(first, min(last, len(self.lines))):
-            line = self.lines[row].rstrip()
-            words = line.split()
-            if width:
-                starts = range(0, len(line), width)
-                words = [line[start : start + width].strip() for start in starts]
+            words = _words(self.lines[row], width)
             if 0 < count <= len(values) and not all(NUMBER.fullmatch(word) for word in words):
                 break
             for word in words:
@@ -119,6 +130,34 @@ class TextFile:
                 values.append(float(re.sub("[dD]", "e", word)))
         return np.array(values)
 
+    def head_numbers(self, first: int, n_lines: int, *, width: int, layout: str) -> Array:
+        """Return the numbers in a block of lines of a head, shape (numbers,).
+
+        A block of reals has a decimal point in its first line, one of integers has none: so a line
+        that is missing above is noticed.
+
+        Args:
+            first: Index of the first line of the block, counted from 0.
+            n_lines: Number of its lines.
+            width: Characters of a number; empty columns are passed over.
+            layout: What lines the head has, for the message, as "11 lines of text, 6 of integers
+                and 10 of reals".
+
+        Raises:
+            RefusedError: A line of the block has other words than numbers, or reals stand among
+                integers.
+        """
+        block = range(first, min(first + n_lines, len(self.lines)))
+        are_reals = first in block and "." in self.lines[first]
+        for row in block:
+            words = filter(None, _words(self.lines[row], width))
+            are_numbers = all(NUMBER.fullmatch(word) for word in words)
+            if not are_numbers or ("." in self.lines[row] and not are_reals):
+                cure = "a line of the head is missing or damaged, or one is too many: load it anew"
+                what = f"'{self.lines[row].strip()[:30]}'"
+                raise self.refusal(row, what, f"a head of {layout}", cure)
+        return self.numbers(first, first + n_lines, width=width)
+
     def fixed_columns(
         self, first: int, *, count: int, per_line: int, width: int, head: int
     ) -> Array:
@@ -132,10 +171,16 @@ class TextFile:
             head: Index of the line that states the count, for the message.
 
         Raises:
-            RefusedError: A sample is no finite number, or the lines that `count` samples fill have
-                more or fewer of them.
+            RefusedError: A sample is no finite number, or the lines that `count` samples fill, up
+                to one with text, have more or fewer of them.
         """
         last = first + ceil(count / max(per_line, 1))
+        # A damaged number has few letters, as in "nan" or "1.5E-O1". Four of them are text, such as
+        # a line that announces the next series.
+        for row, line in enumerate(self.lines[first:last], first):
+            if re.search("[A-Za-z]{4}", line):
+                last = row
+                break
         samples = self.numbers(first, last, width=width)
         self.require_count(samples, count, head)
         return samples
@@ -146,6 +191,17 @@ class TextFile:
             what = f"{count} samples, and {len(samples)} follow"
             cure = "load the file anew, or mend the number in the head"
             raise self.refusal(line, what, "as many samples as the head states", cure)
+
+
+def _words(line: str, width: int) -> list[str]:
+    """Return the words of a line: those in columns of `width` characters, or between blanks if 0.
+
+    Words of columns that are empty are empty.
+    """
+    text = line.rstrip()
+    if not width:
+        return text.split()
+    return [text[start : start + width].strip() for start in range(0, len(text), width)]
 
 
 def recording_in_si(
@@ -170,8 +226,8 @@ def recording_in_si(
         channel: Name of the channel in the file.
         remarks: Clauses on what is unusual in the file.
         stated: Peaks in the file's head. If each of them differs from the peak of the samples by
-            more than 5 %, the recording bears a remark; if each does so by more than a factor of 2,
-            it is refused.
+            more than 5 %, or lies at another time, the recording bears a remark; if each differs by
+            more than a factor of 2, it is refused.
 
     Returns:
         The recording, with samples in m/s².
@@ -192,7 +248,7 @@ def recording_in_si(
         raise RefusedError(location, value, f"accelerations in {ACCELERATION_UNITS}", cure)
     require_step(location, step)
     in_si = to_si * samples
-    remarks += remarks_on_peak(location, in_si, stated, unit)
+    remarks += remarks_on_peak(location, in_si, stated, unit, step=step)
     return Recording(file_format, unit, step, in_si, channel, remarks)
 
 

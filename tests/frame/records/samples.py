@@ -54,6 +54,7 @@ def esm(unit: str = "cm/s^2") -> str:
     head = (
         "EVENT_NAME: TEST\nSTATION_CODE: MRN\nSTREAM: HNE\nSTATION_ELEVATION_M: 17\n"
         f"SAMPLING_INTERVAL_S: {STEP:.6f}\nNDATA: {COUNT}\nDURATION_S: 1.995\nUNITS: {unit}\n"
+        "TIME_PGA_S: 0.180000\n"
         "DATE_TIME_FIRST_SAMPLE_YYYYMMDD_HHMMSS: 20120529_070000.000\nDATA_TYPE: ACCELERATION\nUSER5:\n"
     )
     return head + lines(size * samples(), "20.10E", 1)
@@ -149,10 +150,10 @@ WITH_PEAK = {
     "ESM": lambda f: esm("m/s^2").replace("USER5:", f"PGA_CM/S^2: {f * PEAK * 100 * G:.6f}"),
     "COSMOS": cosmos_with_peak,
     "CSMIP V2": lambda f: csmip(names=("1: 90 Deg",)).replace(
-        "text\n", f"PEAK ACCELERATION = {f * PEAK * 100 * G:10.3f} CM/SEC/SEC AT  1.2 SEC\n"
+        "text\n", f"PEAK ACCELERATION = {f * PEAK * 100 * G:10.3f} CM/SEC/SEC AT  .18 SEC\n"
         "PEAK VELOCITY = 900.1 CM/SEC AT 1.3 SEC\n", 1),
     "CSMIP V1": lambda f: csmip(False, ("1: 90 Deg",), "g/10", raw=True).replace(
-        "AND g/10", f"AND G/10.   MAX  = {f * PEAK:7.3f} G, AT  0.040 SEC"),
+        "AND g/10", f"AND G/10.   MAX  = {f * PEAK:7.3f} G, AT  0.180 SEC"),
     "SMC text": lambda f: smc().replace("*\n", f"*   pk acc = {f * PEAK * 100 * G:.3e}\n", 1),
     "SMC largest": lambda f: smc_with_peak(f, 30),
     "SMC least": lambda f: smc_with_peak(f, 32),

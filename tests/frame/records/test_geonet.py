@@ -16,11 +16,21 @@ def block(values, width_format="8.1f"):
 
 
 def component(name, wave, *, first="Corrected accelerogram 20161113 GNS Science", peak=None):
-    text = [first, *["text"] * 11, f"Component {name}  Longitudinal", *["peak"] * 3]
+    text = [
+        first,
+        *["text"] * 8,
+        f"Number of points  {N_SAMPLES}",
+        "at 0.020 sec intervals",
+        "text",
+        f"Component {name}  Longitudinal",
+        *["peak"] * 3,
+    ]
     integers = [7] * 40
     integers[33:36] = [len(wave)] * 3
     reals = [1.5] * 60
-    reals[25], reals[35] = STEP, np.abs(wave).max() if peak is None else peak
+    reals[23], reals[25] = STEP * (len(wave) - 1), STEP
+    reals[35] = np.abs(wave).max() if peak is None else peak
+    reals[36] = STEP * np.abs(wave).argmax()
     head = "\n".join(text) + "\n" + block(integers, "8d") + block(reals, "8.3f")
     return head + block(wave) + block(9 * wave) + block(5 * wave)
 
@@ -59,6 +69,10 @@ def test_components_of_one_orientation_are_numbered(tmp_path):
         (lambda text: text[:-9000], "samples, and .* follow"),
         (lambda text: text.replace("     403", "       0"), "counts of"),
         (lambda text: text.replace("   0.020", "  99.000"), "a step of 99 s"),
+        (lambda text: text.replace("points  403", "points  413"), "413 samples, as line 10 states"),
+        (lambda text: text.replace("at 0.020", "at 0.010"), "steps of 0.01 s, as line 11 states"),
+        (lambda text: text.replace("   8.040", "   4.020"), "4.02 s in all, as line 23 states"),
+        (lambda text: text.replace("text\n", "", 1), "line 20 is '.*a line of the head is missing"),
     ],
 )
 def test_a_damaged_file_is_one_line(tmp_path, change, words):
@@ -67,6 +81,15 @@ def test_a_damaged_file_is_one_line(tmp_path, change, words):
     assert damaged != text
     with pytest.raises(RefusedError, match=words):
         read_recording(saved(tmp_path, damaged))
+
+
+def test_another_time_of_the_peak_than_the_head_states_is_remarked(tmp_path):
+    text = component("S90E", WAVES[0])
+    time = f"{STEP * np.abs(WAVES[0]).argmax():8.3f}"
+    path = saved(tmp_path, text)
+    assert not [*read_recording(path).doubts()]
+    path = saved(tmp_path, text.replace(time, f"{0.85:8.3f}"))
+    assert "its head states" in " ".join(read_recording(path).doubts())
 
 
 def test_another_peak_than_the_head_states_is_no_record_without_a_word(tmp_path):

@@ -147,6 +147,57 @@ def test_what_is_unusual_is_said(tmp_path):
         assert not [*read_recording(saved(tmp_path, text)).doubts()]
 
 
+@pytest.mark.parametrize("name", written.FORMATS[:-1])
+@pytest.mark.parametrize("change", ["empty first lines", "lines in quotes"])
+def test_files_that_an_editor_or_a_spreadsheet_saved_are_read(tmp_path, name, change):
+    content, unit, rounding = written.variant(name, 0)
+    layout = (written.STEP, unit) if unit else ()
+    if change == "empty first lines":
+        content = b"\n \n" + content
+    else:
+        content = b"\n".join(b'"' + row + b'"' for row in content.splitlines())
+    record = read_recording(saved(tmp_path, content.decode("latin-1"), "record.txt"), "", *layout)
+    expected = written.G * written.samples()
+    assert record.samples == pytest.approx(expected, abs=written.G * rounding)
+
+
+def test_lines_are_counted_from_the_first_empty_one(tmp_path):
+    path = saved(tmp_path, "\n\n" + written.smc(count=401))
+    with pytest.raises(RefusedError, match="line 14 is 401 samples, and 400 follow"):
+        read_recording(path)
+
+
+def test_a_file_of_spectra_is_told_so(tmp_path):
+    text = "Response and Fourier Amplitude Spectra\n" + "1.0 2.0 3.0\n" * 500
+    with pytest.raises(RefusedError, match="a file of spectra: take the record"):
+        read_recording(saved(tmp_path, text))
+
+
+@pytest.mark.parametrize("factor", [0.25, 6.0])
+def test_a_peak_at_another_time_than_in_the_head_is_remarked(tmp_path, factor):
+    time = 0.18 * factor
+    esm = written.esm().replace("USER5:", f"PGA_CM/S^2: {written.PEAK * 100 * written.G:.3f}")
+    true = saved(tmp_path, esm)
+    assert not [*read_recording(true).doubts()]
+    texts = [esm.replace("TIME_PGA_S: 0.180000", f"TIME_PGA_S: {time}")]
+    texts.append(written.WITH_PEAK["CSMIP V2"](1.0).replace("AT  .18 SEC", f"AT {time} SEC"))
+    for text in texts:
+        (doubt,) = read_recording(saved(tmp_path, text)).doubts()
+        assert f"its head states {time:g} s: check the step" in doubt
+
+
+def test_the_peak_of_the_uncorrected_record_does_not_hide_that_of_the_corrected_one(tmp_path):
+    uncorrected = f"Uncor Max  =  {written.PEAK:.3f} g, at   0.180 sec.\n"
+    text = written.WITH_PEAK["CSMIP V2"](10.0).replace("text\n", uncorrected, 1)
+    with pytest.raises(RefusedError, match="where its head states"):
+        read_recording(saved(tmp_path, text))
+    alone = written.csmip(names=("1: 90 Deg",)).replace("text\n", uncorrected, 1)
+    assert not [*read_recording(saved(tmp_path, alone)).doubts()]
+    another = alone.replace(f"{written.PEAK:.3f}", f"{1.3 * written.PEAK:.3f}")
+    (doubt,) = read_recording(saved(tmp_path, another)).doubts()
+    assert "its head states" in doubt
+
+
 def test_waveforms_are_read_by_obspy_or_refused_with_its_name(tmp_path):
     head = bytearray(632)
     head[304:308], head[316:320] = (6).to_bytes(4, "little"), (400).to_bytes(4, "little")
@@ -231,12 +282,37 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         (written.esm().replace("cm/s^2", "cm"), "in units of cm"),
         (
             written.csmip(names=("1: 90",)).replace("400 points of acc", "401 points of acc"),
-            "line 79 is '400 points'",
+            "line 28 is 401 samples, and 400 follow",
         ),
         (written.csmip(names=("1: 90",), unit="furlongs"), "in units of furlongs"),
         (written.smc("4 DISPLACEMENT"), "line 1 is 4 DISPLACEMENT"),
         (written.smc(count=401), "401 samples, and 400 follow"),
         (written.cosmos(step=0.02, names=("1: 90 deg",)), "a step of 0.02 for 400 samples in 2"),
+        (
+            written.cosmos(names=("1: 90 deg",)).replace("400 acc", "450 acc"),
+            "line 34 is 450 samples, and 400 follow",
+        ),
+        (
+            written.csmip(names=("1: 90",)).replace("text", "At intervals of .02 sec", 1),
+            "line 28 is 400 samples in steps of 0.005 s; allowed: steps of 0.02 s, as line 3 states",
+        ),
+        (
+            written.csmip(names=("1: 90",)).replace("text", "410 points of corrected accel", 1),
+            "allowed: 410 samples, as line 3 states",
+        ),
+        (
+            written.esm().replace(": 1.995", ": 3.99"),
+            "line 5 is 400 samples in steps of 0.005 s; allowed: 3.99 s in all, as line 7 states",
+        ),
+        (written.smc().replace("*\n", "", 1), "line 17 is '.*a line of the head is missing"),
+        (written.smc().replace("*\n", "*\n*\n", 1), "line 12 is '.*a line of the head is missing"),
+        (
+            written.csmip(False, ("1: 90",), "g", raw=True).replace("text\n", "", 1),
+            "line 20 is '.*a line of the head is missing",
+        ),
+        (written.smc().replace("|\n", ""), "2 lines of comments, and 1 with | follow"),
+        (written.smc().replace("| a", "| b\n| a"), "2 lines of comments, and 3 with | follow"),
+        (written.smc("5 RESPONSE SPECTRA"), "line 1 is 5 RESPONSE SPECTRA; .*the acceleration"),
     ],
     ids=lambda text: text[:12] if "\n" not in text else "file",
 )
