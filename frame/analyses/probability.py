@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.base.errors import require
+from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import MINUS, Table, range_text
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.analyses.answer import Answer, Record, table_of
@@ -199,10 +199,15 @@ def probability(
         progress: Called with the completed fraction.
 
     Raises:
-        RefusedError: A parameter is both fuzzy and random, a limit is not positive or names no
-            output, or a random parameter does not give `samples` finite values.
+        RefusedError: A parameter is both fuzzy and random, a random name is none of `inputs`, a
+            limit is not positive or names no output, `samples` is below 1 or `seed` below 0, or a
+            random parameter does not give `samples` finite values.
     """
+    checked_number("samples", samples, whole=True, least=1)
+    checked_number("seed", seed, whole=True, least=0)
     if not isinstance(random, Mapping):
+        for name in random:
+            require_choice("random", name, inputs)
         random = {name: inputs[name] for name in random}
         # What is random is not fuzzy.
         inputs = {name: number for name, number in inputs.items() if name not in random}

@@ -6,6 +6,7 @@ from math import ceil, pi
 
 import numpy as np
 
+from alphacut.base.errors import checked_number
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.records.history import Accelerogram
@@ -26,8 +27,10 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
         ratio: Damping ratio ζ, at least 0 and below 1.
 
     Raises:
-        RefusedError: The damping ratio is negative, or 1 or more.
+        RefusedError: The period is not a positive, finite number, or the damping ratio is negative,
+            or 1 or more.
     """
+    checked_number("period", period, positive=True)
     omega = 2 * pi / period
     # The peak of a sine that is read at n points per period is too low by at most 1 - cos(π / n),
     # which is 0.3 % for n = 40.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.number_text import (
     STANDARD_GRAVITY,
     Table,
@@ -142,11 +142,15 @@ def scaled_records(
         ends before its record.
 
     Raises:
-        RefusedError: `measure` is unknown, two records have the same name, a record is zero
-            throughout, the structure has no matrices of mass, damping and stiffness, it may drift,
-            or its first period is above 1000 s.
+        RefusedError: `measure` is unknown, `duration` or `step` is not positive, there is no
+            record, two have the same name, a record is zero throughout, the structure has no
+            matrices of mass, damping and stiffness, it may drift, or its first period is above
+            1000 s.
     """
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
+    require(duration > 0, "duration", value=f"{duration:g} s", allowed="above 0 s")
+    checked_number("step", step, positive=True)
+    require(len(suite) > 0, "suite", value=None, allowed="one record or more")
     # Results of records are told apart by the names.
     names = [record.name or f"record {number}" for number, record in enumerate(suite, start=1)]
     repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
@@ -252,7 +256,7 @@ def record_peaks(
 
     Raises:
         RefusedError: There is no such output, or inputs, levels or the step are not allowed.
-        FailedError: No bounds are found.
+        FailedError: No bounds are found, or a time step did not converge.
     """
     return close_peaks(
         model.moved_by(record.ground),
@@ -396,7 +400,7 @@ def over_records(
     Raises:
         RefusedError: A record is zero throughout, there is no such output, an argument is out of
             range, or the structure has no matrices of mass, damping and stiffness.
-        FailedError: No bounds are found for a record.
+        FailedError: No bounds are found for a record, or a time step did not converge.
     """
     records = scaled_records(
         model, suite, duration=duration, step=step, scale=scale, measure=measure

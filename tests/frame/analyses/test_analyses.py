@@ -228,6 +228,7 @@ def test_the_interval_is_that_of_clopper_and_pearson_at_the_level_of_bonferroni(
         ({"q1": 0.0}, {}, "limit of q1"),
         ({"q1": 1.0}, {"E": speed}, "random"),
         ({"q1": 1.0}, {"v2_0": lambda rng, n: rng.random(3)}, "values of v2_0"),
+        ({"q1": 1.0}, ["m2", "stiffness"], "random"),
     ],
 )
 def test_wrong_questions_are_refused(limits, random, key):
@@ -255,6 +256,21 @@ def test_a_mean_takes_one_value_and_several_records():
         decide(band, Limit("q1", (0.01, 0.1), mean=True))
     with pytest.raises(RefusedError, match="output is mean q1; allowed: q1"):
         decide(band, Limit("q1", 0.1, mean=True))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"suite": []}, "suite is missing; allowed: one record or more"),
+        ({"duration": -1.0}, "duration is -1 s; allowed: above 0 s"),
+        ({"duration": np.nan}, "duration is nan s"),
+        ({"step": 0.0}, "step is 0"),
+    ],
+)
+def test_suites_without_records_and_times_are_refused(changes, message):
+    arguments = {"suite": [Accelerogram(0.05, np.ones(20))], "duration": 1.0, "step": 0.05}
+    with pytest.raises(RefusedError, match=message):
+        over_records(ONE, {"m1": Interval(900, 1100)}, **(arguments | changes))
 
 
 def test_two_records_of_one_name_are_refused():

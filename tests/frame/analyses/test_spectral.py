@@ -26,6 +26,12 @@ def test_peaks_are_those_of_a_dense_integration(period):
     assert spectral_acceleration(ground, period, ratio) == pytest.approx(exact, rel=4e-3)
 
 
+@pytest.mark.parametrize("period", [0.0, -1.0, np.nan, np.inf])
+def test_periods_are_positive_numbers(period):
+    with pytest.raises(RefusedError, match="period is"):
+        spectral_acceleration(Accelerogram(0.02, np.ones(3)), period, 0.05)
+
+
 def test_a_period_that_no_structure_has_is_refused_before_it_takes_minutes():
     frame = StoreyFrame((50e3,), stiffness=(0.09,), dampers=(0.0,), damper_placement="storey")
     record = Accelerogram(0.02, np.ones(40))
