@@ -663,7 +663,9 @@ def fragility(
         progress: Called with the completed fraction.
 
     Raises:
-        RefusedError: The structure does not start at rest or has forces, or a limit does not fit.
+        RefusedError: The structure does not start at rest or has forces, a limit does not fit, or
+            an argument is out of range.
+        FailedError: No bounds are found for a record, or a time step did not converge.
     """
     named = limits_by_name(limits, ())
     require_fragile(model, list(named.values()))
@@ -768,6 +770,7 @@ def incremental_analyses(
 
     Raises:
         RefusedError: Levels or inputs are not allowed, or a response does not exist.
+        StepError: A response has too many events in a step, or its energy is not in balance.
     """
     names = list(limits)
     pairs = [(limit.output, limit.number) for limit in limits.values()]
@@ -806,6 +809,7 @@ def increments_of(
 
     Raises:
         RefusedError: A response does not exist.
+        StepError: A response has too many events in a step, or its energy is not in balance.
     """
     measure, demands = analysis.run(progress)  # (2, levels, limits and events, measures)
     names = [*limits, *events_of(limits)]

@@ -93,6 +93,7 @@ class IncrementalAnalysis:
 
         Raises:
             RefusedError: A response does not exist.
+            StepError: A response has too many events in a step, or its energy is not in balance.
         """
         structures = self._spread_structures()
         grid = self._grid(structures)
@@ -183,10 +184,12 @@ class IncrementalAnalysis:
 
         Raises:
             RefusedError: A response does not exist.
+            StepError: A response has too many events in a step, or its energy is not in balance.
         """
         structures = self._spread_structures()
         for scale in map(float, scales):
             self._move(scale, structures)
+        # Shape (2, levels, limits and events, scales).
         found = np.stack([self._extremes(float(scale))[0] for scale in scales], axis=-1)
         return np.moveaxis(found, 2, 0)
 
@@ -249,6 +252,7 @@ class IncrementalAnalysis:
 
         Raises:
             RefusedError: An output is unknown, or a response does not exist.
+            StepError: A response has too many events in a step, or its energy is not in balance.
         """
         record = self.model.ground
         assert record is not None
@@ -502,6 +506,7 @@ def incremental(
     Raises:
         RefusedError: The columns do not yield, a scale is not positive, a record is zero
             throughout, or inputs or levels are not allowed.
+        StepError: A response has too many events in a step, or its energy is not in balance.
     """
     value = "of another structure"
     allowed = "columns that yield"

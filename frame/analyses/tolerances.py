@@ -273,7 +273,7 @@ def tolerances(
 
         Raises:
             RefusedError: A response does not exist.
-            FailedError: No bounds are found.
+            FailedError: No bounds are found, or a time step did not converge.
         """
         if scale not in tried:
             band = envelope(

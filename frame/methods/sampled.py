@@ -138,6 +138,7 @@ class PeakSearch:
 
         Raises:
             RefusedError: A trajectory does not exist, as one that collapses.
+            StepError: A trajectory has too many events in a step, or its energy is not in balance.
         """
         cuts = flow.boxes
         outputs = tuple(map(str, flow.outputs))
@@ -230,6 +231,7 @@ class _Band:
 
         Raises:
             RefusedError: A trajectory does not exist, as one that collapses.
+            StepError: A trajectory has too many events in a step, or its energy is not in balance.
         """
         points = np.column_stack([inputs[name] for name in self.names])
         values, peaks = self.yielding_flow.values_and_peaks(points)
