@@ -22,6 +22,7 @@ from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import levels
+from alphacut.fuzzy.sets.claimed import widest_cut
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 from alphacut.rve.cell.cell import AnyPhase, Phase, Phases
 from alphacut.rve.result.cell_model import AnyModel
@@ -319,7 +320,7 @@ def fuzzy_stiffness(
     # told the range.
     modulus = cell.inputs.get("inclusion_modulus")
     sample_model = model.for_samples(
-        None if modulus is None else modulus.support, energies=loss_cuts is not None
+        None if modulus is None else widest_cut(modulus), energies=loss_cuts is not None
     )
     function = CellSamples(sample_model, cell, average=average, loss_cuts=loss_cuts)
     # Samples that are alike in these inputs differ in the particle's modulus alone, and share a
@@ -414,7 +415,7 @@ class FuzzyCell:
                 numbers[name] = number
             else:
                 numbers[name] = Crisp(checked_number(name, number))
-            low = numbers[name].support.lower
+            low = widest_cut(numbers[name]).lower
             is_allowed = low >= 0 or not name.endswith("_loss")
             require(is_allowed, name, value=f"from {low:g}", allowed="loss factors of 0 or more")
 
@@ -427,7 +428,7 @@ class FuzzyCell:
         for name, phase in named.items():
             stated = Crisp(phase.loss or 0.0)
             losses.append(numbers.get(f"{name}_loss", stated))
-        if not any(number.support.upper > 0 for number in losses):
+        if not any(widest_cut(number).upper > 0 for number in losses):
             losses = []
         has_particle = not isinstance(phases, Mapping)
         return cls(radius, named, sampled, tuple(losses), has_particle)
@@ -467,9 +468,12 @@ class FuzzyCell:
         return found
 
     def support(self, name: str) -> Cut:
-        """Return the smallest and the largest value of a phase's parameter, fuzzy or not."""
+        """Return the smallest and the largest value of a phase's parameter, fuzzy or not.
+
+        Of a measured number they are the ends of the widest cut that its values decide.
+        """
         if name in self.inputs:
-            return self.inputs[name].support
+            return widest_cut(self.inputs[name])
         phase, _, parameter = name.partition("_")
         value = getattr(self.phases[phase], parameter)
         return Cut(value, value)

@@ -166,8 +166,9 @@ class ImagePhase:
 
     @property
     def is_solid(self) -> bool:
-        """Whether the phase is neither a pore nor rigid, throughout its support."""
-        return self.modulus.support.lower > 0 and self.modulus.support.upper < RIGID
+        """Whether the phase is neither a pore nor rigid, throughout its widest known cut."""
+        lower, upper = widest_cut(self.modulus)
+        return lower > 0 and upper < RIGID
 
 
 def _as_fuzzy(key: str, value: FuzzyNumber | float) -> FuzzyNumber:
@@ -675,7 +676,7 @@ def _widths_by_cause(
     if study.fuzzy_threshold:
         widths["threshold"] = max(0.0, width(lowest, None) - at_nominal)
     numbers = [x for phase in study.phases for x in (phase.modulus, phase.poisson)]
-    if any(number.support.width > 0 for number in numbers):
+    if any(widest_cut(number).width > 0 for number in numbers):
         widths["phases"] = max(0.0, width(None, lowest) - at_nominal)
     return dict(sorted(widths.items(), key=lambda item: -item[1]))
 

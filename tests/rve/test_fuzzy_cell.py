@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.base.errors import RefusedError
 from alphacut.entry import main
-from alphacut.fuzzy import Interval, Reduced, Signed, Triangular
+from alphacut.fuzzy import Interval, Reduced, Signed, Triangular, from_data
 from alphacut.rve import (
     Phase,
     SeriesModel,
@@ -87,6 +87,17 @@ def test_an_input_that_is_no_parameter_is_refused(phases, name):
 def test_an_input_that_is_no_number_is_refused_by_its_name(value):
     with pytest.raises(RefusedError, match=r"a2 is .* finite numbers"):
         fuzzy_stiffness(SeriesModel(), RADIUS, PHASES, {"a2": value}, progress=False)
+
+
+def test_measured_inputs_are_taken_on_levels_that_their_values_decide():
+    loss = from_data([0.01, 0.015, 0.02, 0.03], "median")
+    modulus = from_data([19e9, 19.5e9, 20.5e9, 21e9], "median")
+    inputs = {"matrix_loss": loss, "inclusion_loss": loss, "matrix_modulus": modulus}
+    stiffness = fuzzy_stiffness(
+        SeriesModel(), RADIUS, PHASES, inputs, alpha=[0.5, 1], progress=False
+    )
+    assert stiffness.losses.cuts["E"][0] == pytest.approx(loss.cut(0.5), rel=1e-9)
+    assert stiffness.bounds.inputs["matrix_modulus"].cut(0.5) == modulus.cut(0.5)
 
 
 def test_spheres_keep_hill_s_average_whatever_average_of_a_plane_is_asked_for():

@@ -265,10 +265,11 @@ def test_loss_factors_without_both_bounds_of_the_stiffness_are_refused(modulus, 
         fuzzy_image_stiffness(image, phases, labels=(0, 1), progress=False)
 
 
-def test_a_measured_loss_factor_is_taken_on_levels_that_its_values_decide():
+def test_measured_moduli_and_losses_are_taken_on_levels_that_values_decide():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     loss = from_data([0.01, 0.015, 0.02, 0.03], "median")
-    phase = {"modulus": 1e9, "poisson": 0.3, "loss": loss}
+    modulus = from_data([0.9e9, 0.95e9, 1.05e9, 1.1e9], "median")
+    phase = {"modulus": modulus, "poisson": 0.3, "loss": loss}
     found = fuzzy_image_stiffness(
         image, [phase, phase], labels=(0, 1), alpha=(0.5, 1.0), progress=False
     )
