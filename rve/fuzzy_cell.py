@@ -229,6 +229,9 @@ class FuzzyStiffness:
             phases have loss factors; `point`, the inputs of the samples, shape (sample, parameter);
             and `curve11`, their stresses σ11 over θ, shape (sample, theta), whose attribute
             "relative_error" is the error of a stress at a single θ.
+
+        Raises:
+            MissingLibraryError: xarray is not installed.
         """
         with extra_named():
             import xarray

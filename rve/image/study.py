@@ -497,6 +497,9 @@ class FuzzyImageStiffness:
             "is_open", 1 where the threshold leaves it open on the lowest level. Attributes are
             "nature" (the guarantee), "lengths" (sides of a pixel in m along its axes) and "phases"
             (their names).
+
+        Raises:
+            MissingLibraryError: xarray is not installed.
         """
         with extra_named():
             import xarray

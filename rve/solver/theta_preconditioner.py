@@ -78,8 +78,10 @@ def theta_mass(distribution: ThetaDistribution, levels: Array) -> ThetaMass:
         levels: θ of the levels, rising, shape (layers + 1,).
 
     Returns:
-        Diagonals of the masses of hats and of bubbles, the symmetric M^-½ of the hats, G^-½ of the
-        bubbles made orthogonal to the hats, and the projection M⁻¹ M_hb of bubbles on hats.
+        `hats` and `bubbles`, the diagonals of their masses, shape (layers + 1,) and (layers,);
+        `inverse_root`, the symmetric M^-½ of the mass M of the hats; `bubble_inverse_root`, G^-½ of
+        the mass G of the bubbles made orthogonal to the hats; and `projection`, M⁻¹ M_hb, of
+        bubbles on hats, shape (layers + 1, layers).
 
     Raises:
         numpy.linalg.LinAlgError: The mass of the hats is singular.
