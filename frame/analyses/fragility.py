@@ -941,6 +941,8 @@ def event_words(event: str) -> str:
 def _grid(critical: CriticalMeasures, demands: Sequence[Increments]) -> Array:
     """Return 60 equidistant measures that cover all finite critical ones, for bands and tables.
 
+    They are rising and positive, shape (60,).
+
     Args:
         critical: Measures at which the limit is reached, for each level and record. Those below
             which no structure exceeds it must be finite.
@@ -948,7 +950,8 @@ def _grid(critical: CriticalMeasures, demands: Sequence[Increments]) -> Array:
             a linear structure. The largest measure that was tried must be the same for all records.
             The grid does not exceed it, and ends with it if a critical measure lies beyond it.
     """
-    # The grid is a tenth wider than the critical measures, so that bands begin at 0 and end at 1.
+    # The grid begins a fifth below the smallest critical measure and ends a tenth above the
+    # largest, so that bands begin at 0 and end at 1.
     is_finite = np.isfinite(critical.high)
     largest = 1.1 * float(critical.high.max(initial=0.0, where=is_finite))
     if not is_finite.any():

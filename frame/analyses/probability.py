@@ -309,7 +309,8 @@ def shaped_like(number: FuzzyNumber) -> Sampler:
     uniform = np.linspace(support.lower, support.upper, 4001)
     # The corners of the membership function belong to the grid, so that it is integrated exactly
     # where it is linear between them.
-    grid = np.unique(np.append(uniform, number.cuts[1:]))
+    cuts = number.cuts
+    grid = np.unique(np.append(uniform, cuts.lower + cuts.upper))
     membership = number.membership(grid)
     # Trapezoidal rule.
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2

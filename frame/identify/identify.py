@@ -349,7 +349,16 @@ class Identified:
         refuted frame it has the levels and the refutation alone.
         """
         if self.is_refuted:
-            return LearnedInputs(self.alpha, {}, {}, {}, "", (), {}, refuted=self.refutation)
+            return LearnedInputs(
+                alpha=self.alpha,
+                inputs={},
+                narrowed={},
+                units={},
+                claim="",
+                held_out=(),
+                prior={},
+                refuted=self.refutation,
+            )
         inputs = {}
         prior = {}
         for column, name in enumerate(self.names):

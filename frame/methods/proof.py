@@ -401,9 +401,11 @@ def _line_deviation(model: ModalModel) -> Array:
         if part.load is not None:
             load = part.load.history
         deviations = [part.coefficient.real.deviation(), part.coefficient.imag.deviation()]
-        radii = 2 * np.stack(deviations, axis=1)
+        # A mode and its conjugate add twice the real part of one of them.
+        radii = 2 * np.stack(deviations, axis=1)  # (modes, 2, outputs)
         # What a force adds at once is proportional to the force, with the first coefficient.
         if isinstance(part.load, Direct):
+            # A load itself has no grid: shape (outputs, 1, 1).
             coefficient = np.multiply.outer(2 * part.coefficient.value[0], np.ones((1, 1)))
             responses.append(Response(None, load, 0, coefficient, radii[0]))
             continue

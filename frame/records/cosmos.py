@@ -258,6 +258,7 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
     Raises:
         KeyError: There are titles, and the first line is none.
     """
+    # The group of a title is "UN" or None.
     titles = {k: match for k, line in enumerate(file.lines) if (match := TITLE.match(line))}
     # Volume 2 (corrected) repeats the title of volume 1 (UNCORRECTED …) in its second line, which
     # begins no channel. So a title with UN counts only in files that begin with one.

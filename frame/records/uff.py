@@ -214,6 +214,7 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
             values = content[start : file.tell()]
             orders = {1: "<", 2: ">"}
             yield DataSet(head, [], values, byte_order=orders.get(byte_order, "<"))
+        # The lines up to the next "-1". Those of other numbers and of binary values are dropped.
         inside = takewhile(lambda text: text.strip() != b"-1", iter(file.readline, b""))
         lines = [decoded(text).rstrip("\r\n") for text in inside]
         if first.strip() == str(number).encode():
