@@ -340,12 +340,12 @@ class Bounds:
     def _lines(self, output: str) -> Iterator[str]:
         """Yield a line of text for each level of an output, with its extremes over time.
 
-        A line has the name with its unit, the level, both ends, and what the ends are worth: that
-        the true range may be wider, for attained bounds; their error, for estimated ones; for
-        guaranteed ones the gap to the ends that inputs are known to reach, which is left out where
-        it is not known whether these inputs belong to the set that is meant (`encloses`). Ends are
-        rounded to six digits, attained ones inwards and others outwards. The nature is added where
-        it is not that of all outputs.
+        A line has the name with its unit, the level, both ends, and what the ends are worth: for
+        attained bounds that the true range may be wider, and their error if it is above 0; for
+        estimated ones their error; for guaranteed ones the gap to the ends that inputs are known to
+        reach, which is left out where it is not known whether these inputs belong to the set that
+        is meant (`encloses`). Ends are rounded to six digits, attained ones inwards and others
+        outwards. The nature is added where it is not that of all outputs.
 
         Args:
             output: Name of one of the outputs.
@@ -403,6 +403,7 @@ class Bounds:
         Raises:
             RefusedError: There is no such output; or it has no times, the levels do not run from 0
                 to 1, and the inputs carry no claim of probability.
+            MissingLibraryError: New axes are to be made, and Matplotlib is not installed.
         """
         output = output or self.outputs[0]
         if self.time is None:
@@ -426,6 +427,9 @@ class Bounds:
         and its `label` (the name with its unit, as "q1 [m]"). The attributes are method,
         evaluations, seconds, basis, and encloses where it is not empty: the name of the set that
         the box of the inputs encloses.
+
+        Raises:
+            MissingLibraryError: xarray is not installed.
         """
         with extra_named():
             import xarray

@@ -116,8 +116,8 @@ class RadiusLimits:
     def _cure(self) -> str:
         """Advice in the message on particles that are too dense for cells of one particle.
 
-        It names keys of a case file: the fraction in place of the particles, and for discs also an
-        image of them or stated limits.
+        It names keys of a case file: the fraction (… if it is not known) in place of the particles,
+        and for discs also an image of them or stated limits.
         """
         fraction = "…"
         if self.packed_fraction is not None:
@@ -175,7 +175,11 @@ class FittedRadiusMap:
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
-        """The slopes "a2" and "a4" of the map as fuzzy numbers."""
+        """The slopes "a2" and "a4" of the map as fuzzy numbers.
+
+        Each is a `Triangular` of the ends and the nominal value of its support, or a `Crisp` where
+        both ends are equal.
+        """
         inputs: dict[str, FuzzyNumber] = {}
         for name, ends in self.triangles.items():
             # A triangle without width is no fuzzy number but the value itself.
@@ -504,9 +508,9 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
         the slopes; and the half-width of the band of the distribution function.
 
     Raises:
-        RefusedError: All cells have one r_n, more than 15 % of the cells are too tight for a map
-            without stated limits, fewer than ten values are within the limits, or there are fewer
-            than five groups.
+        RefusedError: All cells have one r_n; without stated limits, more than 15 % of the area or
+            volume is in cells too tight for a map; fewer than ten values are within the limits, or
+            there are fewer than five groups.
         FailedError: No p-box contains the sample.
     """
     capped = rule.capped(sample)
@@ -548,8 +552,8 @@ def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
         "neighbours" with "counted", the number of particles whose neighbours were counted, the
         "mean" number of neighbours and the "mean_distance" of their centres in m, None where there
         are none; and "correlation", the mean over the sections of the correlation of reduced radii
-        of cells that share a wall, NaN where it has no pairs or no spread. Empty for spheres, whose
-        cells have no diagram.
+        of cells that share a wall, NaN if any section has no such pairs or equal radii. Empty for
+        spheres, whose cells have no diagram.
     """
     diagrams = [section.diagram for section in sections if section.diagram]
     if not diagrams:

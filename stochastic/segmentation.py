@@ -153,9 +153,9 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
     """Return which pixels are salt, pepper or scratches, shape (rows, columns).
 
     An impulse differs from the level of every class, and from most of the 7 × 7 pixels around, of
-    which a line has 7, by more than the noise; pixels of a blurred border differ from the levels
-    alone. Noise by itself leaves 0.3 % of such pixels: below 1 % of the image none counts. The
-    image is taken as periodic.
+    which a line has 7, by more than three standard deviations of the noise; pixels of a blurred
+    border differ from the levels alone. Noise by itself leaves 0.3 % of such pixels: below 1 % of
+    the image none counts. The image is taken as periodic.
 
     Args:
         grey: Grey values of an evenly lit image, shape (rows, columns).

@@ -226,7 +226,8 @@ class Call:
         item k is the mapping of the outputs' names to entry k of their arrays. A function with
         `shared` inputs is called once, with a list of n mappings of inputs to numbers, and what it
         returns is returned. Any other function is called n times, with numbers by name; an item is
-        what it returns: a number, an array, or a mapping of names to these.
+        what it returns: a number, an array, or a mapping of names to these. Whether there are n
+        items is not checked.
 
         Args:
             points: One column for each of the inputs `names`, shape (n, inputs).
@@ -237,7 +238,7 @@ class Call:
         """
         if self.vectorised:
             # Several outputs are split by points here, since a sample holds the outputs of one.
-            outputs = _named(self.function(**dict(zip(self.names, points.T, strict=True))))
+            outputs = _by_output_name(self.function(**dict(zip(self.names, points.T, strict=True))))
             arrays = {x: np.atleast_1d(np.asarray(value, float)) for x, value in outputs.items()}
             rows = zip(*arrays.values(), strict=True)
             return [dict(zip(arrays, row, strict=True)) for row in rows]
@@ -252,7 +253,7 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, point, strict=True)}
 
 
-def _named(outputs: object) -> Mapping[Any, Any]:
+def _by_output_name(outputs: object) -> Mapping[Any, Any]:
     """Return outputs by name; a number or an array has the name "y"."""
     return outputs if isinstance(outputs, Mapping) else {"y": outputs}
 
@@ -274,7 +275,7 @@ def _outcome(output: object) -> Outcome:
     try:
         if isinstance(output, Exception):
             raise output
-        named = _named(output).items()
+        named = _by_output_name(output).items()
         arrays = {str(name): _finite_array(str(name), value) for name, value in named}
         layout = tuple((name, array.shape) for name, array in arrays.items())
         # An array "a" and a number "a[0]" would have one name.
@@ -294,7 +295,7 @@ def _finite_array(name: str, value: ArrayLike | None) -> Array:
 
     Raises:
         RefusedError: A value is complex, no number (a text, None, another object), not finite or
-            masked, there is none, or `value` has a unit.
+            masked; `value` is an empty list or array; or it has a unit (an attribute `units`).
         ValueError: Nested lists have different lengths.
     """
     # A masked entry has no value, and an array with a unit loses it on conversion: both would pass

@@ -102,6 +102,8 @@ class Campaign:
         Raises:
             SpentError: The budget is used up, and the point is not among the samples.
             CampaignError: The sample failed.
+            RefusedError: The knowledge about the model names an output that it does not have.
+            FailedError: The store cannot be written, or a worker process died.
         """
         return self(domain.nominal[None]).columns
 

@@ -112,6 +112,7 @@ def _end_with_parent(parent: int) -> None:
         signal.signal(number, signal.SIG_IGN)
 
     def watch() -> None:
+        """Wait until this process is an orphan, and end it."""
         # The kernel gives an orphan another parent.
         while os.getppid() == parent:
             sleep(0.2)
@@ -147,7 +148,8 @@ def completed(
         call: The function of the user, which returns an outcome for each point: a sample, or a
             failure with the text of an exception, so that tasks themselves raise nothing.
         tasks: Pairs of rows, the numbers of some points in their design, and these points, shape
-            (rows, inputs). They are read no earlier than two batches for each worker ahead.
+            (rows, inputs). They are read lazily, at most two batches for each worker ahead of the
+            results.
         executor: Any executor; with None this process evaluates one task after another.
 
     Yields:

@@ -91,7 +91,7 @@ def _quantile(claim: str) -> float | None:
     """Return the probability of the quantile that a claim is about; None if it is about none.
 
     Args:
-        claim: "quantile Q" with a decimal fraction Q such as 0.95; "median", whose probability is
+        claim: "quantile Q" with a number Q that has a decimal point; "median", whose probability is
             0.5; "next value" or "mean", which have none.
 
     Raises:

@@ -75,8 +75,9 @@ class Automatic:
         Raises:
             SpentError: The budget does not carry the first sample.
             RefusedError: Signs are stated, and the budget does not carry all corners or a sample
-                contradicts a sign.
+                contradicts a sign; or the knowledge names an output that the model does not have.
             CampaignError: The model failed at some samples.
+            FailedError: The store of samples cannot be written, or a worker process died.
         """
         outputs = campaign.output_names(domain)
         stated = campaign.knowledge.stated_signs(domain.names, outputs)

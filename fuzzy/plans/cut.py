@@ -264,7 +264,8 @@ class Optimum:
 
         It is the optimum of the box `self.cut`. It stays one in this and in a narrower cut (of a
         higher level) that contains it. In a wider cut (of a lower level) it stays one unless it
-        lies on a face of its own cut that the wider cut moves outwards.
+        lies, to 1e-9 of the width, on a face of its own cut that the wider cut moves outwards.
+        Nothing is evaluated.
 
         Args:
             cut: α-cut of the same inputs, with the index `level` of its α-level, and the ends

@@ -275,8 +275,9 @@ class SingleLinkage:
         Each cut is sampled, and descents start from the best samples, in rounds. The search of a
         bound ends when the expected fraction of the cut in basins that were not seen is below 0.002
         (Boender and Rinnooy Kan, 1987), or is given up where the best optimum lies at a kink or
-        jump, or 1,000 samples have equal values. If `outputs` is empty, each cut gets 100 samples
-        and no descents. Results are in `states`, and all samples in the campaign.
+        jump (unless kinks are expected, `has_kinks`), or 1,000 samples have equal values. If
+        `outputs` is empty, each cut gets 100 samples and no descents. Results are in `states`, and
+        all samples in the campaign.
 
         Args:
             first: Uniform samples of the widest cut in unit coordinates (0 at the lower, 1 at the
@@ -297,11 +298,11 @@ class SingleLinkage:
         """Sample and descend until no bound of an output is open in any cut.
 
         A bound is open in a cut until there are 100 samples and the expected fraction of the cut in
-        basins that were not seen is below 0.002, or the best optimum lies at a kink or jump, or
-        1,000 samples lie on plateaus. Each round visits the cuts with open bounds from the widest
-        on, adds samples, and descends. It may be called again after optima have been recorded by
-        other means; it returns at once if all bounds are closed. Progress is reported to the
-        campaign.
+        basins that were not seen is below 0.002, or the best optimum lies at a kink or jump (unless
+        kinks are expected, `has_kinks`), or 1,000 samples lie on plateaus. Each round visits the
+        cuts with open bounds from the widest on, adds samples, and descends. It may be called again
+        after optima have been recorded by other means; it returns at once if all bounds are closed.
+        Progress is reported to the campaign.
 
         Raises:
             SpentError: The budget ended the search; what was found so far is kept in `states`.
@@ -415,10 +416,11 @@ class SingleLinkage:
     def _open_bounds(self, cut: CutSearch) -> list[Bound]:
         """Return the bounds (output, and sign of minimum or maximum) whose search in a cut goes on.
 
-        Before they are asked, a descent starts, for each bound with an optimum, from the best
-        sample of the campaign in the cut, if it is better than the best optimum by more than the
-        tolerance of values; the optimum that it finds is recorded. A search goes on until its
-        stopping rule holds or it is given up at a kink, a jump or on plateaus.
+        First, for each bound with an optimum, a descent starts from the best sample of the campaign
+        in the cut, if it is better than the best optimum by more than the tolerance of values; the
+        optimum that it finds is recorded. A search goes on until its stopping rule holds (100
+        samples, and an expected fraction of unseen basins below 0.002), or it is given up at a
+        kink, a jump or on plateaus. Where kinks are expected (`has_kinks`), they do not end it.
 
         Raises:
             SpentError: The budget does not carry the evaluations.

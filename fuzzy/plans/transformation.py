@@ -178,8 +178,10 @@ class General:
             inputs with a width are stated, since corners bound it then; the others are attained.
 
         Raises:
-            RefusedError: The budget does not carry the points, or a sample contradicts a sign.
+            RefusedError: The budget does not carry the points, a sample contradicts a sign, or the
+                knowledge names an output that the model does not have.
             CampaignError: The model failed at some points.
+            FailedError: The store of samples cannot be written, or a worker process died.
         """
         grids = level_grids(domain, inner=self.takes_inner_points)
         count = sum(prod(map(len, grid)) for grid in grids)
@@ -241,9 +243,11 @@ class Signed:
 
         Raises:
             RefusedError: There is no output of a given name, the budget does not carry the corners,
-                or a sample contradicts a stated sign.
+                a sample contradicts a stated sign, or the knowledge names an output that the model
+                does not have.
             SpentError: The budget does not carry the probes, or the points of several outputs.
             CampaignError: The model failed at some points.
+            FailedError: The store of samples cannot be written, or a worker process died.
         """
         all_outputs = campaign.output_names(domain)
         for name in self.outputs:

@@ -116,6 +116,7 @@ class FuzzyNumber(ABC):
 
         Raises:
             RefusedError: This is a number of measured values, which do not decide the cut at α = 0.
+            MissingLibraryError: New axes are to be made, and Matplotlib is not installed.
         """
         if axes is None:
             axes = new_axes()

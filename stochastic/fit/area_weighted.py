@@ -55,8 +55,12 @@ class AreaWeighted:
             values: Reduced radii in any order and shape, n of them, at least one.
             weights: Area or volume of the cell of each value, n of them in the same order, with a
                 positive sum; equal by default.
-            groups: Label of the group of each value, such as the number of its packing; the
-                bootstrap draws whole groups. By default each value is a group.
+            groups: Label of the group of each value, such as the number of its packing, n in the
+                same order; the bootstrap draws whole groups. By default each value is a group.
+
+        Returns:
+            New arrays of shape (n,) in the order of rising values, with the labels replaced by the
+            numbers 0, 1, … of their order. Lengths and values are not checked.
         """
         values = np.asarray(values, float).ravel()
         if weights is None:

@@ -139,7 +139,8 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     """Return the index of the column `name` in the header, and the factor that makes it metres.
 
     For "r" the names radius, d, diameter and size are taken too, the last three with half the
-    factor. Upper and lower case do not matter. The first column that fits is taken.
+    factor. Upper and lower case do not matter in names, but in units. The first column whose name
+    and unit fit is taken.
 
     Args:
         header: Fields of the header, each a name and a unit in brackets.

@@ -50,9 +50,11 @@ def read_particles(
         section, radii in m. Particles of an image that its edge cuts are left out.
 
     Raises:
-        RefusedError: The file cannot be read; a circle has a wrong unit, leaves the section or
-            overlaps another one; the image hides its particles or more than 2 % of their area is
-            not round; or not exactly one of `size` and `pixel` is given, or it is out of range.
+        RefusedError: The file cannot be read; the unit of a column is unknown; a circle has its
+            centre outside the section or overlaps another one; the image hides its particles or
+            more than 2 % of their area is not round; or not exactly one of `size` and `pixel` is
+            given, or it is out of range.
+        MissingLibraryError: The file is an image, and scikit-image is not installed.
 
     Example:
         >>> from pathlib import Path
@@ -146,6 +148,7 @@ def circles_in(picture: Array, pixel: float, *, name: str) -> Particles:
         RefusedError: Noise or light hides the particles, there are none, or more than 2 % of their
             area is in pieces that are not round: with less area than a circle of 4 pixels radius,
             or filling less than 90 % of their convex hull.
+        MissingLibraryError: scikit-image is not installed.
     """
     with extra_named(name):
         from skimage import measure

@@ -88,7 +88,7 @@ class Packing:
             cube that they fill to `fraction`, in m.
 
         Raises:
-            RefusedError: There is no room with 100,000 particles.
+            RefusedError: There is no room with 100,000 particles, or with `number` if that is more.
         """
         radii: Array = np.empty(0)
         side = -np.inf
@@ -119,7 +119,8 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
     at a new random centre.
 
     Args:
-        radii: Radii in m, in any order, shape (n,), n at least 1.
+        radii: Radii in m, in any order, shape (n,), n at least 1, each up to half of a side: that a
+            particle overlaps its own images is not noticed.
         box: Sides of the box in m, shape (d,).
         generator: Source of the centres; its state moves on.
 
@@ -173,6 +174,8 @@ class _Obstacles:
             radii: Radii in m, shape (n,).
         """
         overlaps = np.zeros(len(proposal), bool)
+        # Obstacles of one class, with radii within a factor of two, have a periodic tree of their
+        # own.
         for tree, centres, placed_radii in self.size_classes:
             candidates = np.flatnonzero(~overlaps)
             reach = radii[candidates] + placed_radii.max()
@@ -249,7 +252,8 @@ def relax_random_centres(radii: Array, box: Array, generator: np.random.Generato
         generator: Source of the centres and of the moves; its state moves on.
 
     Returns:
-        Centres in m in the order of `radii`, shape (n, d), of particles without overlap.
+        Centres in m in the order of `radii`, shape (n, d), of particles without overlap. Some may
+        lie outside the box: they are to be taken back by its sides.
 
     Raises:
         FailedError: The particles still overlap after all steps.

@@ -119,7 +119,8 @@ def pack(
         Sequence of the packings; each depends on the seed and its index alone.
 
     Raises:
-        RefusedError: A number is out of range, or the fraction above what packs at random.
+        RefusedError: A number is out of range, the fraction is above what packs at random, there is
+            no such shape, or `radii` are neither two radii nor a distribution.
         FailedError: The particles still overlap after all steps.
 
     Example:

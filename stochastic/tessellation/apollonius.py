@@ -231,6 +231,8 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
         walls = neighbours.select((near > 0) & (far > 0))
         pairs = walls.joined(_bounding_pairs(discs, portion))
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
+        # Around its disc's centre, at the distance ρ and the angle φ, a wall is 1/ρ = a cos φ +
+        # b sin φ + c, with 2/near towards the neighbour. The nearest wall has the largest 1/ρ.
         direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]
         a, b = (1 / near + 1 / far) * direction.T
         counts = np.bincount(pairs.first, minlength=len(discs))
