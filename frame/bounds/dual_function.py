@@ -259,6 +259,10 @@ def mode_maximum(
     """Return the maximum of one mode's term of D(μ) over a range of its table, and the point of it.
 
     The term is Σ_s c e + |r e − μ_s| − μ_ω ω − μ_g g, which `maximand` computes at each point.
+    Between the points e is taken as bilinear in ω and q, as g = q ω is, and the error of this is
+    bounded elsewhere. So the term is convex along each axis, and its maximum over all ω and q that
+    the points enclose is that over the points.
+
     Points of a table are numbered row by row of q = g/ω, with the frequency ω running fastest. Of
     equal values the one of the lowest ω, then of the lowest q, is taken. Loops run over slices from
     0, without which they are not compiled to vector instructions.

@@ -1,11 +1,11 @@
 """Guaranteed bounds of the error of a modal model, and of what its quadratic models leave out.
 
-Polynomials φ_k, w_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a response that nearly obeys the
-equations of motion. What it misses there, the defects λ_k φ_k − w_k and λ_k M w_k + D w_k + K φ_k,
-are Taylor models of which hardly more than the remainder is left. Damping only takes energy, so the
-deviation from the true response, in the energy norm √(qᵀ K q + vᵀ M v), grows no faster than these
-defects push it: no eigenvalue problem is solved anew, and nothing rests on a distance between
-eigenvalues.
+Polynomials φ_k, ψ_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a response that nearly obeys the
+equations of motion, with the velocity 2 Re Σ ψ_k exp(λ_k t). What it misses there, the defects
+λ_k φ_k − ψ_k and λ_k M ψ_k + D ψ_k + K φ_k, are Taylor models of which hardly more than the
+remainder is left. Damping only takes energy, so the deviation from the true response, in the energy
+norm √(qᵀ K q + vᵀ M v), grows no faster than these defects push it: no eigenvalue problem is solved
+anew, and nothing rests on a distance between eigenvalues.
 
 Damping by one ratio ζ, 2 ζ (M # K), is no polynomial, but a Taylor model (`geometric_mean`), whose
 remainder is contained in the defect.
@@ -44,13 +44,13 @@ def proved_error(model: ModalModel) -> Array:
 
     The model is q(t) = 2 Re Σ_k φ_k w_k(t) over n modes and S sources, with φ_k and λ_k polynomials
     of the inputs, w_k = exp(λ_k t) or its integral over a load, and the velocity 2 Re Σ_k ψ_k w_k.
-    The true response obeys M q̈ + D q̇ + K q = f. Theorem: with the norm ‖e‖² = qᵀ K q + vᵀ M v of
-    a deviation e = (q, v), and the defects of mode k in q̇ = v, d_k = λ_k φ_k − ψ_k, and in the
-    balance of forces, e_k = λ_k M ψ_k + D ψ_k + K φ_k,
+    The true response obeys M q̈ + D q̇ + K q = f. Theorem: with the norm ‖η‖² = qᵀ K q + vᵀ M v of
+    a deviation η = (q, v), and the defects of mode k in q̇ = v, d_k = λ_k φ_k − ψ_k, and in the
+    balance of forces, p_k = λ_k M ψ_k + D ψ_k + K φ_k,
 
-        ‖e(t)‖ ≤ ‖e(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(d_k* K d_k + e_k* M⁻¹ e_k),
+        ‖η(t)‖ ≤ ‖η(0)‖ + 2 Σ_k ∫₀ᵗ |w_k(s)| ds √(d_k* K d_k + p_k* M⁻¹ p_k),
 
-    since damping only takes energy; for a load a, ‖e(0)‖ is the norm after a unit impulse times ∫
+    since damping only takes energy; for a load a, ‖η(0)‖ is the norm after a unit impulse times ∫
     |a|. An output takes at most its norm of this deviation, `EnergyNorms.outputs`; the errors of
     its coefficients add to it. The w_k of the model are exact: what their tables miss is in
     `remainder_bounds`.
@@ -153,8 +153,8 @@ class EnergyNorms:
 def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
     """Bound the energy norm of the defects of each mode and source, over |exp(λ t)|, shape (S, n).
 
-    The defects are d = λ φ − ψ in q̇ = v and e = λ M ψ + D ψ + K φ in the balance of forces, and
-    their norm is √(d* K d + e* M⁻¹ e).
+    The defects are d = λ φ − ψ in q̇ = v and p = λ M ψ + D ψ + K φ in the balance of forces, and
+    their norm is √(d* K d + p* M⁻¹ p).
 
     Args:
         structure: M, D and K as Taylor models of N unknowns over the box.

@@ -286,6 +286,9 @@ def enclosed_block(
         (K − L̃_jj M)_oo Z_j = −R_j + Σ_i D_ij (M X̃_i)_o + Σ_i (D_ij + F_ij) M_oo Z_i,
         N D = X̃ᵀR + RᵀZ + L̃ᵀW − W L̃ − W D,    N = X̃ᵀM X̃,  W = X̃ᵀM Z,  F = L̃ off its diagonal.
 
+    The first equation is K X = M X L in the rows o, the second X̃ᵀ times all rows. As X̃ is a
+    rotation in the rows b, and thus regular, both together give the rows b as well.
+
     1. The matrices on the left are bounded away from singular (`SolutionBounds`).
     2. Where bounds |Z| ≤ Y and |D| ≤ E give themselves back through these equations, Brouwer's
        theorem gives a subspace there, at every u of the box (as Rump 2001). Products of the

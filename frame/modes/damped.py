@@ -125,7 +125,7 @@ class DampedModes:
 
     eigenvalue: TaylorModel  # λ_k, Im λ_k > 0, (n,), in 1/s
     shape: TaylorModel  # φ_k for each source, (S, n, N)
-    velocity: TaylorModel  # w_k ≈ λ_k φ_k, (S, n, N)
+    velocity: TaylorModel  # ψ_k ≈ λ_k φ_k, (S, n, N)
 
     @classmethod
     def of_structure(cls, structure: DampedStructure, chosen: Ints) -> DampedModes:
@@ -160,7 +160,7 @@ class DampedModes:
         return cls(eigenvalue, shape, (eigenvalue[:, None] * shape).polynomial)
 
     def outputs(self, structure: DampedStructure) -> TaylorModel:
-        """Return the outputs of the states [φ_k, w_k], shape (S, n, m)."""
+        """Return the outputs of the states [φ_k, ψ_k], shape (S, n, m)."""
         n = len(structure.omega)
         on_displacements = structure.output_rows[:, :n]
         on_velocities = structure.output_rows[:, n:]

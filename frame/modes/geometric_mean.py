@@ -24,9 +24,11 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
 
     Where a bound |E| ≤ B gives itself back through this equation, Brouwer's theorem gives such an E
     at every u of the box (as Rump 2001). The map contracts (`right_side_bound`): E is the only one
-    there and continuous in u. The squares of the eigenvalues of M⁻¹ X are those of M⁻¹ K, which are
-    positive. The eigenvalues themselves are positive at the midpoint of the box, hence by
-    continuity everywhere, so that X is the positive definite solution.
+    there and continuous in u; as Eᵀ solves the equation, too, E is symmetric. The squares of the
+    eigenvalues of M⁻¹ X are those of M⁻¹ K, which are positive, so that no eigenvalue of X passes
+    zero. On the way from u to the midpoint, and from the rounded matrices there to M = 1 and K =
+    diag(ω²), whose terms lie within the same bounds and whose solution is E = 0, X thus stays as
+    definite as diag(ω) is: it is the positive definite solution.
 
     Args:
         mass: M, shape (n, n), at the midpoint of the box the identity but for rounding.
@@ -51,6 +53,8 @@ def geometric_mean(mass: TaylorModel, stiffness: TaylorModel, omega: Array) -> T
         right = right_side_bound(defect, coupling, inverse_mass=inverse_magnitude, bound=bound)
         found = right / sums
         found = np.maximum(found, found.T)
+        # Bounds that have grown to ω_i + ω_j, or are not finite, will not give themselves back; the
+        # rounds are ended early, and nothing rests on this.
         if not (found < sums).all():
             break
         if (1.001 * found <= bound).all():
