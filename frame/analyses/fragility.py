@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import require, require_choice
+from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
@@ -769,9 +769,11 @@ def incremental_analyses(
         alpha: Levels, rising within [0, 1].
 
     Raises:
-        RefusedError: Levels or inputs are not allowed, or a response does not exist.
+        RefusedError: `most` is not a positive number, levels or inputs are not allowed, or a
+            response does not exist.
         StepError: A response has too many events in a step, or its energy is not in balance.
     """
+    checked_number("most", most, positive=True)
     names = list(limits)
     pairs = [(limit.output, limit.number) for limit in limits.values()]
     events = [[names.index(name) for name in members] for members in events_of(limits).values()]

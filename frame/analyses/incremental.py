@@ -504,13 +504,14 @@ def incremental(
         collapse. They are attained; other structures may go farther.
 
     Raises:
-        RefusedError: The columns do not yield, a scale is not positive, a record is zero
-            throughout, or inputs or levels are not allowed.
+        RefusedError: The columns do not yield, there is no scale or one is not positive, there is
+            no record or one is zero throughout, or inputs or levels are not allowed.
         StepError: A response has too many events in a step, or its energy is not in balance.
     """
     value = "of another structure"
     allowed = "columns that yield"
     require(yields(model), "incremental", value=value, allowed=allowed)
+    require(len(scales) > 0, "scales", value=None, allowed="one positive number or more")
     tried = np.unique([checked_number("scale", scale, positive=True) for scale in scales])
     outputs = list(map(str, model.outputs))
     # With limits of 1 in SI units, demands are peaks.

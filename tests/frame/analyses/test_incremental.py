@@ -12,6 +12,7 @@ from alphacut.frame import (
     StoreyFrame,
     decide,
     envelope,
+    fragility,
     incremental,
     over_records,
 )
@@ -187,3 +188,14 @@ def test_the_worst_and_the_mean_over_records_are_those_of_each(rng):
     assert farthest.peak["drift1"].reached[0] == worst.reached[0]
     verdict = decide(answer, Limit("drift1", 0.9 * float(mean.reached[0]), mean=True))
     assert verdict.limits["mean drift1"].verdict in ("can be exceeded", "exceeded")
+
+
+@pytest.mark.parametrize("most", [0.0, -1.0, np.nan])
+def test_measures_and_scales_that_lead_nowhere_are_refused(most):
+    frame = StoreyFrame([1.0], stiffness=[200.0], yield_force=[1.0])
+    inputs = {"k1": Triangular(190.0, 200.0, 210.0)}
+    times = {"duration": 1.0, "step": 0.1}
+    with pytest.raises(RefusedError, match="most is"):
+        fragility(frame, inputs, [STEADY], Limit("q1", 1.0), **times, most=most)
+    with pytest.raises(RefusedError, match="scales is missing"):
+        incremental(frame, inputs, [STEADY], [], **times)
