@@ -79,6 +79,16 @@ def test_the_mean_by_student_and_within_bounds():
     assert known == pytest.approx(np.array([-1, 1]) * stats.norm.ppf(0.975) / 2)
 
 
+@pytest.mark.parametrize("unit", [2.0**-1000, 2.0**1000])
+def test_the_mean_of_normal_values_scales_with_their_unit(unit):
+    """Squares of such values are beyond floats: the cuts were points, or not finite."""
+    normal = from_data(SEVEN, "mean", law="normal")
+    scaled = from_data([unit * value for value in SEVEN], "mean", law="normal")
+    for alpha in (1e-9, 0.05, 0.5, 1.0):
+        cut = normal.cut(alpha)
+        assert scaled.cut(alpha) == (unit * cut.lower, unit * cut.upper)
+
+
 @pytest.mark.parametrize("values", [[True, 0.5], [(1.0, 2.0), 0.5], [np.True_, 1.0], [10**400]])
 def test_truth_values_pairs_and_numbers_beyond_floats_are_no_measurements(values):
     with pytest.raises(RefusedError, match="value 1"):
