@@ -83,7 +83,7 @@ class RadiusLimits:
 
         Raises:
             RefusedError: Limits are not stated, and more than 15 % of the area or volume is in
-                tighter cells.
+                tighter cells, of discs or of spheres.
         """
         if self.stated is not None:
             return sample

@@ -96,6 +96,7 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
         np.concatenate([section.cells * section.weight for section in sections]),
         np.concatenate(groups),
     )
+    # The reduced radius of a particle that fills its cell: √(4/π) of discs, (6/π)^(1/3) of spheres
     filled = sections[0].particles.shape.largest
     largest = sample.values[-1]
     cure = "mend the overlaps in the data"

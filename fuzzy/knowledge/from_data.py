@@ -208,8 +208,8 @@ def student_cuts(data: Observations) -> tuple[Stepwise, float]:
         allowed="two or more, unlike",
         cure="give bounds=(lower, upper) in place of a law, or measure more",
     )
-    # The squares of deviations below 1e-162 would be rounded to 0, and the cuts to a point. Powers of
-    # two scale without rounding, so that the digits of all other values stay.
+    # The squares of deviations below 1e-162 would be rounded to 0, and the cuts to a point. Powers
+    # of two scale without rounding, so that the digits of all other values stay.
     exponent = np.frexp(np.abs(values).max())[1]
     deviation = np.ldexp(np.ldexp(values, -exponent).std(ddof=1), exponent)
     half_width = _student_factors(len(values)) * deviation
