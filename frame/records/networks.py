@@ -365,7 +365,10 @@ def read_smc(file: TextFile, unit: str) -> Recording:
 
 
 def _smc_peaks(reals: Array) -> list[StatedPeak]:
-    """Return the peak in the reals of an SMC file with its time; none if it states none."""
+    """Return the peak in the 50 reals of an SMC file's head; an empty list if it states none.
+
+    The peak is in m/s², and its time in s, 0 if the head does not state it.
+    """
     # Places counted from 0: the largest and the smallest sample in cm/s², behind their times in s.
     # The format's number for none is 1.7e38.
     extremes = [(abs(float(reals[place])), float(reals[place - 1])) for place in (29, 31)]

@@ -41,7 +41,7 @@ def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
 
     Yields:
         The magnitude of each peak in m/s², in the order of the text; half a unit of its last digit
-        in m/s², by which it may be rounded; and its time.
+        in m/s², by which it may be rounded; and its time in s, 0 if none is stated.
     """
     name = r"(?:PGA|(?:peak|pk|max(?:imum)?)\b\.?(?:\s*(?:ground\s+)?acc\w*\.?)?(?:\s*value)?)"
     unit_before = r"(?:[(\[](?P<before>[^)\]]+)[)\]]\s*[=:]?|[=:])"

@@ -57,7 +57,8 @@ def require_timing(
     Args:
         file: The file, for the message.
         line: Index of the line by which the samples are read, counted from 0.
-        stated: What other lines state.
+        stated: Count, step in s and duration in s as other lines state them; 0 stands for what a
+            line does not state.
         count: Number of samples.
         step: Time between samples, in s.
     """
