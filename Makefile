@@ -55,7 +55,7 @@ charts:
 	$(IN) python -m benchmarks.frame.envelopes --wide 3
 	$(IN) python -m benchmarks.costs
 	$(IN) python cases/make_composite.py
-	$(IN) python cases/make_tomogram.py --picture
+	$(IN) xvfb-run -a python cases/make_tomogram.py --picture
 	$(IN) python -m benchmarks.pictures
 
 stability:

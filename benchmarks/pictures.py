@@ -25,10 +25,10 @@ COMMANDS = {
     "benchmarks/results/frame_envelopes.png": "python -m benchmarks.frame.envelopes",
     "benchmarks/results/voxels.png": "python -m benchmarks.rve.voxels --chart",
     "cases/composite.png": "python cases/make_composite.py",
-    "docs/pictures/tomogram.png": "python cases/make_tomogram.py --picture",
+    "docs/pictures/tomogram.png": "xvfb-run -a python cases/make_tomogram.py --picture",
     **dict.fromkeys(OF_RUNS, "python -m benchmarks.pictures"),
 }
-"""Command below `./enter` of each picture."""
+"""Command below `./enter` of each picture; VTK needs a display, which ``xvfb-run`` lends it."""
 
 
 def main() -> None:

@@ -30,7 +30,7 @@ def test_each_picture_that_a_page_shows_has_its_command_and_no_other_is_kept():
 @pytest.mark.parametrize("picture", COMMANDS)
 def test_make_charts_runs_the_command_of_each_picture(picture):
     assert f"{COMMANDS[picture]}\n" in CHARTS.replace("$(IN) ", "")
-    program = COMMANDS[picture].split()[1:]
+    program = COMMANDS[picture].partition("python ")[2].split()
     file = Path(*program[1].split(".")).with_suffix(".py") if program[0] == "-m" else program[0]
     assert (ROOT / file).is_file()
 
