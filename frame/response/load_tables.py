@@ -128,20 +128,20 @@ class LoadTable:
             growth: Upper bound of Re λ over the eigenvalues and of Re midpoint, in 1/s, with which
                 `waves` are formed.
         """
-        errors = np.zeros((3, len(self.time)))
-        at_start: Array = np.zeros(3)
-        start = 0
-        for end in [*self.ends, len(self.time) - 1]:
-            nodes = slice(start + 1, end + 1)
-            tau = self.time[nodes] - self.time[start]
-            # Rounding of exp(λ τ), whose exponent has two rounded factors, and of what it
-            # multiplies, relative to these products. They are at most `waves`.
-            relative = UNIT_ROUNDOFF * (24 + 4 * self.max_rate * tau)
-            carried = np.exp(growth * tau) * _shifted(at_start, tau)
-            errors[:, nodes] = (1 + relative) * carried + relative * waves[:3, nodes]
-            errors[:, nodes] += self.rounding_in_windows[:, nodes]
-            at_start = errors[:, end]
-            start = end
+        # A node belongs to the window that begins at the last one of `begins` before it.
+        begins = np.append(0, self.ends)
+        window = np.maximum(np.searchsorted(begins, np.arange(len(self.time))) - 1, 0)
+        tau = self.time - self.time[begins[window]]
+        # Rounding of exp(λ τ), whose exponent has two rounded factors, and of what it multiplies,
+        # relative to these products. They are at most `waves`.
+        relative = UNIT_ROUNDOFF * (24 + 4 * self.max_rate * tau)
+        own = relative * waves[:3] + self.rounding_in_windows
+        factor = (1 + relative) * np.exp(growth * tau)
+        at_begin: Array = np.zeros((3, len(begins)))
+        for k, end in enumerate(self.ends):
+            carried = _shifted(at_begin[:, k], tau[end])
+            at_begin[:, k + 1] = factor[end] * carried + own[:, end]
+        errors = factor * _shifted(at_begin[:, window], tau) + own
         # What the series of a window leave out is carried on likewise. The time since the end of
         # the window is less than t − s for each a(s) in it, so that all windows together leave out
         # at most Σ_q binomial(p, q) truncation[q] L^q ∫ (t − s)^(p − q) |a(s)| exp(g (t − s)) ds,
@@ -151,7 +151,8 @@ class LoadTable:
             for q in range(p + 1):
                 truncated = self.truncation[q] * length**q * waves[p - q]
                 errors[p] += comb(p, q) * truncated
-        return (1 + 1e-9) * errors  # with the rounding of these bounds themselves
+        # with the rounding of these bounds themselves
+        return np.asarray((1 + 1e-9) * errors)
 
     def response(self, rate: Array, node: Ints) -> Array:
         """Return R = ∫ exp(λ (t − s)) a(s) ds, dR/dλ, d²R/dλ² for N eigenvalues and nodes.
@@ -299,20 +300,15 @@ def _norm_of_powers(order: int, q: int) -> float:
 
 
 def _shifted(errors: Array, tau: Array) -> Array:
-    """Return Σ_q binomial(p, q) τ^(p − q) E_q for p = 0, 1, 2, shape (3, T).
+    """Return Σ_q binomial(p, q) τ^(p − q) E_q for p = 0, 1, 2, shape (3, …).
 
     Args:
-        errors: E, shape (3,).
-        tau: τ, shape (T,), in s.
+        errors: E, shape (3, …).
+        tau: τ, shape (…), in s.
     """
     value, slope, curvature = errors
-    return np.stack(
-        [
-            value + 0.0 * tau,
-            slope + tau * value,
-            curvature + 2 * tau * slope + tau**2 * value,
-        ]
-    )
+    bent = curvature + 2 * tau * slope + tau**2 * value
+    return np.stack([value, slope + tau * value, bent])
 
 
 @compiled
