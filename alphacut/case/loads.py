@@ -11,12 +11,12 @@ from pydantic import Field, ValidationInfo
 
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
-from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, case_file, text
+from alphacut.case.types import NotEmpty, OneOrMany, Section, Time, after, case_file, text
 from alphacut.frame import History
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.tables import read_force_history
-from alphacut.frame.records.text_file import ACCELERATION_UNITS
+from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
 from alphacut.frame.records.units import acceleration_factor
 from alphacut.frame.structures.model import PlacedForce
 from alphacut.fuzzy import FuzzyNumber
@@ -224,6 +224,12 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     return read_recordings(paths, channel=channel, step=info.data.get("step"), unit=unit or "")
 
 
+def _step_of_record(step: float) -> float:
+    """Return a step of records in s as it is, or refuse one that no record has."""
+    require_stated_step("", step)
+    return step
+
+
 def _parse_unit(value: object, _: ValidationInfo) -> str:
     """Return a unit of accelerations as it was given, or refuse it."""
     # The unit is converted with the file, so that messages can show it as it was given.
@@ -271,7 +277,7 @@ class RecordsSection(Section):
     five natural periods, and at most envelope.duration.
     """
 
-    step: Time | None = None
+    step: Annotated[Time, after(_step_of_record)] | None = None
     """time between the numbers of a file of one column"""
     unit: Annotated[str, text(_parse_unit)] | None = None
     """unit of files that have none: columns without a head, waveforms"""

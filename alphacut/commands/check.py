@@ -20,10 +20,15 @@ from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, add_quiet, write_answer
-from alphacut.commands.pipeline import cut_record_warnings, read_case, require_runnable
+from alphacut.commands.pipeline import load_end_warnings, read_case, require_runnable
 from alphacut.frame import Exact, History, LinearFlow
 from alphacut.frame.analyses.peaks import WIDENING
-from alphacut.frame.analyses.suites import NominalMode, ScaledRecord, nominal_mode
+from alphacut.frame.analyses.suites import (
+    NominalMode,
+    ScaledRecord,
+    nominal_mode,
+    short_record_warnings,
+)
 from alphacut.frame.boxes import AT_REST
 from alphacut.frame.envelope import Ends, Envelope, within_steps
 from alphacut.frame.structures.linear import LinearSystem, NominalModes, histories, nominal_modes
@@ -203,7 +208,12 @@ def motion_text(content: Content, structure: Structure) -> str:
         peak = record.extremes[0]  # the largest magnitude; the other entry is that of its slope
         sizes = f"peak {engineering(peak, 'm/s^2')}, {peak / STANDARD_GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, {sizes}\n"
-        text += "".join(f"{warning}\n" for warning in cut_record_warnings(content, structure))
+        length = record.step * (len(record.samples) - 1)
+        # The modes are needed only for a record that ends before the motion does.
+        if length < duration:
+            short = short_record_warnings("the record", length, nominal_mode(linear).period)
+            text += "".join(f"warning: {line}\n" for line in short)
+    text += "".join(f"warning: {line}\n" for line in load_end_warnings(content, structure))
     if content.records is not None:
         records = suite_records(content.records, section, structure)
         text += records_text(content.records, records, nominal_mode(linear))

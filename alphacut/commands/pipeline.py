@@ -13,6 +13,7 @@ from pathlib import Path
 from alphacut import frame
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.kept_files import locked
+from alphacut.base.number_text import percent_text
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content, load
 from alphacut.case.loads import RecordsSection
@@ -23,6 +24,7 @@ from alphacut.case.structure import Structure
 from alphacut.commands.options import require_petsc
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.peaks import Peak, Peaks
+from alphacut.frame.structures.linear import histories
 from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.rve.image.fields.grid import device_array
@@ -277,7 +279,7 @@ class Pipeline:
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
         """Compute the envelopes of all studies into `results`, and check their errors.
 
-        A warning is printed if the accelerogram goes on after all responses.
+        A warning is printed of each load that does not end as the responses do.
 
         Args:
             structure: The structure with its fuzzy parameters.
@@ -290,7 +292,7 @@ class Pipeline:
         """
         results = self.results
         content = self.content
-        for warning in cut_record_warnings(content, structure):
+        for warning in load_end_warnings(content, structure):
             say(f"warning: {warning}")
         results.tasks = envelope.tasks(section, content.study, content.limited_outputs)
         # The longest tasks begin, so that none of them is left to the end alone. Their time grows
@@ -504,20 +506,33 @@ def _require_motion_of(content: Content, section: EnvelopeSection, structure: St
         answers.require_tolerances(content.tolerances, Response(structure, own_task))
 
 
-def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Yield a warning if the accelerogram of a structure goes on after the end of all responses.
+def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
+    """Yield a warning of each load that does not end as the responses do.
 
-    Nothing is said without [envelope], of a structure without an accelerogram, and of one that is
-    not linear.
+    These are an accelerogram that goes on after the end of all responses, and a force whose file
+    ends within the longest one, where the force is not zero: it jumps to zero there. Nothing is
+    said without [envelope], and of a structure that is not linear.
 
     Args:
         content: The case, for the durations of [envelope] and its studies.
         structure: Its structure.
     """
     linear = structure.linear
-    if linear is None or linear.ground is None or content.envelope is None:
+    if linear is None or content.envelope is None:
         return
-    length = linear.ground.step * (len(linear.ground.samples) - 1)
     longest = max(task.duration for task in envelope.tasks(content.envelope, content.study))
-    if length > longest * (1 + 1e-9):
-        yield f"the record lasts {length:g} s, and the motion is computed for {longest:g} s"
+    for name, history in histories(linear).items():
+        end = history.start + history.step * (len(history.samples) - 1)
+        largest, _ = history.extremes
+        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned).
+        jumps = abs(history.samples[-1]) > 0.01 * largest and not history.is_held
+        if history is linear.ground:
+            if end > longest * (1 + 1e-9):
+                yield f"the record lasts {end:g} s, and the motion is computed for {longest:g} s"
+        elif jumps and end < longest * (1 - 1e-9):
+            fraction = percent_text(float(abs(history.samples[-1])) / largest)
+            yield (
+                f"{name} ends at {end:g} s with {fraction} of its largest value, and is 0 from"
+                f" then on, while the motion is computed for {longest:g} s: let its file last as"
+                " long, or end with 0"
+            )

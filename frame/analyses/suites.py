@@ -138,8 +138,8 @@ def scaled_records(
 
     Returns:
         The scaled records in the order of the suite, with the measures after scaling, but without
-        peaks. A warning is given for a mean of more than 1 % of the peak, and for a response that
-        ends before its record.
+        peaks. A warning is given for a record shorter than half the first period, for a mean of
+        more than 1 % of the peak, and for a response that ends before its record.
 
     Raises:
         RefusedError: `measure` is unknown, `duration` or `step` is not positive, there is no
@@ -190,12 +190,22 @@ def scaled_records(
             peak={},
         )
         ground = Accelerogram(record.step, factor * record.samples, name=name)
-        scaled.append(
-            ScaledRecord(
-                name, ground, facts, _warnings(name, record, facts, peak=ground.extremes[0])
-            )
-        )
+        warnings = short_record_warnings(f"record {name}", record_length, mode.period)
+        warnings += _warnings(name, record, facts, peak=ground.extremes[0])
+        scaled.append(ScaledRecord(name, ground, facts, tuple(warnings)))
     return tuple(scaled)
+
+
+def short_record_warnings(name: str, length: float, period: float) -> list[str]:
+    """Return a sentence if a record is shorter than half the first natural period, both in s.
+
+    Earthquakes last for many periods, so that the step of such a record is mostly wrong. The half
+    is tuned: it leaves out tests under single pulses.
+    """
+    if length >= 0.5 * period:
+        return []
+    what = f"{name} lasts {length:.4g} s, less than half the first natural period, {period:.4g} s"
+    return [f"{what}: is its step right?"]
 
 
 def _warnings(

@@ -16,7 +16,7 @@ from alphacut.base.errors import RefusedError, checked_number, path_of, require,
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.recording import Baseline, Recording
-from alphacut.frame.records.text_file import ACCELERATION_UNITS
+from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
 from alphacut.frame.records.units import acceleration_factor
 
 # Files of a suite: fragility analyses use 20 to 100 records, and more than 500 files are a mistake
@@ -182,13 +182,14 @@ def _require_arguments(channel: str, step: float | None, *, unit: str, baseline:
     """Check the arguments that all readers of records have.
 
     Raises:
-        RefusedError: `channel` is no text; `step` is neither None nor a finite number above 0;
+        RefusedError: `channel` is no text; `step` is neither None nor from 4e-5 s to below 0.5 s;
             `unit` is neither empty nor a unit of acceleration; or `baseline` is not "none", "mean"
             or "linear".
     """
     require(isinstance(channel, str), "channel", repr(channel), 'a name in quotes, as "2"')
     if step is not None:
         checked_number("step", step, positive=True)
+        require_stated_step("step", step)
     is_known = isinstance(unit, str) and (not unit or acceleration_factor(unit) is not None)
     require(is_known, "unit", repr(unit), allowed=f"a unit of {ACCELERATION_UNITS}")
     require_choice("baseline", baseline, get_args(Baseline))

@@ -204,7 +204,7 @@ class _Table:
         lines = rows or list(self.rows)
         for line in lines:
             if len(self.rows[line]) != self.width or not _are_numbers(self.rows[line]):
-                raise _wrong_row(self.file, line, self.width)
+                raise _wrong_row(self, line)
         return np.array([[float(cell) for cell in self.rows[line]] for line in lines])
 
     def series(self) -> Array:
@@ -222,7 +222,7 @@ class _Table:
         numbers = self.numbers(rows=full)
         last_cells = self.rows[last]
         if len(last_cells) > self.width or not _are_numbers(last_cells):
-            raise _wrong_row(self.file, last, self.width)
+            raise _wrong_row(self, last)
         if self.width > 1 and len(full) > 1:
             # Neighbours in time differ little. In one series these are neighbours in a row, and
             # numbers one below another are as many samples apart as there are columns.
@@ -280,19 +280,23 @@ def _are_numbers(cells: Sequence[str]) -> bool:
     return all(NUMBER.fullmatch(cell) and np.isfinite(float(cell)) for cell in cells)
 
 
-def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
-    """Return, without raising it, the error about a row of a table that is not `width` numbers.
+def _wrong_row(table: _Table, line: int) -> RefusedError:
+    """Return, without raising it, the error about a row of a table that is not all numbers.
 
     Args:
-        file: The file.
+        table: The table.
         line: Index of the line of the row, counted from 0.
-        width: The count of numbers that the row should have.
 
     Returns:
-        The error. Its hint is chosen by what stands in the row: clock times, dates, separators of
+        The error. If the time alone is no number, and the times around it tell it, its hint is that
+        time. Otherwise it is chosen by what stands in the row: clock times, dates, separators of
         thousands, missing values, empty cells, units, words, decimal commas or a number that is cut
         off; without any of these it has no hint.
     """
+    *_, last_row = table.rows
+    text_cure = "text stands among the numbers: write the number that belongs there"
+    if line == last_row:
+        text_cure = "text stands among the numbers: cut it off"
     # The order counts, since the first pattern that is found gives the hint: those of clock times
     # and dates stand before those of single characters that both contain.
     cures = {
@@ -303,14 +307,48 @@ def _wrong_row(file: TextFile, line: int, width: int) -> RefusedError:
         r"(?i)nan|null|n/?a\b|inf|-{2}|#": "values are missing: fill the gap, or cut the record"
         " there",
         r"^\s*[,;]|,\s*,|;\s*;|[,;]\s*$": "cells are empty: fill the gap, or cut the record there",
-        r"\d\s*[a-zA-Z%]+\s*(?:[,;]|$)": "write numbers alone: units stand in the head",
-        r"[A-Za-z]{2}": "text stands among the numbers: cut it off",
+        r"\d\s*[a-zA-Z%]+\s*(?:[,;\t]|$)": "write numbers alone: units stand in the head, as in"
+        " time [s]",
+        r"[A-Za-z]{2}": text_cure,
         r"\d,\d": "write decimal points if these are decimal commas",
         r"[-+.eE]$": "the row ends within a number: load the file anew, or delete this row",
     }
-    text = file.lines[line].strip()
-    allowed = f"rows of {width} numbers such as 1.25 or 1e-3"
-    return file.refusal(line, text, allowed, cure_of(text, cures))
+    text = table.file.lines[line].strip()
+    allowed = "rows of numbers such as 1.25 or 1e-3"
+    first_row = next(iter(table.rows.values()))
+    if _are_numbers(first_row):
+        allowed = f"rows of {table.width} numbers such as 1.25 or 1e-3"
+    cure = cure_of(text, cures)
+    if likely := _likely_time(table, line):
+        cure = f"the time alone is no number: {likely:.9g} fits (spreadsheets make dates of some)"
+    return table.file.refusal(line, text, allowed, cure)
+
+
+def _likely_time(table: _Table, line: int) -> float:
+    """Return the time that fits into a row whose time alone is no number, or 0 if none is likely.
+
+    Two rows before it and the one behind must be numbers whose first ones are evenly spaced, if
+    this row is left in between.
+
+    Args:
+        table: The table. Its times are in the unit of their column.
+        line: Index of the line of the row, counted from 0.
+    """
+    lines = list(table.rows)
+    place = lines.index(line)
+    cells = table.rows[line]
+    samples = cells[1 - table.width :]
+    near = [table.rows[row] for row in lines[max(place - 2, 0) : place + 2] if row != line]
+    are_rows = all(len(row) == table.width and _are_numbers(row) for row in near)
+    if len(near) < 3 or table.width < 2 or not are_rows or not _are_numbers(samples):
+        return 0.0
+    if _are_numbers(cells[:1]) and len(cells) == table.width:
+        return 0.0
+    before_last, before, behind = (float(row[0]) for row in near)
+    step = before - before_last
+    if step <= 0 or abs(behind - before - 2 * step) > 2 * MAX_UNEVENNESS * step:
+        return 0.0
+    return before + step
 
 
 def _have_decimal_commas(rows: Sequence[str]) -> bool:
@@ -321,12 +359,13 @@ def _have_decimal_commas(rows: Sequence[str]) -> bool:
     before it is not above that of the row before, since times or counts of samples rise.
 
     Args:
-        rows: The texts of all rows.
+        rows: The texts of all rows. Those with words or dates, which are mistakes, do not count.
 
     Returns:
         False if there are no rows, no commas, or a row that is no list of numbers with decimal
         commas.
     """
+    rows = [row for row in rows if not re.search(r"[A-Za-z]{2}|\d[-/.]\d+[-/.]\d", row)]
     number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
     further = rf'\s*[;\t]\s*{number}|\s+{number}|(?<="),(?="){number}'
     matches = [re.fullmatch(rf"\s*{number}(?P<more>{further})*[;\s]*", row) for row in rows]
@@ -474,7 +513,8 @@ def _require_cell_of_each_head(table: _Table) -> None:
     """Raise an error if rows seem to have decimal commas between commas.
 
     This is so if the head has two cells or more and begins with times, each row has a comma, and
-    the first row has more cells than the head, up to twice as many. A table without rows passes.
+    the first row has more cells than the head, up to twice as many, and no words, such as units. A
+    table without rows passes.
 
     Raises:
         RefusedError: The rows are such rows.
@@ -485,6 +525,8 @@ def _require_cell_of_each_head(table: _Table) -> None:
     if has_commas and 1 < heads < table.width <= 2 * heads and _Column.of(table.head).is_time:
         value = f"{table.width} numbers in a row below {heads} heads"
         first_row = next(iter(table.rows))
+        if re.search("[A-DF-Za-df-z]", table.file.lines[first_row]):  # E may be an exponent
+            raise _wrong_row(table, first_row)
         cure = "these seem to be decimal commas: write decimal points, or semicolons between the"
         cure += " columns"
         raise table.file.refusal(first_row, value, "a number in a row for each head", cure)
@@ -560,7 +602,8 @@ def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
     """Return what is to be mended in the head of times and accelerations; empty if it is complete.
 
     Complete means: times, if the head names them, in a known unit; accelerations in the second
-    place, not a spectrum; and a known unit of acceleration, from the head or the user.
+    place, not a spectrum; a known unit of acceleration, from the head or the user; and no other one
+    in a head whose names are not known.
 
     Args:
         table: The table, with one column at least.
@@ -577,6 +620,11 @@ def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
         return "this is a spectrum: take the record of the acceleration over time"
     if column.unit and acceleration_factor(column.unit) is None:
         return f"{column.unit} is no unit of accelerations: mend the head"
+    own_factor = acceleration_factor(column.unit)
+    is_named_otherwise = not first.is_time and bool(seconds_of(first.unit)) and own_factor
+    if is_named_otherwise and own_factor != acceleration_factor(unit):
+        # The units tell times and accelerations, as below names in another language.
+        return f"name the columns: time [{first.unit}], acceleration [{column.unit}]"
     if acceleration_factor(unit) is not None:
         return ""
     if re.match(r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\b", first.name):
@@ -674,9 +722,15 @@ def _even_steps(
     # The step is the mean, and times are compared with even ones. Differences of neighbours would
     # not do: those of times such as 1.7e9 s, from 1970 on, have lost the digits of the step.
     step = duration / n_steps
-    if step > 0 and np.abs(time - even).max() <= MAX_UNEVENNESS * step:
-        return _EvenSteps(step, first)
     last_digit = to_s * table.resolution()
+    unevenness = float(np.abs(time - even).max())
+    if step > 0 and unevenness <= MAX_UNEVENNESS * step:
+        # Beyond rounding to their last digit, and 1 % of a step (tuned), as programs leave by
+        # adding up steps, the times are those of a clock that jitters.
+        remark = ""
+        if unevenness > max(last_digit, 0.01 * step):
+            remark = f"its times are uneven by up to {unevenness:.2g} s, taken as even"
+        return _EvenSteps(step, first, remark)
     if not _are_rounded(time, even, last_digit):
         raise _uneven(file, lines, time)
     difference = abs((stated_step or 0.0) * n_steps - duration)

@@ -258,6 +258,15 @@ def require_step(location: str, step: float, cure: str = "mend the step in the h
     require(MIN_STEP <= step < MAX_STEP, location, f"a step of {step:g} s", allowed, cure)
 
 
+def require_stated_step(key: str, step: float) -> None:
+    """Refuse a step, in s, that the user states and no record of an earthquake has."""
+    cure = "state it in s"
+    if step >= MAX_STEP:
+        cure = f"of {step:g} samples in a second it is {1 / step:.9g} s, and {step:g} ms are"
+        cure += f" {step / 1000:g} s"
+    require_step(key, step, cure)
+
+
 def choose_channel(location: str, channel: str, names: Sequence[tuple[str, ...]]) -> int:
     """Return the index of the channel that has a name, or of the only one if none is asked for.
 

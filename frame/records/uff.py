@@ -18,6 +18,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.text_file import NUMBER, choose_channel, decoded, recording_in_si
+from alphacut.frame.records.units import seconds_of
 
 # Codes of the type of values: complex single and complex double.
 COMPLEX = (5, 6)
@@ -84,6 +85,10 @@ def read_uff_record(name: str, content: bytes, channel: str = "", unit: str = ""
     step = history.step
     if history.times is not None:
         step = _even_step(key, history.times)
+    # Line 8 of the head is of the abscissa, and has its name in columns 27 to 46 and its unit in 48
+    # to 67. The unit may be the last word of the name; times without a known one are in s.
+    words = re.findall(r"[^\W\d_]+", found[chosen].head[7][26:67])
+    step *= next(filter(None, map(seconds_of, reversed(words))), 1.0)
     # Line 9 of the head is of the ordinate and has its unit in columns 48 to 67.
     own_unit = found[chosen].head[8][47:67].strip()
     if own_unit.upper() in ("", "NONE"):

@@ -30,8 +30,8 @@ RECORD = np.sin(14 * TIME) + np.sin(9 * TIME)
 YIELD = 'yield_force = "100 kN"\nhardening = "5 %"'
 
 
-def said(folder, capfd, *, step="0.01 s", yields="", suite=False):
-    rows = "".join(f"{t:.2f},{a:.6f}\n" for t, a in zip(TIME, RECORD, strict=True))
+def said(folder, capfd, *, step="0.01 s", yields="", suite=False, digits=2):
+    rows = "".join(f"{t:.{digits}f},{a:.6f}\n" for t, a in zip(TIME, RECORD, strict=True))
     (folder / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + rows)
     ground = "" if suite else 'accelerogram = "record.csv"'
     text = CASE.replace("GROUND", ground).replace("YIELD", yields).replace('"0.01 s"', f'"{step}"')
@@ -81,6 +81,51 @@ def test_a_force_whose_times_are_in_milliseconds_is_doubted(tmp_path, capfd):
     (tmp_path / "case.toml").write_text(case, encoding="utf-8")
     assert main(["check", str(tmp_path / "case.toml")]) == 0
     assert "ends before the second sample, at 250 s: are its times" in capfd.readouterr().out
+
+
+def said_of_force(folder, capfd, samples, *, history="force.csv", duration="4 s"):
+    rows = "".join(f"{0.25 * k:.2f},{x}\n" for k, x in enumerate(samples))
+    (folder / "force.csv").write_text("time [s],force [kN]\n" + rows)
+    force = f'[[force]]\namplitude = {{2 = "1"}}\nhistory = "{history}"\n'
+    case = CASE.replace("GROUND", "").replace("YIELD", "") + force
+    (folder / "case.toml").write_text(case.replace('"4 s"', f'"{duration}"'), encoding="utf-8")
+    assert main(["check", str(folder / "case.toml")]) == 0
+    return capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("history", "end"), [("force.csv", 2), ("force.csv, static", 2), ("force.csv, from 1 s", 3)]
+)
+def test_a_force_that_ends_within_the_motion_without_being_zero_is_warned_of(
+    tmp_path, capfd, history, end
+):
+    text = said_of_force(tmp_path, capfd, [1, 2, 3, 4, 3, 2, 1, 2, 3], history=history)
+    words = (
+        f"warning: force1 ends at {end} s with 75.0% of its largest value, and is 0 from then on"
+    )
+    assert words in text
+
+
+@pytest.mark.parametrize(
+    ("samples", "duration"),
+    [([1, 2, 3, 2, 1, 0.5, 0.2, 0.1, 0], "4 s"), ([1, 2, 3, 4, 3, 2, 1, 2, 3], "2 s")],
+    ids=["it fades away", "it lasts as long"],
+)
+def test_a_force_that_does_not_jump_within_the_motion_is_not_warned_of(
+    tmp_path, capfd, samples, duration
+):
+    assert "force1 ends" not in said_of_force(tmp_path, capfd, samples, duration=duration)
+
+
+@pytest.mark.parametrize("suite", [False, True], ids=["record", "suite"])
+def test_a_record_that_is_shorter_than_half_the_first_period_is_warned_of(
+    tmp_path, capfd, monkeypatch, suite
+):
+    words = "less than half the first natural period, 0.3594 s: is its step right?"
+    assert words not in said(tmp_path, capfd, suite=suite)
+    monkeypatch.setattr(f"{__name__}.TIME", TIME / 25)  # steps of 0.4 ms
+    text = said(tmp_path, capfd, suite=suite, digits=4)
+    assert f"record{' record' if suite else ''} lasts 0.1596 s, {words}" in text
 
 
 def test_nothing_is_said_of_a_step_before_anything_moves(tmp_path, capfd):

@@ -107,7 +107,12 @@ def test_columns_without_a_head_have_step_and_unit_from_the_case(tmp_path):
     (record, _), _ = records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new)
     assert record.ground.step == 0.02
     assert record.ground.samples == pytest.approx(samples)
-    for old, bad in (("0.02 s", "0.02"), ("m/s^2", "mm"), ('unit = "m/s^2"\n', "")):
+    for old, bad in (
+        ("0.02 s", "0.02"),
+        ("0.02 s", "200 s"),
+        ("m/s^2", "mm"),
+        ('unit = "m/s^2"\n', ""),
+    ):
         with pytest.raises(BadInput, match=r"unit|step") as caught:
             records_of(tmp_path, '[records]\nfiles = ["one.csv", "two.csv"]', new.replace(old, bad))
         assert len(str(caught.value).splitlines()) == 1

@@ -54,6 +54,8 @@ def test_what_is_unusual_is_a_remark(tmp_path):
         (["a.txt", "a.txt"], {}, "files is a; allowed: each file once"),
         ("a.txt", {"step": 0.0}, "step is 0.0; allowed: finite numbers greater than 0"),
         ("a.txt", {"step": float("nan")}, "step is nan"),
+        ("a.txt", {"step": 200}, "of 200 samples in a second it is 0.005 s, and 200 ms are 0.2 s"),
+        ("a.txt", {"step": 1e-5}, "a step of 1e-05 s; .*state it in s"),
         ("a.txt", {"baseline": "median"}, "baseline is median; allowed: none, mean, linear"),
         ("a.txt", {"unit": "furlongs"}, "furlongs"),
         ("a.txt", {"unit": 9.81}, "unit is 9.81; allowed: a unit of g"),

@@ -159,14 +159,59 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
         ("0.01,", "cells are empty"),
         ("0.01,0.1,5", "decimal points"),
         (",0.1", "cells are empty"),
-        ("max,0.3", "text stands among the numbers"),
+        ("max,0.3", "text stands among the numbers: write the number"),
         ("0.01s,0.3", "units stand in the head"),
+        ("0.01 s,0.3", "units stand in the head"),
         ("0.01,-", "ends within a number: load the file anew"),
     ],
 )
 def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
     rows = ["0.00,0.5", row.replace("0.01,0.1,5", "0.01,0,15"), "0.02,0.3", "0.03,0.4"]
     assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+
+
+@pytest.mark.parametrize("mark", [",", ";"])
+@pytest.mark.parametrize("cell", ["01. Okt", "10-Jan", "2024-10-01", "nan", "1.1O"])
+def test_a_time_that_is_no_number_is_told_by_those_around_it(tmp_path, mark, cell):
+    rows = [f"{0.01 * k:.2f}{mark}{x:.5f}" for k, x in enumerate(VALUES)]
+    if mark == ";" and cell != "1.1O":
+        rows = [row.replace(".", ",") for row in rows]
+    rows[110] = cell + rows[110][4:]
+    message = refused(saved(tmp_path, rows, f"time [s]{mark}acceleration [g]"))
+    assert f"line 112 is {cell}" in message
+    assert "the time alone is no number: 1.1 fits" in message
+
+
+def test_text_behind_the_numbers_is_to_be_cut_off(tmp_path):
+    rows = ["0.00,0.5", "0.01,0.4", "0.02,0.3", "max,0.5"]
+    message = refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+    assert "text stands among the numbers: cut it off" in message
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_units_in_each_cell_are_no_decimal_commas(tmp_path, mark):
+    rows = [f"{0.01 * k:.2f} s{mark}{x:.5f}" for k, x in enumerate(VALUES)]
+    message = refused(saved(tmp_path, rows, f"time [s]{mark}acceleration [g]"))
+    assert "line 2 is 0.00 s" in message
+    assert "write numbers alone: units stand in the head" in message
+
+
+def test_times_of_a_clock_that_jitters_are_remarked(tmp_path, rng):
+    for jitter, words in ((2e-4, "its times are uneven by up to 0.000"), (4e-6, "")):
+        times = 0.01 * np.arange(N_SAMPLES) + rng.uniform(-jitter, jitter, N_SAMPLES)
+        times[0] = 0
+        rows = [f"{t:.7f},{x:.5f}" for t, x in zip(times, VALUES, strict=True)]
+        record = read_recording(saved(tmp_path, rows, "time [s],acceleration [g]"))
+        assert "".join(record.remarks).startswith(words)
+        assert bool(record.remarks) == bool(words)
+
+
+@pytest.mark.parametrize("unit", ["", "g"])
+def test_names_in_another_language_are_told_what_to_be(tmp_path, unit):
+    rows = [f"{0.01 * k:.2f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES)]
+    path = saved(tmp_path, rows, "Zeit [s];Beschleunigung [m/s²]")
+    assert "name the columns: time [s], acceleration [m/s²]" in refused(path, "", None, unit)
+    assert read_recording(path, unit="m/s^2").samples == pytest.approx(VALUES)
 
 
 @pytest.mark.parametrize(

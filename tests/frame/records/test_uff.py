@@ -68,6 +68,20 @@ def test_what_is_no_acceleration_over_time_is_refused(tmp_path, changes, message
         read_recording(saved(tmp_path, uff58(WAVE, **changes)))
 
 
+@pytest.mark.parametrize("unit", ["ms", "msec", "[ms]"])
+@pytest.mark.parametrize("has_times", [False, True])
+def test_abscissas_in_milliseconds_are_read_as_such(tmp_path, unit, has_times):
+    times = 5.0 * np.arange(400) if has_times else None
+    content = uff58(WAVE, step=5.0, times=times)
+    axis = f"{'Time':<20} {'s':<20}".encode()
+    for words in (f"{'Time':<20} {unit:<20}", f"{'Time ' + unit:<20} {'NONE':<20}"):
+        record = read_recording(saved(tmp_path, content.replace(axis, words.encode())))
+        assert record.step == pytest.approx(0.005, rel=1e-6)
+    without = content.replace(axis, f"{'Time':<20} {'NONE':<20}".encode())
+    with pytest.raises(RefusedError, match="a step of 5 s"):
+        read_recording(saved(tmp_path, without))
+
+
 def test_data_sets_of_one_response_are_told_apart(tmp_path):
     runs = [uff58(k * WAVE).replace(b"made up", b"run %d  " % k) for k in (1, 2)]
     path = saved(tmp_path, b"".join(runs))
