@@ -257,9 +257,9 @@ def boxes_of(results: Results) -> list[tuple[str, list[str], str]]:
         lines = [f"{k} = [{', '.join(f'{x:.4g}' for x in ends)}]" for k, ends in values.items()]
         found.append(("radius of the particle", lines, "r(θ)"))
     if modulus is not None:
-        low, high = modulus.numbers.E_GPa[0]
+        lower, upper = modulus.numbers.E_GPa
         lines = [f"method {modulus.numbers.method}", f"{modulus.numbers.samples} samples"]
-        lines += [f"E = {low:.5g} … {high:.5g} GPa"]
+        lines += [f"E = {lower[0]:.5g} … {upper[0]:.5g} GPa"]
         found.append(("cell on the product domain", lines, "fuzzy E"))
     if results.structure is not None:
         fuzzy = ", ".join(dict.fromkeys(name for task in results.tasks for name in task.fuzzy))

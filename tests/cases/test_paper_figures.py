@@ -2,6 +2,7 @@
 
 import importlib.util
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from alphacut.entry import main
 from alphacut.figures.style import figure_style
 from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.result import Ends
 from alphacut.io.results import ResultsFolder
 from alphacut.rve import Cell, Phase
 from alphacut.stochastic import HermiteMap
@@ -44,6 +46,15 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case(paper):
     assert plane.get_title(loc="left") == "physical domain, θ = -1"
     bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
     assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))
+
+
+def test_the_box_of_the_cell_has_the_ends_of_the_widest_cut(paper):
+    cuts = Ends([22.0, 23.0, 24.0], [28.0, 26.0, 25.0])
+    numbers = SimpleNamespace(E_GPa=cuts, method="series", samples=5)
+    content, modulus = SimpleNamespace(radius=None), SimpleNamespace(numbers=numbers)
+    results = SimpleNamespace(content=content, modulus=modulus, structure=None)
+    ((_, lines, _),) = paper.boxes_of(results)
+    assert lines[-1] == "E = 22 … 28 GPa"
 
 
 def test_figures_of_the_paper_stand_beside_those_of_the_run_and_are_drawn_once(
