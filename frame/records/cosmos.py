@@ -379,10 +379,14 @@ def _read_unannounced(file: TextFile, channel: _Channel, unit: str) -> Recording
             unit = match[1]
             break
     if re.search("[A-Za-z]", file.lines[line]):
-        samples = file.fixed_columns(line + 1, count=count, per_line=8, width=9, head=line)
+        samples = file.fixed_columns(
+            line + 1, count=count, per_line=8, width=9, head=line, numbers_may_follow=True
+        )
         step = duration / (count - 1)
     else:
-        pairs = file.fixed_columns(line, count=2 * count, per_line=10, width=7, head=line - 1)
+        pairs = file.fixed_columns(
+            line, count=2 * count, per_line=10, width=7, head=line - 1, numbers_may_follow=True
+        )
         samples = pairs[1::2]
         steps = np.diff(pairs[::2])
         step = float(steps.mean())

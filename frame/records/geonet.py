@@ -126,6 +126,7 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
         per_line=component.per_line,
         width=component.width,
         head=component.start + component.text_lines,
+        numbers_may_follow=True,  # velocities
     )
     # The places are counted from 0, the numbers of the format's description from 1.
     step = float(reals[25])

@@ -159,7 +159,14 @@ class TextFile:
         return self.numbers(first, first + n_lines, width=width)
 
     def fixed_columns(
-        self, first: int, *, count: int, per_line: int, width: int, head: int
+        self,
+        first: int,
+        *,
+        count: int,
+        per_line: int,
+        width: int,
+        head: int,
+        numbers_may_follow: bool = False,
     ) -> Array:
         """Return samples that stand in fixed columns, shape (count,).
 
@@ -169,10 +176,12 @@ class TextFile:
             per_line: Samples in a line; 0 counts as 1.
             width: Characters of a sample, above 0.
             head: Index of the line that states the count, for the message.
+            numbers_may_follow: Whether lines of other numbers, as velocities, may follow at once.
 
         Raises:
-            RefusedError: A sample is no finite number, or the lines that `count` samples fill, up
-                to one with text, have more or fewer of them.
+            RefusedError: A sample is no finite number, or there are more or fewer than `count` up
+                to a line with text, or to the last line that `count` samples fill where other
+                numbers may follow.
         """
         last = first + ceil(count / max(per_line, 1))
         # A damaged number has few letters, as in "nan" or "1.5E-O1". Four of them are text, such as
@@ -181,6 +190,12 @@ class TextFile:
             if re.search("[A-Za-z]{4}", line):
                 last = row
                 break
+        # Further lines of numbers are samples that the head does not count.
+        for row in range(last, len(self.lines)):
+            words = [word for word in _words(self.lines[row], width) if word]
+            if numbers_may_follow or not words or not all(map(NUMBER.fullmatch, words)):
+                break
+            last = row + 1
         samples = self.numbers(first, last, width=width)
         self.require_count(samples, count, head)
         return samples

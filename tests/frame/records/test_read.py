@@ -312,6 +312,15 @@ def test_cosmos_with_numbers_that_touch(tmp_path):
         ),
         (written.smc().replace("|\n", ""), "2 lines of comments, and 1 with | follow"),
         (written.smc().replace("| a", "| b\n| a"), "2 lines of comments, and 3 with | follow"),
+        (written.smc(count=392), "392 samples, and 400 follow"),
+        (
+            written.cosmos(names=("1: 90 deg",)).replace("400 acc", "390 acc"),
+            "390 samples, and 400 follow",
+        ),
+        (
+            written.csmip(names=("1: 90",)).replace("400 points of acc", "320 points of acc"),
+            "320 samples, and 400 follow",
+        ),
         (written.smc("5 RESPONSE SPECTRA"), "line 1 is 5 RESPONSE SPECTRA; .*the acceleration"),
     ],
     ids=lambda text: text[:12] if "\n" not in text else "file",
