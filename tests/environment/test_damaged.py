@@ -56,12 +56,12 @@ def test_each_end_of_a_process_is_told(tmp_path, rng, read, failure):
 
 def test_a_process_that_takes_much_memory_is_told(tmp_path, rng, monkeypatch):
     """What it takes itself, beside the memory that its parent holds."""
-    monkeypatch.setattr(damaged, "MOST_MEGABYTES", 50.0)
+    monkeypatch.setattr(damaged, "MOST_MEGABYTES", 150.0)
     write = damaged.bytes_to("file.txt", lambda: b"1 2 3")
-    held = b"x" * 200_000_000
-    for size, n_failures in ((1_000, 0), (100_000_000, 2)):
+    held = b"x" * 300_000_000
+    for size, n_failures in ((1_000, 0), (500_000_000, 2)):
         form = Format("made up", write, lambda _, size=size: b"y" * size)
         outcome = outcome_of(form, 2, rng, Path(tmp_path, str(size)))
         assert len(outcome.failures) == n_failures, outcome.failures
         assert all(" MB" in words for words in outcome.failures)
-    assert len(held) == 200_000_000
+    assert len(held) == 300_000_000
