@@ -343,7 +343,8 @@ class SingleLinkage:
         An output whose search is complete is evaluated along each input, to both sides of the best
         optimum of its minimum and its maximum, in each cut. Where it improves again, away from the
         optimum, a descent should find a smooth optimum of its own; if it does not, the result is
-        True. Optima that are found are recorded, so that the search may have to go on. For an
+        True. Before, stalls of descents at kinks are left (`_leave_stalls`). Optima that are found
+        are recorded, so that the search may have to go on. For an
         output whose search is not complete, nothing is evaluated and the result is False.
 
         Args:
@@ -353,6 +354,9 @@ class SingleLinkage:
             SpentError: The budget does not carry the evaluations.
             CampaignError: The model failed at some points.
         """
+        for cut, bound in product(self.cuts, self.bounds):
+            if bound.output == output and self.is_estimate(output):
+                self._leave_stalls(cut, bound)
         # The search itself has started no descent there, as the best optimum is nearby. And waves
         # exceed the optimum only nearby: farther away the trend has changed the output by more than
         # they do.
@@ -365,6 +369,38 @@ class SingleLinkage:
                 if self._has_wave_beside(cut, bound, best, column=column, side=side):
                     return True
         return False
+
+    def _leave_stalls(self, cut: CutSearch, bound: Bound) -> None:
+        """Go on from optima at kinks and jumps, by one input after another.
+
+        Along a kink of one input a descent stalls although another input still lowers the value,
+        perhaps to below the best optimum, which is smooth. Where a value improves along an input,
+        a descent starts, and its end is recorded: a bound that lies at a kink is attained only.
+
+        Args:
+            cut: The α-cut.
+            bound: Name of the output, and the sign (1 for its minimum, −1 for its maximum).
+
+        Raises:
+            SpentError: The budget does not carry the evaluations.
+            CampaignError: The model failed at some points.
+        """
+        places = np.linspace(0.0, 1.0, 9)
+        for optimum in tuple(self.states[cut.level, bound].optima):
+            if optimum.is_smooth:
+                continue
+            start = cut.unit(optimum.point[None])[0]
+            value = optimum.value
+            for column in range(len(start)):
+                line = np.repeat(start[None], len(places), axis=0)
+                line[:, column] = places
+                values = cut.values(line, bound)
+                best = int(values.argmin())
+                if values[best] < value:
+                    start = line[best]
+                    value = float(values[best])
+            if value < optimum.value - self._tolerance(bound):
+                self._record(cut.descend(start, bound, SEARCH.careful_first_step))
 
     def _has_wave_beside(
         self, cut: CutSearch, bound: Bound, best: Array, *, column: int, side: float

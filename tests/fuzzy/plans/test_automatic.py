@@ -56,6 +56,23 @@ def test_a_valley_of_roots_beside_a_slope_is_not_bounded_by_corners():
     assert bounds.nature is Nature.ATTAINED or bounds.lower[1, 0] - bounds.error[1, 0] <= -14736.9
 
 
+def test_a_descent_that_stalls_in_a_cusp_is_followed_by_the_other_input():
+    """It ends above the value of the smooth optimum at a corner; with y at its upper end, below."""
+
+    def function(x, y):
+        cusp = 0.6309654877974369 * np.sqrt(np.abs(x - 0.6581892431485322))
+        return cusp + 0.48149344111319314 * x - 0.6150719473307159 * y
+
+    inputs = {
+        "x": Interval(-0.9426466164541686, 0.8277394226793051),
+        "y": Interval(-0.7607540627298616, 0.8671835842965365),
+    }
+    bounds = propagate(function, inputs, alpha=[0], vectorised=True)
+    right = function(0.6581892431485322, 0.8671835842965365)
+    assert bounds.nature is Nature.ATTAINED or bounds.lower[0, 0] - bounds.error[0, 0] <= right
+    assert bounds.lower[0, 0] < function(-0.9426466164541686, 0.8671835842965365)
+
+
 WAVES = {
     "square": lambda t: np.sign(np.cos(t)),
     "sine": np.sin,
