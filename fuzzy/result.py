@@ -179,6 +179,7 @@ class Bounds:
         between_levels = 2 * rounding + error[1:] + error[:-1]
         attained = self.attained
         proved = self.proved
+        # `_require_none` raises if an entry of its array is positive.
         crossing = self.lower - self.upper - rounding - estimate_error
         _require_none("lower bounds lie above upper ones", crossing, self.outputs)
         lower_falls = -np.diff(self.lower, axis=0) - between_levels
@@ -202,16 +203,13 @@ class Bounds:
 
         The bounds of an output are attained, estimated or guaranteed. Attained and estimated ends
         are reached to within their `error`, so that they are moved inwards by it here. For
-        guaranteed outputs the ends `inner` are reached, if they are known. Where the box of the
-        inputs only encloses the set that is meant (`encloses`) and `inner` is not known, it is not
-        known whether any end is reached in the set.
+        guaranteed outputs the ends `inner` are reached, if they are known. All ends are unknown if
+        the box of the inputs is larger than the set that is meant (`encloses`) and `inner` is None.
         """
         unknown = np.full(self.lower.shape, np.nan)
         inner = self.inner or Ends(unknown, unknown)
         if self.encloses and self.inner is None:
             return inner
-        # A value that a scheme computes is reached to its error, and so is the end of an estimate:
-        # both are moved inwards by it.
         lower = np.where(self._guaranteed, inner.lower, self.lower + self.error)
         upper = np.where(self._guaranteed, inner.upper, self.upper - self.error)
         return Ends(lower, upper)
@@ -299,10 +297,10 @@ class Bounds:
         """Return the bounds as lines of text.
 
         The first line says what the bounds promise (attained, estimated or guaranteed), on what
-        basis, by which method and at which cost. A line for each level of an output follows, over
-        time with the extremes over all times, for as many outputs as 25 lines hold, but one at
-        least. The last lines are the notes of the method, and the claim of probability that the
-        inputs' measured values allow.
+        basis, by which method and at which cost. A line for each level of an output follows, with
+        the extremes over all times if there are times. Outputs are shown as far as they fit into 25
+        lines, but one at least. The last lines are the notes of the method, and the claim of
+        probability that the inputs' measured values allow.
         """
         max_lines = 25  # of levels of outputs; the text shall fit on a screen
         n_shown = max(1, max_lines // len(self.alpha))
@@ -340,12 +338,15 @@ class Bounds:
     def _lines(self, output: str) -> Iterator[str]:
         """Yield a line of text for each level of an output, with its extremes over time.
 
-        A line has the name with its unit, the level, both ends, and what the ends are worth: for
-        attained bounds that the true range may be wider, and their error if it is above 0; for
-        estimated ones their error; for guaranteed ones the gap to the ends that inputs are known to
-        reach, which is left out where it is not known whether these inputs belong to the set that
-        is meant (`encloses`). Ends are rounded to six digits, attained ones inwards and others
-        outwards. The nature is added where it is not that of all outputs.
+        A line has the name with its unit, the level, both ends, and what the ends are worth:
+
+        - attained: that the true range may be wider, and the error if it is above 0;
+        - estimated: the error;
+        - guaranteed: the gap to the ends that inputs are known to reach. It is left out if the box
+          of the inputs encloses a smaller set (`encloses`), which may not contain these inputs.
+
+        Ends are rounded to six digits, attained ones to the inside of the range, others to the
+        outside. The nature is added if it differs from the nature of all outputs together.
 
         Args:
             output: Name of one of the outputs.

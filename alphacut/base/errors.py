@@ -24,8 +24,8 @@ def printable(value: object, most: int = MAX_LENGTH) -> str:
     several blanks become one. An integer of thousands of digits is described in words.
     """
     try:
-        # What follows goes through the characters one by one, which would take long of a large
-        # text. Four times the length are enough unless most of them are blanks.
+        # What follows goes through the characters one by one, which takes long for a large text.
+        # Four times the length is enough unless most of the characters are blanks.
         text = str(value)[: 4 * most]
     except ValueError:
         # Python refuses to write integers of more than some thousands of digits.
@@ -111,7 +111,7 @@ class RefusedError(ValueError):
             """Return "PLACE: KEY is VALUE; allowed: ALLOWED", with key and place of this error.
 
             "KEY is missing" stands there if the value of this error is None, and "KEY is empty" if
-            its text is. An empty place, and empty allowed values, are left out.
+            `value_text` is empty. An empty place, and empty allowed values, are left out.
             """
             text = f"{key} is {value_text or 'empty'}"
             if value is None:
@@ -230,8 +230,8 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
         Array of the shape of the points.
 
     Raises:
-        RefusedError: It is not a function, it raises an error, or it returns another shape or what
-            are no numbers. Its values need not be finite.
+        RefusedError: It is not a function, it raises an error, or it returns another shape or
+            something else than numbers. Numbers need not be finite.
     """
     if not callable(function):
         raise RefusedError(key, repr(function), allowed)
@@ -253,16 +253,16 @@ def array_of_call(key: str, function: object, *points: Array, allowed: str) -> A
 def require_numbers(name: str, values: object) -> None:
     """Raise RefusedError unless `values` is a list, tuple or array of finite real numbers.
 
-    It may be empty, and an array of any shape; a list in a list is refused, and so are texts, truth
-    values and complex numbers. `name` stands in the message.
+    A list may be empty, and an array may have any shape. A list in a list is refused, and so are
+    texts, truth values and complex numbers. `name` stands in the message.
     """
-    # Sets have no order, and of a dictionary the keys would be taken, of bytes the codes.
+    # Sets have no order. A loop over a dictionary would take its keys, one over bytes their codes.
     no_lists = (str, bytes, Mapping, Set)
     is_list = isinstance(values, Collection) and not isinstance(values, no_lists)
     require(is_list, name, value=repr(values), allowed="a list of numbers")
     if isinstance(values, np.ndarray):
-        # An array is checked without a loop over its entries, of which matrices have many. The loop
-        # follows only where it finds the entry that is wrong.
+        # An array is checked without a loop, which would be slow for large matrices. If it is
+        # wrong, the loop below finds the entry for the message.
         if values.dtype.kind in "iuf" and np.isfinite(values).all():
             return
         values = np.ravel(values).tolist()

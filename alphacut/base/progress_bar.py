@@ -12,7 +12,7 @@ Progress = Callable[[float], None]
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Return a function that takes the completed fraction of a part, and reports that of the whole.
+    """Return a function that takes the completed fraction of a part, and reports it for the whole.
 
     Args:
         progress: Function that takes the completed fraction of the whole computation, 0 to 1; with

@@ -55,7 +55,7 @@ def versions() -> dict[str, str]:
     for library in (*of_cell, "numpy", "scipy", "xarray"):
         if found := version_of(library):
             names[library] = found
-    # This distribution holds DOLFINx and petsc4py without their own metadata.
+    # The distribution dolfinx-solver-real holds DOLFINx and petsc4py without their own metadata.
     if wheel := version_of("dolfinx-solver-real"):
         import petsc4py
 
@@ -82,7 +82,8 @@ def source_digest(packages: tuple[str, ...]) -> str:
         folder = root if package == "alphacut" else (root / package).resolve()
         files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
         for name in sorted(files):
-            # In an installation the four packages are folders of alphacut and no links.
+            # In an installation the four packages, whose names are in NESTED, are folders of
+            # alphacut and no links.
             if package != "alphacut" or name.partition("/")[0] not in NESTED:
                 digest.update(name.encode() + files[name].read_bytes())
     return digest.hexdigest()

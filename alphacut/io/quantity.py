@@ -189,9 +189,10 @@ def _wrong_unit(unit: str, si: str) -> str:
 
 
 def _is_unit_of(spelling: str, si: str) -> bool:
-    """Return whether a unit of the dimension of the SI unit `si` is spelt so, here or by Pint.
+    """Return whether a spelling is a unit of the dimension of the SI unit `si`.
 
-    An empty spelling is no unit, also of a pure number.
+    It is one if it stands in the table `QUANTITIES`, or if Pint knows it. An empty spelling is no
+    unit, also of a pure number.
     """
     dimension = QUANTITIES[si]
     if spelling in dimension.factors or spelling in dimension.powers:
@@ -378,7 +379,7 @@ def parse_number(value: object, si: str) -> float:
 
 
 def parse_fuzzy(value: object, si: str) -> FuzzyNumber:
-    """Return a quantity in the SI unit `si` as a fuzzy number, whose kind the count of values says.
+    """Return a quantity as a fuzzy number in the SI unit `si`.
 
     One value is crisp, two are an interval, three a triangular number (lower end, value of
     membership 1, upper end), four a trapezoidal one. Values may be equal. A spread such as

@@ -15,8 +15,8 @@ def number_cure(text: str) -> str:
 
     Whether the text is understood is not looked at: the caller shows the cure only if it is not.
     """
-    # The first pattern that is found holds: thousands come before the decimal comma, of which
-    # "25,000" would be one, and the comma between values before the comma in a number.
+    # The first pattern that is found holds. So that of thousands stands before that of a decimal
+    # comma, since "25,000" has both; likewise the one of several values before a decimal comma.
     cures = {
         r"^[-+]?\d{1,3}(?:[,'’_\s]\d{3})+(?!\d)": "write thousands without a separator, as 25000",
         r"^[-+\d.]+\s*,\s+[-+\d.]": (
@@ -40,10 +40,10 @@ def number_cure(text: str) -> str:
 
 
 def form_cure(text: str) -> str:
-    """Return what to write in place of several values or a spread whose units stand elsewhere.
+    """Return how to write several values or a spread that has a wrong form; empty if none is found.
 
-    It is found by the pattern of the whole text, such as "[5, 6 m]" or "5 ± 10 %", and empty if
-    there is none. "[5 m, 6 m]" is right and has none.
+    A wrong form has its unit or its brackets in a wrong place, such as "[5, 6 m]" or "5 ± 10 %".
+    "[5 m, 6 m]" is right.
     """
     cures = {
         r"^\[[^\]]*(?:±|\+/-)": 'write a spread without brackets, as "5 m ± 1 m" or "5 m ± 10 %"',
@@ -119,10 +119,10 @@ def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterabl
 def _spellings(unit: str) -> Iterator[str]:
     """Yield other spellings of a unit, the most likely one first.
 
-    They are the unit without brackets; with the usual symbol in place of each word, whatever its
-    capitals, as "kN/m" of "KN/M"; with blanks between the symbols, as "kN m" of "kN-m"; as one
-    word, as "kN" of "kilo newtons"; with forces in place of masses, as "kgf" of "kg"; and without
-    powers. A spelling may be the unit itself, no unit at all, or come twice.
+    In this order they are: the unit without brackets; the usual symbol for each word, as "kN/m" of
+    "KN/M"; blanks between the symbols, as "kN m" of "kN-m"; all as one word, as "kN" of
+    "kilo newtons"; forces in place of masses, as "kgf" of "kg"; and no powers. A spelling may be
+    the unit itself, no unit at all, or come twice.
     """
     bare = re.sub(r"[\[\](){}]", "", unit).strip(" .")
     yield bare

@@ -33,11 +33,11 @@ RUN_AGAIN = f"make it anew by {command_to_paste('run', 'CASE.toml')}"
 
 
 def plain_name(name: str) -> str:
-    """Return a name if it is that of a file in a folder of results, or in its folder of figures.
+    """Return a name if it is a plain one, which cannot lead out of a folder of results.
 
-    It has letters, digits and ".", "_", "+" and "-", such as "envelope.nc" or "figures/peaks.svg",
-    up to 101 of them after "figures/", begins with no dot there and has no ".." inside. So no name
-    in a list that was tampered with leads out of the folder.
+    A plain name has 1 to 101 letters, digits and ".", "_", "+" and "-", no dot at its beginning and
+    no ".." inside, such as "envelope.nc". It may have "figures/" in front. The list of a folder may
+    have been tampered with, so its names are checked here.
 
     Raises:
         ValueError: The name is another one, such as "../a", "/a" or "a/b".
@@ -144,8 +144,7 @@ class ResultsFolder:
     def content(self, name: str) -> bytes:
         """Return the content of a listed file, which is compared with its digest in the list.
 
-        The list has no digest of a store of samples, which changes; its content is returned as it
-        is.
+        A store of samples changes, so its digest in the list is empty and nothing is compared.
 
         Args:
             name: Name of the file in this folder, such as "envelope.nc" or "figures/peaks.svg".
@@ -190,9 +189,9 @@ class ResultsFolder:
     def require_free(self, name: str) -> None:
         """Raise RefusedError if a new file of a name would replace what this program has not made.
 
-        A name is free if nothing has it, or a regular file or a link that is listed; of a link the
-        file will replace the link, not its target. If the list is damaged (`is_damaged`), any
-        regular file or link may be replaced.
+        A name is free if nothing has it, or a regular file or a link that is listed. If the list is
+        damaged (`is_damaged`), any regular file or link may be replaced. A link is then replaced
+        itself, not its target.
 
         Args:
             name: Name of the file in this folder, such as "figures/peaks.svg".
@@ -246,7 +245,7 @@ class ResultsFolder:
     def _write(
         self, source: str, contents: Mapping[str, bytes], forget: Iterable[str] = ()
     ) -> None:
-        """List files in place of others in manifest.json, and then write them.
+        """Add files to the list in manifest.json, and then write them.
 
         Args:
             source: Digest of what the files were made from; empty for a text of the run itself.
@@ -296,7 +295,7 @@ class ResultsFolder:
     def clear(self) -> None:
         """Remove every listed file, and empty the list, which is written to manifest.json.
 
-        Of a link the link is removed, not its target. What cannot be removed stays, without an
+        A link is removed itself, not its target. What cannot be removed stays, without an
         error; so do files that are not listed, and folders.
 
         Raises:

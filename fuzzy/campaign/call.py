@@ -222,12 +222,14 @@ class Call:
     def _outputs(self, points: Array) -> Sequence[Any]:
         """Call the function, and return its unchecked outputs, one item for each point.
 
-        A `vectorised` function is called once, with an array of shape (n,) for each input by name;
-        item k is the mapping of the outputs' names to entry k of their arrays. A function with
-        `shared` inputs is called once, with a list of n mappings of inputs to numbers, and what it
-        returns is returned. Any other function is called n times, with numbers by name; an item is
-        what it returns: a number, an array, or a mapping of names to these. Whether there are n
-        items is not checked.
+        - A `vectorised` function is called once, with an array of shape (n,) for each input. Item k
+          has entry k of each output, by the name of the output.
+        - A function with `shared` inputs is called once, with a list of n mappings of input names
+          to numbers. Its return value is returned.
+        - Any other function is called n times, with a number for each input. An item is the return
+          value of one call: a number, an array, or a mapping of names to these.
+
+        Whether there are n items is not checked.
 
         Args:
             points: One column for each of the inputs `names`, shape (n, inputs).

@@ -123,9 +123,9 @@ class Campaign:
 
         Raises:
             SpentError: New points exceed the budget; none of them is evaluated.
-            CampaignError: Samples failed, or have other outputs than the first one. It is raised
-                after all others have been evaluated, which are in the store, if there is one, but
-                not among the samples.
+            CampaignError: Samples failed, or have other outputs than the first one. All other
+                points are evaluated before it is raised. They are then in the store, if there is
+                one, but not among the samples.
             RefusedError: The knowledge about the model names an output that it does not have.
             FailedError: The store cannot be written, or a worker process died.
         """
@@ -204,7 +204,7 @@ def _tasks(call: Call, points: Array, *, stored: frozenset[int]) -> Iterator[Tas
 
 
 def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
-    """Return the sample or the failure of each new point, stored ones from the store of samples.
+    """Return the sample or the failure of each new point, from the store of samples or evaluated.
 
     Samples are written to the store while the others are evaluated, and at the latest when this
     function is left, also by an exception. Failures are not stored.
@@ -236,6 +236,7 @@ def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
             sample = campaign.store.get(campaign.model, key)
             if sample:
                 outcomes[row] = campaign.checked(sample)
+    # The rows that each call evaluates, without those that the store has given.
     tasks = _tasks(campaign.call, points, stored=frozenset(outcomes))
     unwritten: dict[str, Sample] = {}
     last_write = perf_counter()

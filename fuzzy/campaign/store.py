@@ -132,7 +132,7 @@ class Store:
         A row is intact if its checksum is that of its columns. Such rows are added to `self._rows`
         by the keys of their model and point, also where the file is damaged elsewhere. A new, empty
         file gets its table here and is intact. False means damage: SQLite's check of the file
-        finds some, there are other tables than that of the samples, or a row is not intact.
+        finds some, the only table is not the one of `create_table`, or a row is not intact.
 
         Raises:
             sqlite3.DatabaseError: The file cannot be accessed (it is locked, its disk is full, it

@@ -66,8 +66,9 @@ def pool(workers: int) -> Iterator[Executor | None]:
 def _processes(workers: int) -> Executor:
     """Return an executor of `workers` processes on this machine, which start at its first task.
 
-    They are forked where that is safe, so that they need not import anything again; else they start
-    anew. They end when this process has ended, and ignore Ctrl-C and hang-ups.
+    They are forked if this process is known to have one thread, so that they need not import
+    anything again; else they start anew. They end when this process has ended, and ignore Ctrl-C
+    and hang-ups.
     """
     # Unlike the executor of the standard library, loky's sends functions by value where another
     # process cannot import them, such as lambdas.

@@ -136,10 +136,10 @@ def mean_cuts(data: Observations) -> Stepwise:
     band = _band_half_width(n)
     fractions = np.arange(n + 1) / n
     partial_means = np.append(0.0, np.cumsum(data.values)) / n
-    # An edge of the band moves the fraction `band` of the values, those farthest away, to a bound:
-    # the largest values to the lower bound, or the smallest values to the upper one. What remains
-    # adds the integral of the sorted values over the other fractions, whose primitive is
-    # `partial_means`: the sum of the k smallest values over n at the fraction k/n.
+    # At one edge of the band the fraction `band` of the values, the largest ones, is moved to the
+    # lower bound; at the other edge the smallest ones are moved to the upper bound. The remaining
+    # values keep their places. Their part of the mean follows from `partial_means`, which at the
+    # fraction k/n is the sum of the k smallest values over n.
     lower = low * band + np.interp(1 - band, fractions, partial_means)
     upper = high * band + partial_means[-1] - np.interp(band, fractions, partial_means)
     # Rounding must not lead out of the bounds, nor out of the cut at the next lower level.
@@ -167,8 +167,8 @@ def _stepwise_at_levels(low: float, high: float, *, lower: Array, upper: Array) 
 def _band_half_width(n: int) -> Array:
     """Return the half width of Smirnov's band at each of the 999 levels α of `LEVELS`.
 
-    The distribution function of a quantity differs from that of n independent values of it, the
-    fraction of values up to x, by no more than the half width at all x, with P ≥ 1 − α.
+    With P ≥ 1 − α the following holds at all x: the probability that a quantity is at most x, and
+    the fraction of n independent values of it that are at most x, differ by up to the half width.
 
     Returns:
         Half widths in [0, 1], falling with α, shape (levels,). They are cached and must not be
@@ -193,9 +193,9 @@ def student_cuts(data: Observations) -> tuple[Stepwise, float]:
         data: The sorted values and their physical bounds, infinite for none.
 
     Returns:
-        The cuts, exact at the 999 levels `LEVELS` from 1e-9 to 1 (in between the next wider
-        one holds), and the level from which they hold: 0 with two bounds, else the lowest of the
-        `LEVELS`, below which the number repeats that cut.
+        The cuts, and the level from which they hold. They are exact at the 999 levels `LEVELS` from
+        1e-9 to 1; in between the next wider one stands. They hold from 0 on with two bounds, else
+        from the lowest of the `LEVELS`, whose cut is repeated below.
 
     Raises:
         RefusedError: There are fewer than two values, or all are equal.
@@ -212,7 +212,7 @@ def student_cuts(data: Observations) -> tuple[Stepwise, float]:
     # of two scale without rounding, so that the digits of all other values stay.
     exponent = np.frexp(np.abs(values).max())[1]
     deviation = np.ldexp(np.ldexp(values, -exponent).std(ddof=1), exponent)
-    half_width = _student_factors(len(values)) * deviation
+    half_width = _student_factors(len(values)) * deviation  # the factors are t/√n at the `LEVELS`
     return _clip_cuts(values.mean() - half_width, values.mean() + half_width, data.bounds)
 
 

@@ -98,10 +98,9 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
     """Return a copy of a claimed number whose cuts stand at the higher levels of the joint claim.
 
-    The cut at level β moves to the level α ≥ β of the joint cut, in which all of m numbers have
-    their cuts at β: α = 1 − (1 − β)^m for independent samples, else min(m β, 1). The level from
-    which the values decide the cuts, `decided`, moves in the same way. Of cuts that arrive at one
-    level, as at 1, the last one, the narrowest, is kept. The support at α = 0 stays.
+    With m joined numbers the cut at level β moves up to the level α = 1 − (1 − β)^m if their
+    samples are independent, else to min(m β, 1). The support at α = 0 stays. If several cuts arrive
+    at one level, such as 1, the narrowest is kept.
 
     Args:
         number: Fuzzy number with a claim, whose cuts are given at some levels and hold up to the
@@ -144,8 +143,8 @@ class JointClaim:
         """Return what may be claimed of a result that is computed from some inputs.
 
         A claim says that a quantity lies in its α-cut with P ≥ 1 − α under conditions. The claim of
-        a result needs the conditions of all inputs' claims, those of joining them, and that the
-        inputs without a claim lie in their cuts.
+        a result has the conditions of all inputs' claims, and the one under which these were
+        joined. A further condition is that the inputs without a claim lie in their cuts.
 
         Args:
             inputs: Fuzzy numbers by name, whose claims have been joined (`jointly`) if there are
@@ -210,8 +209,8 @@ def _rule_of(claimed: Mapping[str, ClaimedNumber]) -> JointRule:
 def _conditions_by_input(claimed: Mapping[str, ClaimedNumber]) -> list[str]:
     """Return the conditions of the claims as texts such as "E, nu: 12 values drawn alike".
 
-    Inputs whose claims have equal conditions share one text, with their names in front. A claim
-    with several conditions has them in one text, apart by commas; one without conditions has none.
+    Inputs whose claims have equal conditions share one text, with their names in front. Several
+    conditions of a claim are joined by commas. Inputs without conditions are left out.
     """
     names_by_condition: dict[str, list[str]] = {}
     for name, number in claimed.items():

@@ -89,8 +89,8 @@ class Knowledge:
 def negligible(values: Array) -> Array:
     """Return the largest difference of each output that rounding explains, shape (outputs,).
 
-    It is 1e-11 times the sum of the range of the output over the samples and its largest magnitude
-    there: models add up thousands of rounding errors of 1e-16.
+    The output's range over the samples and its largest magnitude there are added, and multiplied by
+    1e-11: models add up thousands of rounding errors of 1e-16.
 
     Args:
         values: Values of samples, shape (n, outputs), n ≥ 1.

@@ -146,6 +146,7 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
         Ranges with rising levels from 0 on, below 1. Of ranges with equal levels the narrowest is
         returned. The arrays are cached and must not be changed.
     """
+    # For gap k: the probabilities that the quantity lies inside it, in a gap below, and above it.
     gaps = _GapProbabilities.of(n, quantile)
     low = 0
     high = n

@@ -341,7 +341,8 @@ def _changed_in_turn(turns: Array) -> Array:
         turns: The points in their order, shape (n, inputs), n ≥ 1.
 
     Returns:
-        Points of the path, shape ((n − 1) inputs + 1, inputs). Point k is row k · inputs.
+        Points of the path, shape ((n − 1) inputs + 1, inputs). Row k · inputs is row k of `turns`,
+        counted from 0.
     """
     count, inputs = turns.shape
     path = np.empty(((count - 1) * inputs + 1, inputs))
@@ -384,8 +385,8 @@ def _climb_staircases(
     Args:
         campaign: Evaluates the points, and keeps them as samples.
         widest: Cut of the lowest level; only its inputs with a width are changed.
-        pattern: Signs (1 or −1) of the effects of these inputs over the sign of the first one,
-            shape (inputs,). All outputs here have this pattern.
+        pattern: For each of these inputs 1 if its effect has the sign of the first input's effect,
+            else −1, shape (inputs,). It is the same for all outputs here.
         first_signs: Sign (1 or −1) of the effect of the first input on each of the outputs, shape
             (outputs,).
         columns: Columns of these outputs in the samples, shape (outputs,).

@@ -115,8 +115,8 @@ class CutSearch:
     def largest_slope(self, point: Array, output: str) -> float:
         """Return the largest slope of an output at a point of the cut, to either side.
 
-        Differences are taken along each input that is farther than their step, 1e-4 of the width of
-        its cut, from both ends of the cut.
+        Differences have a step of 1e-4 of the width of an input's cut. They are taken along each
+        input that is farther than a step from both ends of its cut.
 
         Args:
             point: Values of all inputs, shape (inputs,).
@@ -243,10 +243,10 @@ class Optimum:
     def is_smooth(self) -> bool:
         """Whether the output has nearly no slope at the optimum: False at kinks and jumps.
 
-        Nearly no slope means up to 0.01 ranges of the output over the width of the cut, along each
-        input that is not at an end of its cut. The slope at the end of the descent decides if it is
-        that small; else longer differences to both sides are evaluated, once. False also if the
-        budget does not allow these.
+        A slope is the change of the output, in units of its range, over the width of an input's
+        cut. Only inputs that are not at an end of their cut count. Slopes of up to 0.01 are nearly
+        none. If the slope at the end of the descent is larger, longer differences to both sides are
+        evaluated, once, and decide. The answer is False if the budget does not allow these.
 
         Raises:
             CampaignError: The model failed at one of the points.
@@ -262,10 +262,10 @@ class Optimum:
     def is_optimum_of(self, cut: CutSearch) -> bool:
         """Return whether the point is a local optimum of another α-cut as well.
 
-        It is the optimum of the box `self.cut`. It stays one in this and in a narrower cut (of a
-        higher level) that contains it. In a wider cut (of a lower level) it stays one unless it
-        lies, to 1e-9 of the width, on a face of its own cut that the wider cut moves outwards.
-        Nothing is evaluated.
+        It is an optimum of the box `self.cut`. In this cut, and in a narrower one (of a higher
+        level), it is an optimum if the cut contains it. In a wider cut (of a lower level) it is an
+        optimum unless it lies, to 1e-9 of the width, on a face of its own cut and the wider cut
+        reaches beyond this face. Nothing is evaluated.
 
         Args:
             cut: α-cut of the same inputs, with the index `level` of its α-level, and the ends

@@ -138,8 +138,8 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
 
     The narrowest cut with a width gets `campaign.knowledge.tests` points, 16 by default, and each
     wider one a quarter of that: points of a narrower cut lie in the wider ones, too. Levels with
-    equal cuts count once. The points of a cut fill it evenly, and are the same in each call. There
-    are no more of them than evaluations are left in the budget, which may be none.
+    equal cuts count once. The points of a cut fill it evenly, and are the same in each call. Only
+    the first ones, as many as evaluations are left in the budget, are returned; there may be none.
 
     Args:
         domain: Inputs and levels; the cut of a level is the box of the α-cuts of all inputs.

@@ -62,8 +62,8 @@ SEARCH = SearchSettings()
 def value_tolerance(output_range: float, magnitude: float) -> float:
     """Return the difference of two values of an output up to which they count as one.
 
-    It is 1e-5 of the range, and 1e-9 of the magnitude for outputs that hardly vary, added up. It is
-    also the error that is stated of an estimated bound.
+    It is 1e-5 of the range plus 1e-9 of the magnitude, which matters for outputs that hardly vary.
+    It is also the error that is stated of an estimated bound.
 
     Args:
         output_range: Range of the output in the widest α-cut, 0 or more.

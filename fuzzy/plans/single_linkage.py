@@ -91,9 +91,9 @@ def with_farthest_points(unit: Array, known: Array, rng: np.random.Generator) ->
     """Draw up to 1,000 of some points of the unit cube anew, so that they lie far apart.
 
     Each new point is, of random candidates, the one farthest from all other points: the known ones,
-    those that stay, and the new ones before it (Mitchell 1991). Of holes that take 0.3 % of a cube
-    these points leave 75 times fewer than uniform points in three dimensions, and half as many in
-    six.
+    those that stay, and the new ones before it (Mitchell 1991). Such points miss fewer regions that
+    take 0.3 % of the cube than uniform points do: 75 times fewer in three dimensions, half as many
+    in six.
 
     Args:
         unit: Uniform points of [0, 1)^d, shape (n, d), n ≥ 1; not changed. The first 1,000, or all
@@ -173,10 +173,11 @@ class BoundSearch:
         """Expected fraction of the cut that lies in basins of optima that were not seen yet.
 
         With W different local optima, found by descents from N uniform samples, it is
-        W (W + 1) / (N (N − 1)) (Boender and Rinnooy Kan, 1987). N are the `explored` samples. The
-        fraction of all samples that lie on plateaus (many samples of one value, from which descents
-        find no way) is added, unless these count as explored. The sum is infinite without an
-        optimum, or with fewer than two explored samples.
+        W (W + 1) / (N (N − 1)) (Boender and Rinnooy Kan, 1987). N is the number of `explored`
+        samples: those off plateaus (many samples of one value, from which descents find no way),
+        and where kinks are expected also those on plateaus if they are 1,000 or more. The fraction
+        of all samples that are not explored is added. The result is infinite without an optimum, or
+        with fewer than two explored samples.
         """
         explored = self.explored
         n_optima = len(self.optima)
@@ -343,8 +344,8 @@ class SingleLinkage:
         An output whose search is complete is evaluated along each input, to both sides of the best
         optimum of its minimum and its maximum, in each cut. Where it improves again, away from the
         optimum, a descent should find a smooth optimum of its own; if it does not, the result is
-        True. Before, stalls of descents at kinks are left (`_leave_stalls`). Optima that are found
-        are recorded, so that the search may have to go on. For an
+        True. First of all, `_leave_stalls` goes on from optima at kinks, where descents may have
+        stalled. Optima that are found are recorded, so that the search may have to go on. For an
         output whose search is not complete, nothing is evaluated and the result is False.
 
         Args:
@@ -423,9 +424,9 @@ class SingleLinkage:
             SpentError: The budget does not carry the evaluations.
             CampaignError: The model failed at some points.
         """
-        # Distances at which waves are looked for. The largest is a critical distance, of which 100
-        # samples of one to three inputs have 0.1 to 0.35. Tuned: 15 of 400 trends with waves beside
-        # them are estimated wrongly without this look, and 1 with it.
+        # Distances at which waves are looked for. The largest is about the critical distance of
+        # single linkage: 0.1 to 0.35 for 100 samples of one to three inputs. They are tuned: 15 of
+        # 400 trends with waves beside them are estimated wrongly without this look, and 1 with it.
         distances = np.append(0.0, np.geomspace(1e-4, 0.2, 12))
         line = np.repeat(best[None], len(distances), axis=0)
         line[:, column] += side * distances
@@ -478,12 +479,14 @@ class SingleLinkage:
     def _descend(self, cut: CutSearch, bound: Bound) -> None:
         """Descend from the samples and corners of a cut that have no better one nearby.
 
-        Nearby is the critical distance of single linkage, within which a ball has σ ln N of N
-        samples, with σ = 4. If two or more optima are no corners of the cut, σ = 2 follows, which
-        starts more descents and hides fewer basins. Changed is the state of the bound in the cut:
-        the optima found, the starts and plateaus from which a descent was made (none is repeated),
-        and the numbers of samples on plateaus and off them. A plateau consists of samples of one
-        value, of which one alone starts a descent.
+        Nearby means within the critical distance of single linkage: a ball of this radius has
+        σ ln N of N samples on average, with σ = 4. If two or more optima are no corners of the cut,
+        σ = 2 follows, which starts more descents and hides fewer basins. A plateau consists of
+        samples of one value, of which only one starts a descent.
+
+        The state of the bound in the cut is changed: the optima found, the starts and plateaus from
+        which a descent was made (none is repeated), and the numbers of samples on plateaus and off
+        them.
 
         Args:
             cut: The α-cut, of which samples have been evaluated.

@@ -312,6 +312,8 @@ def _level_points(signs: Signs, grid: Grid) -> Array:
     distinct = np.unique(signs, axis=0)
     rows: list[tuple[float, ...]] = []
     for pattern in np.concatenate([distinct, -distinct]):
+        # The minimum lies at the lower end if the output rises. The maximum is the minimum of the
+        # opposite signs.
         choices = []
         for sign, points in zip(pattern, grid, strict=True):
             by_sign = {0: points, 1: points[:1], -1: points[-1:]}
@@ -419,9 +421,10 @@ def _observed_signs(
 ) -> Signs:
     """Return the sign that the slopes at all probes of a box have.
 
-    The probes are the nominal point, the extreme corners by the slopes there, and four points
-    inside. A sign is unsure where slopes differ in sign, or the magnitude of the smallest one is
-    below 5 % of the range of the slopes over the probes. It is evidence, not proof.
+    The probes are the nominal point, the corners where the slopes at the nominal point put the
+    extremes, and four points inside. A sign is unsure where slopes differ in sign, or the smallest
+    magnitude of a slope is below 5 % of the range of the slopes over the probes. A sign is
+    evidence, not proof.
 
     Args:
         model: Function from points, shape (n, inputs), to the outputs there, shape (n, outputs).

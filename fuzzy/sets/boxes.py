@@ -115,8 +115,8 @@ class Domain:
         """Check the fields, and replace them: levels by a tuple, plain numbers by `Crisp`.
 
         A claimed number (of measured values) has a level `decided`, below which its values do not
-        decide the cut. If no level here lies below it, the number is replaced by a copy with the
-        level 0, whose cuts are the same at these levels and can be asked for at any other.
+        decide the cut. If no level here lies below it, the number is replaced by a copy whose
+        `decided` is 0. Its cuts are the same, and can be asked for at all levels.
 
         Raises:
             RefusedError: There is no input or level, the levels do not rise within [0, 1], an input
@@ -156,9 +156,8 @@ class Domain:
     def inside(self, points: Array) -> Mask:
         """Return which points lie in the box of each level, shape (levels, n).
 
-        The box of a level consists of the α-cuts of all inputs. Faces belong to it, and a point
-        that is outside by up to 1e-12 of the width of an input's cut at the lowest level, which is
-        rounding, lies inside.
+        The box of a level consists of the α-cuts of all inputs, with its faces. A point may lie
+        outside by rounding, up to 1e-12 of the width of an input's cut at the lowest level.
 
         Args:
             points: One column for each input, in the order of the field `inputs`, shape

@@ -162,12 +162,12 @@ def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
-    """Return the lower or upper end at `alpha` by linear interpolation; exact at `levels`.
+    """Return the end of a cut at level `alpha` by linear interpolation; exact at `levels`.
 
     Args:
         alpha: Level, from the first of `levels` on. At the last one and above, the last end holds.
         levels: Strictly rising levels, one or more.
-        ends: End of the cut at each level.
+        ends: The lower ends of the cuts at the levels, or their upper ends.
     """
     right = bisect_right(levels, alpha)
     if right == len(levels):
