@@ -88,13 +88,13 @@ class CellContent(Section, defer_build=True):
     def radius_and_cell(
         self,
     ) -> tuple[RadiusMapSection | ThetaSection | FractionMap, RoundCell | MeshedCell]:
-        """Return where the random size of the particles comes from, and the cell with its phases.
+        """Return the source of the random size of the particles, and the cell with its phases.
 
         Returns:
-            The section on the random variable θ, and the section [cell]. A cell whose mesh comes
-            from a file needs the distribution of θ alone: [radius], or without one a standard
-            normal variable cut off at -3 and 3. A cell with one particle comes with the map from θ
-            to its radius: [radius], else the map of the constant fraction `cell.fraction`.
+            The source, and the section [cell]. For a cell with one particle the source is the map
+            from the random variable θ to the radius: [radius], else the map of the constant
+            fraction `cell.fraction`. A cell whose mesh comes from a file needs the distribution of
+            θ alone: [radius], or without one a standard normal variable cut off at -3 and 3.
 
         Raises:
             RefusedError: The cell is an image or missing, or a particle has neither [radius] nor a
@@ -135,6 +135,7 @@ class CellContent(Section, defer_build=True):
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
             require(not self.mesh.refine, "mesh.refine", True, "true beside mesh.file")
+            # `radius_map` is [radius] if it has a1 … a4, else None.
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.described_fields()["a1"].description
             require(is_complete, "radius.a1", None, f"{about}; theta alone beside mesh.file")
@@ -171,12 +172,12 @@ class CellContent(Section, defer_build=True):
         # Of two sources one would silently win.
         has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         is_computed = "microstructure" in self.stages
-        has_map = is_computed or has_fraction or self.image_cell or self.mesh_cell
+        needs_radius = not (is_computed or has_fraction or self.image_cell or self.mesh_cell)
         for stage in self.stages:
             if stage != "modulus":
                 self._require_section(stage, stage)
                 continue
-            if not has_map:
+            if needs_radius:
                 self._require_section(stage, "radius")
             self._require_section(stage, "cell")
         has_radius = self.radius is not None

@@ -127,14 +127,14 @@ class Content(CellContent):
         """Return the structure of the case with the forces of [[force]].
 
         Args:
-            modulus: Young's modulus in Pa, as stage modulus computes it; None for that of the
-                section, or a stand-in of 20 GPa where the section has none.
+            modulus: Young's modulus in Pa, as stage modulus computes it; None for the modulus that
+                the case states, or for 20 GPa if it states none.
             loss: Loss factor of the material, from which the damping ratios follow if the case asks
                 for damping by the material; None for a stand-in of 2 %. It is ignored otherwise.
 
         Raises:
-            RefusedError: The case has no structure, the values make none, or it takes no such
-                force.
+            RefusedError: The case has no structure, its values make none, or the structure cannot
+                take one of the forces.
         """
         section = self.structure_section
         if section is None:
@@ -199,9 +199,9 @@ class Content(CellContent):
     def _require_records_alone(self, records: RecordsSection) -> None:
         """Refuse what cannot stand beside a suite of ground motion records, [records].
 
-        These are an accelerogram of the structure, a structure that no ground motion moves, and the
-        sections [probability], [tolerances], [identify] and [[study]], which ask about one
-        response, while a suite has one response for each record.
+        Refused are an accelerogram of the structure, a structure that no ground motion moves, and
+        the sections [probability], [tolerances], [identify] and [[study]]. They ask about one
+        response, while a suite has one for each record.
 
         Args:
             records: The section; the case has it.
@@ -214,8 +214,7 @@ class Content(CellContent):
             has_ground = section.nominal.model.ground is not None
             require_alone("records", has_ground, "an accelerogram")
             section.require_pattern()
-        # Answers over a suite are means and fractions of records. Of these four questions nobody
-        # has defined how the answers under several records make one.
+        # For these sections it is not defined how results under several records make one result.
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
@@ -242,17 +241,14 @@ class Content(CellContent):
         A [[study]] is an envelope with inputs, outputs and a duration of its own; questions are the
         sections with limits of the response, such as [decision].
 
-        Checked are the method and the integrator where columns yield, the inputs, outputs and
-        duration of [envelope] and of each [[study]], that no two studies have the same name, that a
-        modulus is known or computed, the limits of each question, and that identification has a
-        frame.
-
         Args:
             envelope: What holds for all studies: method, integrator, α-levels, time step.
             structure: The structure, with a stand-in for what stage modulus computes.
 
         Raises:
-            RefusedError: With the key of the first thing that does not fit.
+            RefusedError: The method or the integrator does not suit columns that yield; an input,
+                output or duration does not fit; two studies have the same name; no modulus is known
+                or computed; a limit does not fit; or [identify] has no frame.
         """
         # Where columns begin to yield, the response has kinks as a function of the inputs. Proofs
         # expand it in Taylor polynomials and Graph Followers follow gradients: both need
@@ -292,7 +288,7 @@ class Content(CellContent):
             key: Section of the study, "envelope" or "study[2]", for messages.
             study: Names of its fuzzy inputs, of the outputs in its figures, and its duration in s.
             envelope: What holds for all studies; its time step must divide the duration.
-            structure: The structure. What a stage will make fuzzy may still be crisp in it.
+            structure: The structure. Inputs that a stage will make fuzzy may still be crisp in it.
 
         Raises:
             RefusedError: An input is unknown or crisp, an output is unknown, the duration is no

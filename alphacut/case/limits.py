@@ -83,8 +83,9 @@ class CaseLimit:
     def value_in_si(self, structure: Structure, key: str) -> float:
         """Return the limit in the SI unit of its output.
 
-        If the limit is relative, as "drift1 <= 1 %", its `value` is a fraction: of a base shear,
-        that of the weight of all floors; of any other output, that of the height of the storey.
+        A relative limit, such as "drift1 <= 1 %", has a fraction as its `value`. For the base shear
+        it is a fraction of the weight of all floors, for any other output of the height of the
+        storey.
 
         Args:
             structure: The structure, for its weight, heights and the units of its outputs.
@@ -150,13 +151,13 @@ class CaseLimit:
             The limits from the ground up. A limit with a number or of the whole frame, and any
             limit of a structure without floors, is returned alone and unchanged.
         """
-        # Kinds of outputs that each storey or floor has are known with words, as "drift of storey";
-        # those of the whole frame, such as the base shear, without.
+        # OUTPUTS has words, such as "drift of storey", for outputs that each storey or floor has,
+        # and an empty text for outputs of the whole frame, such as the base shear.
         _, words = OUTPUTS.get(self.output, ("", ""))
         if not structure.model.floors or not words:
             return (self,)
         names = [f"{self.output}{z}" for z in range(1, structure.model.floors + 1)]
-        # Of a single storey the event would be its limit itself.
+        # With a single storey there is nothing to join.
         event = ""
         if len(names) > 1:
             event = self.text
@@ -176,13 +177,14 @@ def parse_limit(value: object) -> CaseLimit:
     "0.5 %", which then refers to the height of the storey or to the weight.
 
     Returns:
-        CaseLimit: Its value is in the SI unit of the output; a fraction if it refers to a height or
-        the weight; and in SI of whatever unit was written if the name of the output tells none.
+        CaseLimit: Its value is in the SI unit of the output, or a fraction if it refers to a height
+        or the weight. If the name of the output tells no unit, the value is in the SI unit that
+        belongs to the unit written.
 
     Raises:
-        RefusedError: The text is another one, the sign does not fit the side, VALUE is several
-            values or an interval, its unit is not the one that the name of the output tells, or a
-            limit of a magnitude is not positive.
+        RefusedError: The text has another form, "<=" or ">=" does not fit max or min, VALUE is
+            several values or an interval, its unit is not that of the output, or a limit of a
+            magnitude is not positive.
     """
     match = re.fullmatch(r"(?:(max|min|mean) )?(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift <= 1/200', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
@@ -309,15 +311,14 @@ class ProbabilitySection(QuestionSection):
         """Refuse limits and random inputs that the structure does not have.
 
         Args:
-            structure: Structure of the case, in which a modulus that stage modulus computes is
-                crisp.
+            structure: Structure of the case.
 
         Raises:
-            RefusedError: A limit does not fit the structure, or a random input but E is unknown or
-                crisp.
+            RefusedError: A limit does not fit the structure, or a random input other than E is
+                unknown or crisp.
         """
         super().require_answerable(structure)
-        # A modulus that stage modulus computes is still crisp here, and may be random in the run.
+        # A modulus E that stage modulus computes is still crisp here, and may be random in the run.
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
@@ -355,7 +356,7 @@ class FragilitySection(QuestionSection):
 
         Raises:
             RefusedError: The structure has forces or does not start at rest; a limit does not fit
-                it or is none of a magnitude; or `most`, the largest intensity tried, is stated
+                it, or does not limit a magnitude; or `most`, the largest intensity tried, is stated
                 though no columns yield.
         """
         super().require_answerable(structure)

@@ -122,10 +122,10 @@ class ForceSection(Section):
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
     def require_consistent(self) -> None:
-        """Refuse a section without amplitudes, and amplitudes in another unit than it needs.
+        """Refuse a section without amplitudes, and amplitudes in a unit that does not fit.
 
-        Forces are in N, amplitudes of an impulse in N s. A file with a unit has the forces, and its
-        amplitudes are factors without a unit.
+        The history says which unit amplitudes must have: N, or N s for an impulse. If the file of
+        the history states a unit, amplitudes are factors without one.
 
         Raises:
             RefusedError: With the key of the first amplitude that does not fit.
@@ -144,14 +144,15 @@ class ForceSection(Section):
 def with_forces(
     structure: Structure, sections: Sequence[ForceSection], places: Sequence[str]
 ) -> Structure:
-    """Return the structure with the forces of a case, whose amplitudes become its parameters.
+    """Return the structure with the forces of a case; their amplitudes become its parameters.
 
     Args:
-        structure: The structure without them. It is not changed, and returned itself if there are
-            no sections.
-        sections: Each has one time history and the amplitudes that act by it, each a fuzzy number
-            with its SI unit, by the degree of freedom.
-        places: Names of the degrees of freedom in their order; none if it takes no forces.
+        structure: The structure without forces. It is not changed. Without sections it is returned
+            itself.
+        sections: Each has one time history and, for each degree of freedom on which it acts, an
+            amplitude: a fuzzy number and its SI unit.
+        places: Names of the degrees of freedom in their order; none if the structure takes no
+            forces.
 
     Raises:
         RefusedError: The structure takes no forces, or a force acts on no degree of freedom.
@@ -169,8 +170,8 @@ def with_forces(
             forces.append(PlacedForce(places.index(place), amplitude.nominal, history))
             amplitudes.append(amplitude)
             units.append(unit)
-    # The structure chooses the names of amplitudes, in the order of the forces that it was given.
-    # A frame names them by floor, F3 and F3_2 of a second one; a structure from matrices F1, F2 …
+    # The model returns a name for each amplitude, in the order of the forces. A frame names them by
+    # floor: F3, and F3_2 for a second force on floor 3. A structure from matrices has F1, F2 …
     model, names = structure.model.with_forces(forces)
     numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
     force_units = dict(zip(names, units, strict=True))

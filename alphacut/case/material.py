@@ -87,7 +87,7 @@ class RadiusMapSection(ThetaSection):
     def require_consistent(self) -> None:
         """Refuse supports of a1 … a4 for which the radius leaves (0, 1) at some θ.
 
-        The radius is over half the side of the cell, so that a particle with radius 1 touches its
+        The radius is divided by half the side of the cell: a particle with radius 1 touches its
         periodic images.
 
         Raises:
@@ -224,7 +224,7 @@ class RoundCell(Section):
         angle between the first axis and x.
 
         Raises:
-            RefusedError: The text is another one, the ratio of the axes is not from 1/4 to 4, or
+            RefusedError: The text has another form, the ratio of the axes is not from 1/4 to 4, or
                 the angle is not finite.
         """
         if self.particles in ("cylinders", "spheres"):
@@ -311,8 +311,9 @@ class RoundCell(Section):
         is_solved = is_isotropic or self.particles != "spheres"
         allowed = "Young's modulus of spheres"
         require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
-        # An outline whose largest distance from its centre is R r, with r the radius over half the
-        # side, touches the next cell where R r = 1. Beyond that the phases would overlap.
+        # Let r be the radius divided by half the side of the cell. The largest coordinate on the
+        # outline is R r, with R = reach(outline). The particle touches the next cell at R r = 1,
+        # and would overlap its image beyond.
         if self.fraction is not None:
             largest = self.fraction.support.upper
             touching = float(self.shape.fractions(1 / reach(outline)))
@@ -379,12 +380,13 @@ class ImageCell(Section):
         return self._of_phases(self.loss or ())
 
     def require_consistent(self) -> None:
-        """Refuse keys that exclude each other, and numbers of values that do not fit the phases.
+        """Refuse keys that exclude each other, and wrong numbers of values for the phases.
 
-        The phases come from `threshold`, one more phase than thresholds, or from `labels`, one
-        phase for each. Young's modulus has a value for each phase, Poisson's ratio one for each or
-        one for all, the loss factor likewise or none. An image has `pixel`, a side or (width,
-        height), and a volume has `voxel`, a side or those along x, y and z.
+        The phases come either from `labels`, one phase for each label, or from `threshold`, one
+        phase more than thresholds. Young's modulus has a value for each phase. Poisson's ratio has
+        one for each or one for all, and so has the loss factor, which may also be missing. An image
+        has `pixel`: one side, or width and height. A volume has `voxel`: one side, or the sides
+        along x, y and z.
 
         Raises:
             RefusedError: With the key that does not fit; no phase is solid; or there are loss
@@ -403,8 +405,7 @@ class ImageCell(Section):
         # side, so that without any other phase nothing is bounded.
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
-        # A pore dissipates nothing and a rigid phase is not strained: their loss factors would
-        # stand in no sum of energies.
+        # A pore and a rigid phase store no energy, so that their loss factors would mean nothing.
         is_possible = all(self.is_solid) or not self.loss
         cure = "pores in one material leave its loss factor; else take a small modulus for pores"
         require(is_possible, "cell.loss", "there", "none beside a pore or a rigid phase", cure)

@@ -41,8 +41,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
 
     Returns:
         The factor as a function of the parameters, and the array, shape (unknowns, unknowns). The
-        shape is not checked if the names of the unknowns were refused, which is told of their own
-        key.
+        shape is not checked if the names of the unknowns were refused.
 
     Raises:
         RefusedError: The value is no such pair, the factor is no product of powers, the file is
@@ -59,7 +58,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             if unknowns:
                 _require_shape(path.name, array, rows)
                 require_symmetric(path.name, array, unknowns)
-            # Such a term does nothing, which nobody writes on purpose: the array is another one.
+            # A term of zeros does nothing: its author meant another array.
             require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
             return Monomial.parse(factor), array
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
@@ -103,15 +102,16 @@ Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
 
 def _si_unit(value: object, _: ValidationInfo) -> str:
-    """Return a unit of SI, or a word that is no known unit.
+    """Return the value as a text if it is a coherent SI unit, or no known unit.
 
     Rows act on unknowns in SI units, so that a multiple such as kN would make the output a thousand
     times too large.
 
     Raises:
-        RefusedError: The unit is a multiple of one of SI.
+        RefusedError: The unit is a multiple of an SI unit.
     """
     unit = str(value)
+    # Of "1 kN" the parser returns the number 1000 and the SI unit "N".
     try:
         number, si = parse_fuzzy_in_any_unit(f"1 {unit}")
     except ValueError:
@@ -183,8 +183,7 @@ class MatricesSection(StructureSection):
             damping = self.damping_ratio
         else:
             ratios = damping_ratios_by_name(self.damping_ratio, None)
-        # A structure needs one parameter at least, from which its numbers take their type: one that
-        # is used by nothing stands for none.
+        # A structure needs one parameter at least: if there is none, an unused one is added.
         numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
@@ -218,7 +217,7 @@ class MatricesSection(StructureSection):
         return Structure(model, numbers)
 
     def warnings(self, structure: Structure | None) -> Iterator[str]:
-        """Yield a sentence for each fuzzy parameter that no factor has.
+        """Yield a sentence for each fuzzy parameter that appears in no factor.
 
         Args:
             structure: The structure, which is not looked at.
@@ -235,7 +234,9 @@ class MatricesSection(StructureSection):
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Return the damping ratios that the loss factor of the material of E gives, by name.
+        """Return the damping ratios that follow from the loss factor of the material, by name.
+
+        Young's modulus of this material is the parameter E.
 
         Args:
             damping: Has the damping ratio of joints, which is added to each.
@@ -280,8 +281,8 @@ class MatricesSection(StructureSection):
         """Refuse outputs and parameters without usable names, and a record without a direction.
 
         Raises:
-            RefusedError: There is no output, a name is not of letters, digits and underscores, the
-                ground moves but moves no unknown, or the matrices make no structure.
+            RefusedError: There is no output; a name is not of letters, digits and underscores; the
+                motion of the ground moves no unknown; or the matrices make no structure.
         """
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         require_names("matrices.parameters", self.parameters)

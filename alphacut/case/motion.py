@@ -97,14 +97,13 @@ class EnvelopeSection(Section):
         """Refuse a duration that is no whole number of time steps, or of too many.
 
         Args:
-            key: Key of the duration, such as "envelope.duration"; "KEY of NAME" for that of a
-                record, which the case cannot change.
+            key: Key of the duration, such as "envelope.duration". "KEY of NAME" means the duration
+                of a record, which the case cannot change.
             duration: Length of the simulation in s.
 
         Raises:
-            RefusedError: The duration is shorter than one step, no multiple of it to 1e-9, or has
-                more than a million steps, which do not fit into memory. The message has a step that
-                fits.
+            RefusedError: The duration is shorter than one step, is no multiple of it to 1e-9, or
+                has more than a million steps. The message has a step that fits.
         """
         # Envelopes of all outputs on all levels are kept at each step: more do not fit into memory.
         max_steps = 1_000_000

@@ -127,12 +127,13 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
             kind = "key"
             if isinstance(detail["input"], dict):
                 kind = "section"
-            # A near key of the same section is shown by its last name alone.
+            # The suggestion is the full name of a known key; the key itself if it is known, though
+            # not allowed here; or "". In the same section its last name alone is shown.
             close = suggested[key].removeprefix(f"{key.rpartition('.')[0]}.")
             names = ", ".join(_sibling_names(model, key))
             if suggested[key] == key:  # as cell.matrix_modulus of a cell whose mesh is a file
                 yield RefusedError(key, f"a {kind} of another kind of section", names)
-            elif "." in close:  # of another section: it may be one of this section that is meant
+            elif "." in close:  # in another section; the keys of this one are listed as well
                 yield RefusedError(key, f"an unknown {kind}", names, f"did you mean {close}?")
             elif close:
                 yield RefusedError(key, f"an unknown {kind}", "", f"did you mean {close}?")
@@ -186,9 +187,9 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
             raised.
 
     Returns:
-        RefusedError: The one that a validator of this project raised, with `key` where it names
-        none; else one with the value, the allowed values or the description of a missing key, and a
-        hint.
+        RefusedError: The error that a validator of this project raised, with `key` if it has no key
+        itself; else a new one with the value, the allowed values (of a missing key its
+        description), and a hint.
     """
     context = detail.get("ctx", {})
     cause = context.get("error")

@@ -63,13 +63,13 @@ class MaterialDamping:
 
 
 def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber, ...]:
-    """Return the damping ratios over the critical one that a value of a case states.
+    """Return the damping ratios, as fractions of critical damping, that a value of a case states.
 
     Args:
-        value: A ratio of all modes, such as "2 %", or as a list of numbers alone, a fuzzy one; a
-            list with a text for each mode from the slowest on; or "material", to take the ratios
-            from the loss factor of the material, or "material + 1 %" with the ratio of the joints
-            added.
+        value: A number or a text such as "2 %", or a list of numbers alone, which is one fuzzy
+            ratio of all modes; a list with a text for each mode from the slowest on; "material", to
+            take the ratios from the loss factor of the material; or "material + 1 %", with the
+            ratio of the joints added.
 
     Returns:
         MaterialDamping for "material"; else one fuzzy ratio, or one for each mode.
@@ -219,14 +219,14 @@ def damping_ratios_by_name(
     """Return damping ratios by the names of parameters: "zeta", or "zeta1", "zeta2" … of each mode.
 
     Args:
-        ratios: One ratio of all modes, one for each mode from the slowest on, none, or the ratio of
-            the joints that is added to the damping by the material.
-        loss: Loss factor η of the material, from which the ratio sin(½ arctan η) of all modes
-            follows; None for a stand-in of 2 %. It is used for damping by the material only.
+        ratios: One ratio of all modes; one for each mode from the slowest on; none; or damping by
+            the material, which has the ratio of the joints to be added.
+        loss: Loss factor η of the material; None for a stand-in of 2 %. It is used for damping by
+            the material only, whose ratio is sin(½ arctan η) for all modes.
     """
     if isinstance(ratios, MaterialDamping):
         ratios = (damping_from_loss(loss or LOSS_STAND_IN, joints=ratios.joints),)
-    # A single ratio is that of all modes: "zeta1" would be that of the first one alone.
+    # A single ratio holds for all modes, while "zeta1" would be the ratio of the first mode alone.
     if len(ratios) == 1:
         return {"zeta": ratios[0]}
     return {f"zeta{mode}": ratio for mode, ratio in enumerate(ratios, start=1)}
@@ -347,12 +347,12 @@ class Frame(StructureSection):
         """Yield a sentence for each doubtful unit and each weight that is left out (P-Delta).
 
         Doubtful are masses, lengths, second moments, stiffnesses or yield forces of two storeys
-        that differ more than 300-fold, and a storey above 100 m.
+        that differ more than 300-fold, and a storey above 100 m. Weights are not judged if gravity
+        is part of the frame.
 
         Args:
-            structure: The frame with its fuzzy parameters; None while its modulus is unknown, when
-                nothing is said of weights. If gravity is part of the frame, nothing is said of them
-                either.
+            structure: The frame with its fuzzy parameters; None while its modulus is unknown: then
+                weights are not judged.
         """
         # Wrong prefixes k, M and G are factors of a thousand and more, while an isolator is some 50
         # times softer than a storey: 300 lies between both.
@@ -366,7 +366,7 @@ class Frame(StructureSection):
         if tallest > 100:  # m, ten times the height of a tall storey
             yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
             return
-        yield from self._size_warnings(tallest or 5.0)
+        yield from self._size_warnings(tallest or 5.0)  # m, a guess where no height is known
         if self.gravity or self.lengths is None or structure is None:
             return
         # The coefficients are the largest in the supports of all parameters: if they are small,
@@ -519,16 +519,16 @@ class Frame(StructureSection):
                 `damper_placement` do not stand together; no key of damping is there, not even with
                 0; or the values make no frame.
         """
-        # The damping ratio that follows from the loss factor of the material is that of a frame
-        # whose strain energy is all in columns of this material: given stiffnesses do not tell.
+        # Damping by the material supposes that all strain energy is in columns of this material. If
+        # stiffnesses are given, the material of the columns is unknown.
         has_columns = self.stiffness is None or not isinstance(self.damping_ratio, MaterialDamping)
         value = "material, beside stiffness"
         allowed = "columns of the material, or [matrices] if some storeys are of another one"
         require(has_columns, "frame.damping_ratio", value, allowed)
-        # Undamped responses are unusual, and a forgotten key would make them: whoever wants one
-        # says so, as "0 %".
         is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         require(is_placed, "frame.damper_placement", None, "both dampers and damper_placement")
+        # Undamped responses are unusual, and a forgotten key would make them: whoever wants one
+        # says so, as "0 %".
         keys = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
         is_damped = any(map(self.has_key, keys))
         require(is_damped, "frame.dampers", None, " or ".join(keys), cure='"0 %" for none')
@@ -555,6 +555,7 @@ class Pendulum(StructureSection):
         Raises:
             RefusedError: The values make no pendulum.
         """
+        # keys of the section, and the arguments of `pendulum` in the same order
         keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
         arguments = ("mass", "length", "damping", "gravity", "phi0", "omega0")
         numbers = [getattr(self, key) for key in keys]

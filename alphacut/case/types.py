@@ -49,11 +49,11 @@ class Section(BaseModel):
     def described_fields(cls) -> dict[str, FieldInfo]:
         """Return the fields of the section by key, each with a description of what the key is.
 
-        The description stands in the field, or in the line below the key in its class; it is added
-        to the field in place. Pydantic would read these lines of all classes as they are defined
-        (`use_attribute_docstrings`), for which each command would wait 0.04 s. Here only a message
-        or a page that needs them has them read. A key without such a line has None.
+        The description stands in the field, or in the line below the key in the source of the
+        class; such a line is added to the field in place. A key without either has None.
         """
+        # Pydantic can read these lines itself (`use_attribute_docstrings`), but does so whenever a
+        # class is defined: each command would wait 0.04 s for texts that few of them show.
         for section in cls.__mro__:
             for key, line in _lines_below_keys(section).items():
                 info = cls.model_fields[key]
@@ -210,9 +210,8 @@ class Quantity:
         """Return the quantity that a value states, in SI, whether or not it lies in the range.
 
         Raises:
-            ValueError: The value is no such quantity. An integer is a number without quotes; a
-                number without a unit is one without quotes, a percentage, or a fuzzy number in
-                brackets.
+            ValueError: The value is no such quantity. A whole number must stand without quotes, and
+                so must a number without a unit unless it has "%" or brackets.
         """
         # True is an int in Python, but no number in TOML.
         if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
