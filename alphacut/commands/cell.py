@@ -223,14 +223,16 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
         return None
     if isinstance(result, HomogenisedSpheres):
         modulus, nu = result.error_of(hill_average)
-        # The cube has the three moduli m = (K, (C11 − C12)/2, C44). Under ε11 = ε22 = ε the stress
-        # is σ11 = ε (C11 + C12) = ε (2 K + 2/3 m_1), and under the shear ε12 = ε it is
-        # σ12 = 2 ε C44. Both rise with each modulus, as `error_of` needs.
+        # `error_of(f)` gives the absolute error of f(m), of which the three moduli of the cube
+        # m = (K, (C11 − C12)/2, C44) have errors. Under ε11 = ε22 = ε the stress is
+        # σ11 = ε (C11 + C12) = ε (2 K + 2/3 m[1]); under the shear ε12 = ε it is σ12 = 2 ε C44.
+        # Both rise with each modulus, as `error_of` needs.
         stresses = result.error_of(lambda m: STRAIN * np.array([2 * m[0] + 2 / 3 * m[1], 2 * m[2]]))
     else:
         modulus = result.estimated_error * result.modulus
         nu = result.poisson_error
-        # The mean σ11 is proportional to C11 + C12, and σ12 to C33: moduli 0 and 2 of the plane.
+        # The mean σ11 is proportional to C11 + C12, and σ12 to C33. These are moduli 0 and 2 of the
+        # plane, so that stresses have their relative errors.
         stresses = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": _stresses(stresses)}
 

@@ -342,9 +342,9 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
 def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
     """Yield a sentence for each output whose peak may rise by over 1 % between time nodes.
 
-    The peak, and what responses add to it between nodes, are those of the most plausible structure.
-    Where columns yield, all peaks but those of accelerations are found between nodes as well; these
-    are judged by the response with the initial stiffness.
+    The peak, and what responses add to it between nodes, are computed for the most plausible
+    structure. Where columns yield, peaks of accelerations alone are read at the nodes, so that only
+    they are judged, by the response with the initial stiffness.
 
     Args:
         linear: A linear structure, or a frame that yields.
@@ -363,12 +363,11 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
     flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
     nominal = np.zeros((1, 0))  # the one structure without fuzzy inputs
     at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
-    between = node_deviation(flow, nominal).T
-    # At rest rounding alone moves a structure, and its peak is no measure of what is between nodes.
-    # `reach` is the size of each output that the energy of the response allows, shape (outputs,);
-    # a billionth of it, AT_REST, is far above rounding and below any peak of interest.
+    between = node_deviation(flow, nominal).T  # what each step may add, of the same shape
+    # The peak of a structure at rest is rounding alone. It is replaced by AT_REST, a billionth, of
+    # `reach`: the size that the energy of the response allows, shape (outputs,).
     peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
-    # Before a late force sets in, nothing moves and the energy is zero: nothing is widened then.
+    # If nothing moves at all, peaks are 0, and the ratio of 1 says that nothing is widened.
     farthest = within_steps(at_nodes, between).max(axis=1)
     widening = np.divide(farthest, peaks, out=np.ones_like(peaks), where=peaks > 0) - 1
     for name, fraction in zip(linear.outputs, widening, strict=True):
@@ -392,9 +391,9 @@ def records_text(
 ) -> str:
     """Return a table of the ground motion records of a suite, and their warnings.
 
-    The left columns describe each record as its file holds it, the columns "PGA used", "Sa(T1)
-    used" and "motion" as it moves the structure, after correction and scaling. Accelerations are in
-    g.
+    The columns "PGA used", "Sa(T1) used" and "motion" describe each record as it moves the
+    structure, after correction and scaling; the columns before them as its file holds it.
+    Accelerations are in g.
 
     Args:
         section: The records of the case, as their files hold them.
@@ -436,8 +435,8 @@ def _in_g(acceleration: float) -> str:
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:
     """Yield a row of each quantity in a section of a case, and in the sections below it.
 
-    Quantities that the case leaves out have no row, except columns of frames, whose default
-    matters. Texts and other values that are no quantities have none either.
+    Values that are no quantities have no row. Quantities that the case leaves out have none either,
+    except columns of frames, whose default matters.
 
     Args:
         prefix: Beginning of the keys, empty or with its dot, such as "cell.".
@@ -613,10 +612,10 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
 
     Args:
         data: Dataset of an envelope file, in SI units, with the axes alpha, time, output and
-            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2), "label" the
-            name of each output with its unit in brackets, and the attributes are "nature" and
-            "method". "proved_lower" and "proved_upper", guaranteed bounds beside wider ones,
-            "inner_lower" and "inner_upper", attained ones, and the errors need not be there.
+            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2); "label" the
+            name of each output with its unit in brackets. Attributes are "nature" and "method".
+            Three things may be missing: guaranteed bounds "proved_lower" and "proved_upper" beside
+            other bounds, attained bounds "inner_lower" and "inner_upper", and errors.
 
     Returns:
         The envelope. Its fuzzy inputs are only known as intervals: their cuts on the lowest level.

@@ -102,18 +102,17 @@ def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
 
     The parts are 1/64, 1/64, 1/32 and 1/16 of the work, until they have taken two seconds together.
     The time of a part x is taken as a + b x, where a is what every part takes once; a and b are
-    fitted by least squares of the relative errors. The first part also compiles kernels: what it
-    takes longer than its repetition is added once.
+    fitted by least squares of the relative errors. The whole work, x = 1, then takes a + b. The
+    first part also compiles kernels: what it takes longer than its repetition is added once.
 
     Args:
         run: Function that does about a given fraction of the work, and returns the fraction done.
         fewest: Number of parts that are timed at least, however long they take.
 
     Returns:
-        a + b with the time of compiling, in s; not less than the longest part took. If all parts
-        did the same fraction, the time of the last one over its fraction. If one or two parts took
-        the two seconds, the time of the last one, since such parts consist of what every part takes
-        once.
+        Seconds, with the time of compiling: a + b, or the time of the longest part if this is more.
+        If all of three or more parts did the same fraction: the time of the last part divided by
+        its fraction. If only one or two parts were timed: the time of the last one.
     """
     parts = list[float]()
     seconds = list[float]()
@@ -125,8 +124,8 @@ def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
         is_long = sum(seconds[1:]) > LONG_ENOUGH or seconds[0] > 2 * LONG_ENOUGH
         if is_long and len(parts) >= fewest:
             break
-    # The second part is the same as the first: it shows what compiling took. If it was left out,
-    # the slice has the first time alone, and the difference is 0.
+    # The second part is the same as the first: it shows what compiling took. The slice ends with
+    # the time of the second part, or of the first if there is no second: the difference is then 0.
     compiling = max(0.0, seconds[0] - seconds[:2][-1])
     # A work that has no smaller parts is timed by equal ones.
     if len(parts) > 2 and len(set(parts)) == 1:
@@ -400,9 +399,9 @@ def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]
         fraction: Fraction of the duration, in (0, 1].
 
     Returns:
-        The task with a duration of eight steps at least, if it has as many, and its part of the
-        whole. Of a response of more than 16,000 steps it is the fraction of these, since parts of
-        all of it would take long as well.
+        The task with its shorter duration, and this duration as a fraction of the whole. It has
+        eight steps at least, if the response has as many. If the response has more than 16,000
+        steps, the fraction is taken of 16,000, since parts of all steps would take long as well.
     """
     # In fewer than eight steps nothing moves, and the cost of starting hides that of steps.
     steps = round(task.duration / task.section.step)
@@ -454,7 +453,7 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
     """
     assert content.records is not None
     records = suite.suite_records(content.records, task.section, structure)
-    # As in the run: all outputs have peaks, and those that questions limit need not be outputs.
+    # As in the run: peaks are computed of all outputs, and of those that questions limit besides.
     limited = tuple(dict.fromkeys(structure.outputs + content.limited_outputs))
     task = replace(task, limited=limited)
     # Structures that yield take longer the stronger the record is; the median record by duration is
@@ -474,9 +473,9 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
 
 
 def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
-    """Yield what the questions will take that compute responses of their own.
+    """Yield what the questions [probability] and [tolerances] will take.
 
-    These are [probability] and [tolerances]; the others follow from known peaks.
+    They compute responses of their own; all others follow from known peaks.
 
     Args:
         content: The case.

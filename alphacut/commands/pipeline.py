@@ -328,7 +328,7 @@ class Pipeline:
         for record in records:
             for warning in record.warnings:
                 say(f"warning: {warning}")
-        # All outputs have peaks in the results, and those that questions limit need not be outputs.
+        # Peaks are computed of all outputs, and of those that questions limit besides.
         limited = tuple(dict.fromkeys(structure.outputs + self.content.limited_outputs))
         task = replace(task, limited=limited)
         longest_first = sorted(records, key=lambda record: -record.duration)
@@ -487,8 +487,8 @@ def _require_motion_of(content: Content, section: EnvelopeSection, structure: St
     Args:
         content: The case.
         section: Its section [envelope].
-        structure: The structure, with numbers as fuzzy as they will be. The first record of a suite
-            moves it in place of all.
+        structure: The structure, with the numbers fuzzy that will be so in the run. Of a suite the
+            first record alone moves it here.
 
     Raises:
         RefusedError: An input, output, record, method or tolerance does not fit the structure.
@@ -509,9 +509,9 @@ def _require_motion_of(content: Content, section: EnvelopeSection, structure: St
 def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
     """Yield a warning of each load that does not end as the responses do.
 
-    These are an accelerogram that goes on after the end of all responses, and a force whose file
-    ends within the longest one, where the force is not zero: it jumps to zero there. Nothing is
-    said without [envelope], and of a structure that is not linear.
+    Warned of are an accelerogram that goes on after all responses have ended, and a force that is
+    not zero where its file ends, before the longest response does: it jumps to zero there. There
+    are no warnings without [envelope], or if the structure is not linear.
 
     Args:
         content: The case, for the durations of [envelope] and its studies.
@@ -524,7 +524,8 @@ def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
     for name, history in histories(linear).items():
         end = history.start + history.step * (len(history.samples) - 1)
         largest, _ = history.extremes
-        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned).
+        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned). The
+        # last value of a history that `is_held` stays on, so that it does not jump either.
         jumps = abs(history.samples[-1]) > 0.01 * largest and not history.is_held
         if history is linear.ground:
             if end > longest * (1 + 1e-9):

@@ -79,8 +79,9 @@ def draw_tolerances(answer: Tolerances) -> Figure:
     All are divided by the nominal value of the input, or by 1 where this is zero.
 
     Args:
-        answer: For each input its support in the case, `own`, and scaled by the admissible scale,
-            `kept`, which is the nominal value alone if limits are exceeded at each scale.
+        answer: For each input `own`, its support in the case, and `kept`, the scaled support within
+            which no limit is exceeded. If limits are exceeded at each scale, `kept` is the nominal
+            value alone.
     """
     supports = answer.supports.values()
     nominal = np.array([[x.nominal or 1.0] for x in supports])  # (inputs, 1)
@@ -96,12 +97,12 @@ def draw_tolerances(answer: Tolerances) -> Figure:
 
 
 def draw_decision(answer: Decision) -> Figure:
-    """Draw a bar from the smallest to the largest peak over its limit, for each limit and α-level.
+    """Draw a bar from the smallest to the largest peak for each limit and α-level.
 
-    Each limit has a row, at whose middle the bars of all its levels lie over each other, those of
-    higher levels darker and thinner. Above them stands the verdict with its guarantee and the
-    degrees to which exceeding the limit is possible and necessary. Events that any of several
-    limits is exceeded have no peak and are left out.
+    Peaks are divided by their limit. Each limit has a row, in which the bars of all its levels lie
+    over each other, higher levels darker and thinner. Above them stands the verdict with its
+    guarantee and the degrees to which exceeding the limit is possible and necessary. Events that
+    any of several limits is exceeded have no peak and are left out.
 
     Args:
         answer: Verdicts on the limits, the first of which is drawn on top.
@@ -132,16 +133,17 @@ def draw_decision(answer: Decision) -> Figure:
 
 
 def peak_over_limit(limit: LimitDecision) -> Ends:
-    """Return the smallest and the largest peak over the limit on each level.
+    """Return the smallest and the largest peak on each level, divided by the limit.
+
+    More exactly they are 1 − margin / size, where size is the magnitude of the limit. For a limit
+    of zero it is the largest magnitude of a finite margin, so that bars have a length to be seen.
 
     Args:
-        limit: Limit and margins, limit less peak, in the unit of the output. The largest peak is
-            infinite where none is excluded.
+        limit: Limit and margins, in the unit of the output. A margin is the limit less the peak.
+            The largest peak is infinite where no peak is excluded.
 
     Returns:
-        Ratios of shape (levels,) each, to the magnitude of the limit. Of a limit of zero they are 1
-        less the margin over the largest magnitude of a finite margin, so that their bars have about
-        the length of those of other limits.
+        Ratios, shape (levels,) each.
     """
     size = abs(limit.limit)
     if size == 0.0:

@@ -48,8 +48,8 @@ def draw(fitted: FittedRadiusMap, folder: Path, section: MicrostructureSection) 
 def draw_pbox(fitted: FittedRadiusMap) -> Figure:
     """Draw the distribution of the reduced radius r_n, and the p-box of the fuzzy map.
 
-    r_n is the radius over half the side of a square or cube as large as the cell of a particle. The
-    lower panel has the same less the distribution of the fit, in per cent.
+    r_n is the radius divided by half the side of a square or cube as large as the cell of a
+    particle. The lower panel shows the same curves less the distribution of the fit, in per cent.
 
     Args:
         fitted: The radius map, and the sample that it was fitted to.

@@ -127,8 +127,8 @@ def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
     """
     low, high = (float(end[level]) for end in infinite_if_unknown(cuts))
     if nature is Nature.GUARANTEED:
-        # A declared error belongs to a guaranteed bound: without it the number shown would be none.
-        # The lower end falls to 0 at most, unless it was negative before.
+        # Without the declared error the number shown would be no bound. `min` keeps a lower end
+        # that is negative, and lets a positive one fall to 0 at most.
         low = max(low - error, min(low, 0.0))
         high += error
     return range_text(low, high, nature, 5)
@@ -401,14 +401,15 @@ def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
     Args:
         peak: Bounds of a peak in SI units.
         factor: Number by which they are multiplied to be shown.
-        levels: Indices of the levels whose cuts are shown. A cut between the highest and the
-            lowest level has three digits, these have four.
+        levels: Indices of the levels whose cuts are shown. The cuts on the lowest and the highest
+            level have four digits, all others three.
 
     Returns:
-        A text for each level and three more. The last two, the farthest attained peak of the lowest
-        level and its distance from the bound as a fraction of this, are empty for peaks that are
-        not guaranteed, and if the box of the inputs encloses a set learned from a measurement: no
-        response of the box is known to be one of the set.
+        A text for each level; the error; the farthest attained peak on the lowest level; and the
+        gap, which is the distance from this peak to the bound of the farthest peak as a fraction of
+        the bound. The last two are empty for peaks that are not guaranteed, and if the box of the
+        inputs encloses a set learned from a measurement: no response of the box is known to belong
+        to the set.
     """
     lower = factor * peak.lower
     upper = factor * peak.upper
@@ -532,9 +533,8 @@ def agreement(is_guaranteed: bool) -> str:
 def smaller_steps(parts: Parts) -> Iterator[str]:
     """Yield a sentence for each peak whose bound the time step widens noticeably.
 
-    It does if what responses may add between nodes is over 1 % of the bound and over half of its
-    uncertainty (`is_widened_by_step`).
-    Bounds hold at all times, so they contain what responses may add between the time nodes. The
+    Bounds hold at all times, so they contain what responses may add between the time nodes. Widened
+    noticeably are bounds of which this is over 1 %, and over half of their uncertainty. The
     sentence says about what half the step would give.
 
     Args:
@@ -551,7 +551,7 @@ def smaller_steps(parts: Parts) -> Iterator[str]:
             if peak.nature is not Nature.GUARANTEED:
                 what = "an error of"
                 value = float(peak.error[0]) - saved
-            elif peak.is_least:  # the bound of a smallest value is a lower one, and rises
+            elif peak.is_least:  # a smallest value has a lower bound, which rises
                 what = "at least"
                 value = float(peak.far_end[0]) + saved
             else:
@@ -602,8 +602,8 @@ def drivers(parts: Parts) -> Iterator[str]:
         yield _driver_sentence("E", parts.shares["E"], count=3)
     for name in peaks[-1:]:
         what = name.replace("the peak", "the reached peak")
-        # A box around a set learned from a measurement was searched: no point of it is known to
-        # belong to the set, so that nothing is known to be reached.
+        # The search was in a box around a set learned from a measurement. Its points need not
+        # belong to the set, so that no peak is known to be reached.
         if parts.encloses:
             what = f"{name}, as tried in the box around {parts.encloses},"
         yield _driver_sentence(what, parts.shares[name], count=2)

@@ -128,10 +128,12 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
         studies: Numbers of each study by name. There must be one with a peak.
 
     Returns:
-        Bounds, error and attained value in SI units, NaN where no value is known to be attained,
-        and the distance of the attained value from the bound as a fraction of this ("gap, share").
-        If the bounds are those of a box that encloses a set of inputs, learned from a measurement,
-        a column "inputs" says so.
+        Least and greatest peak, error and attained value in SI units; NaN where no value is known
+        to be attained. "gap, share" is the distance from the attained value to the bound of the
+        farthest peak, as a fraction of this bound: "least peak" for the smallest value of an
+        output, "greatest peak" for all others. If bounds hold for a box that encloses a set of
+        inputs learned from a measurement, a column "inputs" says so. The index of the rows begins
+        at 0 again for each peak.
     """
     found = []
     for name, study in studies.items():
@@ -145,7 +147,7 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
                 "greatest peak": peak.upper,
                 "error": peak.error,
                 "nature": str(peak.nature),
-                # Unknown values are infinite inside, and empty cells in a file.
+                # Unknown values are infinite in `reached`; a file has empty cells for NaN.
                 "peak reached": np.where(np.isfinite(peak.reached), peak.reached, np.nan),
                 "gap, share": peak.gaps,
             }
@@ -165,9 +167,10 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> pd.DataFrame:
 
     Returns:
         Row of each time node: the time in s and, for each level, lower bound, upper bound and
-        error. Guaranteed bounds contain the error; there the third column is the gap to attained
-        values. It is left out if the bounds are those of a box that encloses a set of inputs,
-        learned from a measurement, as the titles then say; and so is what `data` does not have.
+        error. Guaranteed bounds contain the error, and have the gap to attained values as their
+        third column. This column is left out if bounds hold for a box that encloses a set of inputs
+        learned from a measurement, which the titles then say. Variables that `data` does not have
+        are left out as well.
     """
     series = data.sel(output=output)
     nature = Nature(data.attrs["nature"])
@@ -198,8 +201,8 @@ def shown(frame: pd.DataFrame) -> Table:
     Args:
         frame: Numbers and texts; a missing number is NaN and becomes an empty text.
     """
-    # Numbers are rounded for the eye; a rounded bound must stay a bound, so that these columns are
-    # rounded in their own directions before the others.
+    # A rounded bound must stay a bound: columns of bounds are rounded in their own directions here,
+    # all other numbers to the nearest at the end.
     filled = frame.dropna(axis=1, how="all")
     for low, high, guarantee in (
         ("E from [GPa]", "E to [GPa]", "nature of E"),

@@ -184,19 +184,21 @@ class EnvelopeTask:
             RefusedError: A limited output is none that the structure can have.
             FailedError: A response could not be computed.
         """
-        # Limited outputs that are not observed have no envelope: their peaks come from the proof.
+        # Limited outputs that are not observed have no envelope: their peaks come from the second
+        # proof. `output_of` is "q3" for "max q3", so that it differs from names of signed peaks.
         outputs = [str(name) for name in envelope.outputs]
         signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
         found = peaks(envelope, [*outputs, *signed])
-        # A second proof of many inputs is hardly tighter, since the largest number of sub-boxes
-        # ends it: with an infinite gap any guaranteed peak is taken as it is.
+        # A second proof of many inputs is hardly tighter, since it ends at the largest number of
+        # sub-boxes: an infinite gap lets each guaranteed peak stay as it is.
         gap = PEAK_ERROR
         if len(structure.inputs(self.fuzzy)) > MAX_PARAMETERS:
             gap = np.inf
         # Where the method has searched the peaks themselves, a second search finds no more.
         is_searched = envelope.searched_peaks is not None
         limited = [x for x in self.limited if not is_searched or x not in found]
-        # Both bounds hold, so that the tighter end of either is taken.
+        # Names of peaks that are missing or not guaranteed within the gap are loose. Both bounds of
+        # them hold, so that the tighter ends are taken.
         if loose := loose_peaks(found, limited, gap):
             found = tightest(found, replace(self, limited=loose).close_peaks(structure, progress))
         return found
@@ -308,9 +310,9 @@ def require_tolerance(
     """Require that the declared errors of an envelope are within the tolerance of the case.
 
     Without a tolerance there is nothing to require. A tolerance in m or N applies to the outputs in
-    this unit; one without a unit is a fraction of the largest peak of each output. A larger error
-    of a Graph Follower is a warning only, since it takes the tolerance as the smallest gain for
-    which it computes a trajectory, and so is one of a nonlinear system.
+    this unit; one without a unit is a fraction of the largest peak of each output. For a nonlinear
+    system, and for a Graph Follower, a larger error is a warning only: a follower takes the
+    tolerance as the smallest gain for which it computes a trajectory, not as a limit of its error.
 
     Args:
         result: Its `arrays` have the error of each output, over α and time, in SI units, and its
@@ -319,7 +321,7 @@ def require_tolerance(
         structure: The structure, for the units of its outputs.
 
     Raises:
-        FailedError: An error of another method is larger.
+        FailedError: An error is larger, of a linear system and another method.
         RefusedError: The tolerance is in the unit of no output.
     """
     if task.section.tolerance is None:
@@ -329,8 +331,8 @@ def require_tolerance(
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
         peak = result.numbers.peak[name]
-        # The error of an estimated peak also has what lies between the time nodes, which the band
-        # at the nodes does not have.
+        # The error of an estimated peak also contains what lies between the time nodes; the errors
+        # of the band are those at the nodes alone.
         if peak.nature is Nature.ESTIMATED:
             error = max(error, float(peak.error.max()))
         # An output that stays at zero, such as a residual drift where nothing yields, has a peak of

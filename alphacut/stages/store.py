@@ -132,9 +132,9 @@ class RunProgress:
     def next_part(self, names: Iterable[str], skipped: Iterable[str] = ()) -> Progress:
         """Return the function that takes the progress of the next stages, and reserve their part.
 
-        The stages get that part of what is left of the bar which their rough seconds are of
-        `seconds_left`, those of all stages to come. Both `seconds_left` and `done`, the fraction of
-        the bar that is reserved so far, are changed.
+        The part is a fraction of the rest of the bar: the rough seconds of these stages divided by
+        `seconds_left`, the seconds of all stages to come. It is added to `done`, the fraction of
+        the bar that is reserved so far, and their seconds are taken from `seconds_left`.
 
         Args:
             names: Names of the stages that will be computed next.
@@ -219,11 +219,11 @@ class StageStore:
                 results[stage.name] = found
         stale = [stage for stage in stages if stage.name not in results]
         tick = self.progress.next_part([stage.name for stage in stale], [*results])
-        # A stage alone may use all workers itself, and only this process gives it a folder for
-        # further files.
         # The bar moves by the work of stages, which is more even than by their number.
         total = sum(stage.work for stage in stale)
         done = 0.0
+        # A stage alone may use all workers itself, and only this process gives it a folder for
+        # further files.
         if executor is None or self.folder is None or len(stale) == 1:
             for stage in stale:
                 stage_tick = subprogress(tick, done / total, (done + stage.work) / total)
@@ -360,7 +360,8 @@ class StageStore:
         if computed.data is not None:
             with whole_file(files / f"{stage.name}.nc") as partial:
                 computed.data.to_netcdf(partial)
-        # Files that an earlier result had beyond those of this one are removed with it.
+        # `before` tells what the earlier result was made from: those of its files that this result
+        # does not replace are removed.
         before = ""
         if name in self.folder.files:
             before = self.folder.files[name].source

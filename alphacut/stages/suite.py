@@ -31,8 +31,8 @@ def suite_records(
 ) -> tuple[ScaledRecord, ...]:
     """Return the records of a suite as they move the structure, in the order of the case.
 
-    Each is corrected by a baseline and scaled; its response ends five natural
-    periods after it, but not later than the longest duration.
+    Each is corrected by a baseline and scaled. Its response ends five natural periods after the
+    record, but not later than the longest duration.
 
     Args:
         section: Recordings, baseline correction, and the scale or the intensity to be reached.
@@ -51,8 +51,8 @@ def suite_records(
         scale=section.scale.value,
         measure=section.scale.measure,
     )
-    # Each response ends some periods after its record, at a time of its own: that of [envelope],
-    # which the case has been checked for, is only the longest.
+    # Each response ends at a time of its own. The case has been checked for the duration of
+    # [envelope] alone, which is the longest.
     for record in records:
         envelope.require_steps(f"envelope.duration of {record.name}", record.duration)
     return records
@@ -79,7 +79,7 @@ def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Sta
         task: Names of the fuzzy inputs and of the peaks, time step and α-levels.
         record: The scaled record.
     """
-    # The duration of a record tells how much work it is, compared with the others.
+    # `work` is the size of a stage compared with the others: the duration of the response.
     inputs = [structure.model, structure.numbers, record, task]
     compute = partial(_peaks, structure, task, record)
     packages = ("fuzzy", "frame")
