@@ -201,7 +201,7 @@ def begun_late(points, cells, phase):
         (with_a_hole, r"the prisms fill 9\d\.\d+% .* give holes a phase of their own"),
         (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
         (cut_out, "has a prism on one side alone: a slit; .* Coherence"),
-        (dented, "is folded; put middle nodes .* Mesh.HighOrderOptimize"),
+        (dented, "is folded; move corners .*Mesh.HighOrderOptimize"),
         (begun_late, "is matrix in a layer of θ and inclusion in the next; .* two meshes"),
     ],
 )
