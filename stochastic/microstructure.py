@@ -74,16 +74,16 @@ class RadiusLimits:
         """Return a copy of a sample with the reduced radii r_n of discs capped at `Shape.reach`.
 
         r_n is the radius of a particle over half the side of a square or cube as large as its cell.
-        Reach is the largest r_n of a map, 0.99 for discs; at 1 particles touch the sides of a
-        square cell. With stated limits, and for spheres, the sample itself is returned: limits cut
-        off what is tighter.
+        At r_n = 1 particles touch the sides of such a cell, so reach, the largest r_n of a map, is
+        0.99 for discs. For spheres, and where limits are stated, the sample itself is returned,
+        since its largest r_n are cut off later.
 
         Args:
             sample: Reduced radii of all cells, weighted by area or volume.
 
         Raises:
-            RefusedError: Limits are not stated, and more than 15 % of the area or volume is in
-                tighter cells, of discs or of spheres.
+            RefusedError: Limits are not stated, and more than 15 % of the area or volume (of
+                spheres as well) is in cells with an r_n above reach.
         """
         if self.stated is not None:
             return sample
@@ -460,7 +460,7 @@ def _repacked(
             best = cells
             best_error = error
         progress(0.5 + 0.2 * (number + 1) / max_packings)
-        # The exponent is above 1, since the limit cuts off more than in proportion.
+        # The exponent is above 1, since a denser packing loses more to the limit.
         correction = (target / map_fraction) ** 1.5
         fraction = min(packing.fraction * correction, rule.shape.densest)
         # Denser than `densest` spheres do not pack: the fraction then stays as it is.

@@ -152,10 +152,10 @@ def _rounding(grey: Array) -> float:
 def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
     """Return which pixels are salt, pepper or scratches, shape (rows, columns).
 
-    An impulse differs from the level of every class, and from most of the 7 × 7 pixels around, of
-    which a line has 7, by more than three standard deviations of the noise; pixels of a blurred
-    border differ from the levels alone. Noise by itself leaves 0.3 % of such pixels: below 1 % of
-    the image none counts. The image is taken as periodic.
+    An impulse differs by more than three standard deviations of the noise from the level of every
+    class, and from most of the 7 × 7 pixels around it. Pixels of a blurred border differ from the
+    levels only. Noise alone makes 0.3 % of the pixels differ, so no pixel is an impulse if fewer
+    than 1 % would be. The image is taken as periodic.
 
     Args:
         grey: Grey values of an evenly lit image, shape (rows, columns).
@@ -174,9 +174,9 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
 def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
     """Raise for an image of which a class piles up at an end of the grey values.
 
-    A class is clipped where 1 % of its pixels have the last grey value, and three times as many as
-    have the next one. Classes with fewer than 50 pixels away from borders tell nothing. A clean
-    image, whose classes are all flat, passes.
+    A class is clipped if at least 1 % of its pixels have the lowest or highest grey value of the
+    image, and more than three times as many as have the next value. Classes with fewer than 50
+    pixels away from borders are not judged. A clean image, whose classes are all flat, passes.
 
     Args:
         values: Grey values, shape (rows, columns).
@@ -212,8 +212,8 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
 def _is_flat(grey: Array, contrast: float) -> bool:
     """Return whether a class has one grey value, or up to three distant ones, as in a clean image.
 
-    These take 95 % of its pixels. Where particles meet, a blurred image has others. Distant grey
-    values are apart by 5 % of the contrast.
+    These take at least 95 % of its pixels; the others may be blurred ones where particles meet.
+    Distant grey values are apart by at least 5 % of the contrast.
 
     Args:
         grey: Grey values of the pixels of the class, shape (pixels,), at least one.
@@ -260,7 +260,8 @@ def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int)
     columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), polynomials])
     flat = values.ravel()
     rounding = _rounding(flat)
-    # The first fit has the outliers too; each further one leaves out those of the fit before.
+    # The first fit has the outliers too; each further one leaves out the outliers of the fit
+    # before.
     used = inner
     for _ in range(3):
         coefficients = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
@@ -284,8 +285,8 @@ def _fit_light(values: Array, labels: Ints, *, polynomials: Array, classes: int)
 def _inner_pixels(labels: Ints, classes: int) -> Mask:
     """Return the pixels that have no pixel of another class within 3, shape (rows, columns).
 
-    The distance is 2 or 1 if less than a tenth of some class would be left, and all pixels are
-    returned if it would with 1 as well. The image is taken as periodic.
+    If that leaves less than a tenth of some class, the distance is 2, then 1, and at last all
+    pixels are returned. The image is taken as periodic.
 
     Args:
         labels: Class of each pixel, from 0, shape (rows, columns).

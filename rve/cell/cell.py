@@ -215,9 +215,9 @@ def continuous_radii(radius_map: RadiusMap) -> Array:
             distribution of θ.
 
     Raises:
-        RefusedError: It is no radius map, a radius is outside (0, 1), which is tested at 65 even
-            steps, or neighbouring radii differ by more than 0.01: the map jumps, and no rule in θ
-            can tell the error of a jump.
+        RefusedError: It is no radius map, a radius is outside (0, 1) at one of 65 even steps, or
+            neighbouring radii differ by more than 0.01. Such a map has a jump, whose error no rule
+            in θ can estimate.
     """
     require_map(radius_map)
     distribution = radius_map.distribution
@@ -225,7 +225,7 @@ def continuous_radii(radius_map: RadiusMap) -> Array:
     radii = radius_map(theta)
     changes = abs(np.diff(radii))
     jump = int(np.argmax(changes))
-    # A change of this size within a step is twenty times as steep as maps of particles are.
+    # Maps of particles change at most by about a twentieth of this in a step.
     if changes[jump] > 0.01:
         value = f"{radii[jump]:.4g} and {radii[jump + 1]:.4g} side by side"
         raise RefusedError(f"r at θ = {theta[jump]:.4g}", value, "maps without a jump")
@@ -253,10 +253,9 @@ def require_compressible(*phases: AnyPhase) -> None:
 def require_solve_arguments(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
-    """Raise for arguments of `solve` that are no radius map, no phase and no sequence of phases.
+    """Raise unless the arguments of `solve` are a radius map, a phase and a list of phases.
 
-    A map is a function with the attribute `distribution`; whether it has allowed radii is not
-    looked at.
+    A map is a function with the attribute `distribution`; its radii are not checked.
 
     Args:
         radius_map: First argument.

@@ -81,7 +81,7 @@ class Extents(NamedTuple):
 def extents(outline: Outline) -> Extents:
     """Return the largest |x1|, the largest |x2| and the smallest distance of an outline.
 
-    They are those of the radius 1.
+    All three are for a particle of radius 1.
 
     Args:
         outline: Distance of the edge from the centre over the radius, as a function of the polar
@@ -127,7 +127,7 @@ def bend_radii(outline: Outline) -> tuple[Array, Array]:
     """Return points of an outline with their bend radii, for the radius 1.
 
     The bend radius is |x'|²/|x''| with derivatives in the polar angle φ, by central differences. It
-    is that of curvature where φ runs evenly along the outline, and less elsewhere.
+    is the radius of curvature where |x'| is constant along the outline, and less elsewhere.
 
     Args:
         outline: Distance of the edge from the centre over the radius, as a function of the polar
@@ -146,7 +146,7 @@ def bend_radii(outline: Outline) -> tuple[Array, Array]:
     after = np.roll(points, -1, axis=0)
     first = (after - before) / (2 * step)
     second = (after - 2 * points + before) / step**2
-    # On a straight part x'' vanishes where φ runs evenly; the bend radius is then huge, not 1/0.
+    # x'' may vanish on a straight part; the bend radius is then huge and not 1/0.
     length = np.hypot(second[:, 0], second[:, 1])
     second_norm = np.maximum(length, 1e-12)
     return points, np.asarray((first**2).sum(axis=1) / second_norm)

@@ -269,7 +269,8 @@ def _number_nodes(prisms: Prisms, level: Ints, *, planar: Ints, layers: int, ver
         vertices: Number of vertices of the plane mesh, which stand before its edge midpoints.
 
     Raises:
-        MeshError: The new numbers are not 0, 1, 2, …, each once: a column does not pass all levels.
+        MeshError: A column does not pass all levels, so the new numbers are not 0, 1, 2, …, each
+            once.
     """
     per_level = int(planar.max()) + 1
     number = level * per_level + planar

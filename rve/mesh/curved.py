@@ -67,21 +67,21 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
     Returns:
         Straight-sided triangles with the vertices of the interface on the outline. For an outline
         that is no circle, edges at its bends are shortened step by step until no curved triangle of
-        the orders 2 to 5 is nearly folded: the smallest determinant of its Jacobian J exceeds 0.2
+        the orders 2 to 5 is nearly folded: its smallest determinant of the Jacobian J exceeds 0.2
         of the mean.
 
     Raises:
         RefusedError: `size` is outside (0, 1]; the outline is not positive or not periodic;
-            `radius` is not positive or the particle reaches 0.9995 of half the side, so that
-            elements between it and its images would have no end; or the outline is so sharp that
-            triangles fold at the shortest edges that are tried.
+            `radius` is not positive or the particle reaches 0.9995 of half the side, where the gap
+            to its images would need too many elements; or the outline is so sharp that triangles
+            fold at the shortest edges that are tried.
         MissingLibraryError: Gmsh is not installed, and the mesh is not in the user's cache.
     """
     require_mesh_size(size)
-    # Nearer to its images, at 0.9995 of half the side, elements in the gap would have no end.
+    # Beyond 0.9995 of half the side the gap to the images would need too many elements.
     require_fit(outline, radius, limit=0.9995)
-    # On coarser meshes small particles hide from every order, and errors that are estimated by
-    # comparing orders come out too small.
+    # On coarser meshes no order of elements resolves a small particle, and errors that are
+    # estimated by comparing orders come out too small.
     size = min(size, 0.7)
     if is_round(outline):
         return _graded_mesh(radius, size, outline, refinement=0.0)
@@ -178,8 +178,8 @@ def _lagrange_nodes(mesh: PlaneMesh, edges: Ints, *, order: int, num_edges: int)
     num_vertices = len(mesh.points)
     per_edge = order - 1
     per_triangle = (order - 1) * (order - 2) // 2
-    # Vertices of a triangle rise, so both triangles at an edge run along it in the same direction
-    # and see its nodes in the same order.
+    # The vertices of a triangle have rising numbers, so both triangles at an edge run along it in
+    # the same direction and have its nodes in the same order.
     on_edges = num_vertices + edges[:, :, np.newaxis] * per_edge + np.arange(per_edge)
     first_inside = num_vertices + num_edges * per_edge
     first_of_triangle = first_inside + np.arange(len(mesh.triangles)) * per_triangle

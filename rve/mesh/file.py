@@ -65,9 +65,8 @@ def read_grid(path: Path | str) -> PrismGrid:
 def mesh_content(path: Path | str) -> bytes:
     """Return the bytes of a file in Gmsh's format MSH from its section $MeshFormat on.
 
-    A file that begins otherwise may be a script of Gmsh, whose commands Gmsh would run; here Gmsh
-    reads no file at all. Sections $Comments before $MeshFormat are left out; what follows
-    $MeshFormat is not looked at.
+    A file that begins otherwise may be a script of Gmsh, and is refused. Sections $Comments before
+    $MeshFormat are left out. What follows $MeshFormat is not checked.
 
     Args:
         path: The file, text or binary; its name may have any ending.
@@ -142,7 +141,7 @@ def read_prisms(mesh: MshFile) -> Prisms:
 def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
     """Return the nodes of the prisms of one volume as indices of the file's points, shape (m, 15).
 
-    The order within a prism is that of Gmsh's type "Prism 15", which is Basix's: vertices, then
+    The order within a prism is that of Gmsh's type "Prism 15", the same as Basix's: vertices, then
     midpoints of edges.
 
     Args:
@@ -164,11 +163,11 @@ def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
 
 
 def refined(grid: PrismGrid) -> PrismGrid:
-    """Split each prism of a mesh from a file into eight, in the place of its own curved shape.
+    """Split each prism of a mesh from a file into eight, which together have its curved shape.
 
     A prism is halved along θ, and its triangle is split into four at the midpoints of the edges.
-    The eight span all polynomials of the one, so that the displacements of the coarser mesh are
-    among those of the finer one, whose stiffness is therefore nowhere larger.
+    The eight can represent each displacement of the one, so the finer mesh is nowhere stiffer than
+    the coarser one.
 
     Args:
         grid: A mesh with the positions `fixed` of all nodes; without them an AssertionError is
@@ -192,10 +191,11 @@ def refined(grid: PrismGrid) -> PrismGrid:
     at = np.concatenate([planar, heights[..., np.newaxis]], axis=-1).reshape(-1, 3)
     shapes = np.asarray(wedge(1).tabulate(0, at)[0]).reshape(len(at), -1)
 
-    # A new node that prisms share is recognised by its trilinear weights of their six vertices,
-    # which are zero for all vertices that they do not share; positions would need a tolerance.
-    # Barycentric coordinates are quarters and heights are quarters, so the weights are sixteenths
-    # from 0 to 16, and 17 · vertex + weight is one whole number for both. Weights 0 become −1.
+    # A new node may lie in several prisms. Its key tells that it is the same node: the vertices of
+    # the prism with the node's trilinear weights, which are 0 for all vertices that these prisms do
+    # not share. (Positions would need a tolerance.) Barycentric coordinates and heights are
+    # quarters, so weights are sixteenths, 0 to 16, and 17 · vertex + weight holds both in one whole
+    # number. Vertices of weight 0 become −1.
     across = np.stack([1 - at[:, 0] - at[:, 1], at[:, 0], at[:, 1]], axis=1)  # of the triangle
     weights = np.hstack([across * (1 - at[:, 2:]), across * at[:, 2:]])
     sixteenths = np.rint(16 * weights).astype(int)
@@ -210,8 +210,8 @@ def refined(grid: PrismGrid) -> PrismGrid:
 def _quarters() -> Array:
     """Return the vertices of the four triangles that halve the edges of the reference triangle.
 
-    The reference triangle has the vertices (0, 0), (1, 0) and (0, 1). The first three triangles
-    stand at these vertices, the last is the middle one. All are counterclockwise.
+    The reference triangle has the vertices (0, 0), (1, 0) and (0, 1). The first three triangles lie
+    at these vertices, the last in the middle. All are counterclockwise.
 
     Returns:
         Coordinates, shape (4, 3, 2): triangles, vertices, x and y.

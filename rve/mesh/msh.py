@@ -318,8 +318,8 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
         if is_parametric not in (0, 1) or dimension not in range(4):
             raise DamagedMeshError("with a block of nodes of an unknown kind")
         tags.append(source.sizes(count))
-        # All tags of a block come before all its coordinates. Behind the coordinates of each node
-        # may stand as many parameters as the entity has dimensions.
+        # All tags of a block come before all its coordinates. In a parametric block each node has,
+        # behind its coordinates, as many parameters as the entity has dimensions.
         width = 3 + dimension * is_parametric
         points.append(source.floats(count * width).reshape(count, width)[:, :3])
     mesh.points = np.concatenate(points)
@@ -390,8 +390,8 @@ def _read_version_2(numbers: _Source) -> MshFile:
             continue
         if run.labels.shape[1] < 2:
             raise DamagedMeshError("with elements that name no entity")
-        # Behind group and entity stand the number of an element's partitions, and these; a ghost
-        # element has them with the sign −.
+        # The labels are group, entity, the number of the element's partitions, and the partitions
+        # themselves, which are negative for a ghost element.
         partitions = np.abs(run.labels[:, 3:]).max(initial=0)
         mesh.partitions = max(mesh.partitions, int(partitions))
         for entity in map(int, np.unique(run.labels[:, 1])):
@@ -443,7 +443,7 @@ class _Run(NamedTuple):
 
 
 def _runs_of_version_2(source: _Numbers) -> Iterator[_Run]:
-    """Yield the elements of version 2, of one type and number of labels at a time.
+    """Yield the elements of version 2 in runs with one type and one number of labels.
 
     In bytes the file has such runs itself; in text, where each element stands by itself, elements
     are collected by type and number of labels.
@@ -520,8 +520,8 @@ def _with_elements(
         mesh: The mesh with its points, shape (n, 3). Its `elements` and `volumes` are changed in
             place.
         tags: Tags of the points, any whole numbers in any order, shape (n,).
-        runs: Elements by the tag of their volume and the number of their type; arrays of tags of
-            nodes, each of shape (elements, nodes of one), which are put behind one another.
+        runs: Elements by the tag of their volume and the number of their type: arrays of the tags
+            of their nodes, each of shape (elements, nodes of one), which are concatenated.
 
     Returns:
         `mesh` itself.
@@ -538,7 +538,7 @@ def _with_elements(
         raise DamagedMeshError("with two nodes of one tag")
     for key, arrays in runs.items():
         wanted = np.concatenate(arrays)
-        # A tag above all others would be looked for behind the last one, where nothing is.
+        # `searchsorted` gives the length, one too many, for a tag above all others.
         place = np.minimum(np.searchsorted(rising, wanted), max(len(rising) - 1, 0))
         if wanted.size and (not len(rising) or (rising[place] != wanted).any()):
             raise DamagedMeshError("with an element whose node is not there")

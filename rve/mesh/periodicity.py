@@ -38,8 +38,8 @@ def unknowns(points: Array) -> Ints:
     representative: Ints = np.arange(len(points))
     for axis in (0, 1):
         first, second = _partners(points, on_side[:, axis], axis)
-        # No node but a corner lies on both pairs of sides, so the pairs of the second axis do not
-        # break up those of the first.
+        # Only corners lie on both pairs of sides, so all other pairs of the first axis stay as they
+        # are when the second axis follows.
         representative[first] = representative[second] = np.minimum(first, second)
     free = ~on_side.all(axis=1)
     unknown: Ints = np.full(len(points), -1)
@@ -72,7 +72,8 @@ def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
     count = min(len(first), len(second))
     is_apart = abs(along[first[:count]] - along[second[:count]]) > SAME_PLACE
     if len(first) != len(second) or is_apart.any():
-        # The first node apart, or the first one of the longer side beyond the end of the other.
+        # The first node that is apart from its partner, or else the first extra node of the longer
+        # side.
         unpaired = int(np.argmax(np.append(is_apart, True)))
         coordinate = along[max(first, second, key=len)[unpaired]]
         side = f"x{axis + 1} = ±1 at x{2 - axis} = {coordinate:.6g}"

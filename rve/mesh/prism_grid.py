@@ -127,8 +127,8 @@ class LevelSet(FixedCell):
         """
         kinds: list[bool] = []
 
-        # `array_of_call` makes floats of what z returns. A mask of the particles would pass as
-        # zeros and ones, all in the matrix, so its type is noted before.
+        # `array_of_call` makes floats of what z returns. A mask of the particles would become zeros
+        # and ones, so no particle at all; `noted` sees the type before.
         def noted(*coordinates: Array) -> Array:
             """Return the values of z at points; note in `kinds` whether they are Booleans."""
             found = np.asarray(self.z(*coordinates))
@@ -170,11 +170,10 @@ def _sign_error(value: str) -> RefusedError:
 def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
     """Move the nodes of a planar mesh of the cell [−1, 1]² to other radii of its particle.
 
-    Nodes slide along rays from the centre: inside the particle in proportion to the radius; outside
-    so that their distance from the outline over the distance between the outline and the side of
-    the square stays. Midpoints of edges slide too, so that the layers between a large particle and
-    the side bend with it; only an edge across a diagonal of the square, where sliding has a kink,
-    stays straight, unless it lies on the outline.
+    Nodes slide along rays from the centre. Inside the particle their distance grows with the
+    radius. Outside, a node keeps its fraction of the way along its ray from the outline to the side
+    of the square. Midpoints of edges slide too, so edges bend. Only an edge across a diagonal of
+    the square, where sliding has a kink, stays straight, unless it lies on the outline.
 
     Args:
         mesh: Six-node triangles at the radius `mesh.radius`, which is positive.
@@ -202,8 +201,8 @@ def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
         scale = np.where(mesh.arc, radius * outline / distance, scale)
     points = mesh.points * scale[..., np.newaxis]
 
-    # The ends of an edge across the diagonal x = y or x = −y have x − y or x + y of either sign.
-    # The tolerance keeps edges that end on the diagonal from crossing it by round-off.
+    # An edge crosses the diagonal x = y where x − y has opposite signs at its ends, and x = −y
+    # where x + y has. The tolerance keeps edges that end on a diagonal from counting by round-off.
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
     crosses_first = (x - y).prod(axis=0) < -1e-12
     crosses_second = (x + y).prod(axis=0) < -1e-12

@@ -99,14 +99,15 @@ def triangles(
         gradings.append(bend_grading(outline, radius, refinement))
 
     def min_size(x: float, y: float) -> float:
-        """Return the shortest edge length that a grading wants at a point, or `size` if less."""
+        """Return the shortest of `size` and the edge lengths of the gradings at a point."""
         return size * min(1.0, min(grading(x, y) for grading in gradings))
 
     sizes = min_size if gradings else None
     generate = partial(gmsh_triangles, size, radius, outline, sizes)
 
-    # The key of the cache is all that Gmsh is given: the numbers, the outline at the points of its
-    # spline, its bends, this file, and the version of Gmsh. The function itself cannot be hashed.
+    # The key of the cache stands for all that Gmsh is given: the numbers, the outline at the points
+    # of its spline, its bends, this file, and the version of Gmsh. `outline` is a function and
+    # cannot be hashed, so its values are.
     angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
     numbers = np.array([size, radius, near_particle, refinement, *extents(outline)])
     points, bends = bend_radii(outline)
@@ -265,10 +266,9 @@ def _square_loop(geo: Any, size: float) -> int:
 def _spline_steps(outline: Outline) -> int:
     """Return the number of steps of the spline through each quarter of an outline, a multiple of 4.
 
-    It is 4 ⌈q⌉, at least 16 and at most 128, with q the largest ratio on the outline of the
-    distance from the centre and the bend radius. So there are about four steps for a radian by
-    which the outline turns, which keeps lobes apart. Vertices are put on the outline itself
-    afterwards.
+    It is 4 ⌈q⌉, at least 16 and at most 128. q is the largest value on the outline of the distance
+    from the centre over the bend radius. So there are about four steps for each radian by which the
+    outline turns, which keeps lobes apart.
 
     Args:
         outline: Distance of the edge over the radius, as a function of the polar angle in radians.
@@ -360,10 +360,10 @@ def particle_grading(outline: Outline, radius: float) -> Sizes:
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     """Return a function of x1 and x2 that shortens edges where an outline bends.
 
-    The function gives the wanted edge length over the nominal one. It is 1.4 / `refinement` times
-    the smallest sum of the bend radius of a point of the outline and the distance from it, over 720
-    points of the outline. So it is the same everywhere on a circle and grows with the distance from
-    it. It may exceed 1.
+    The function gives the wanted edge length over the nominal one, which may exceed 1. It is 1.4 /
+    `refinement` times the smallest sum of two lengths over 720 points of the outline: the bend
+    radius there, and the distance of (x1, x2) from there. So edges grow with the distance from the
+    outline.
 
     Args:
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle.

@@ -72,7 +72,7 @@ class CellFields:
             point_data=fine._point_fields(),
             cell_data={"phase": [fine.phase]},
         )
-        # XDMF else keeps its arrays in a second file, in HDF5, which takes the package h5py.
+        # By default XDMF keeps its arrays in a second file in HDF5, which needs the package h5py.
         options = {"data_format": "XML"} if kind == "xdmf" else {}
         meshio.write(path, mesh, file_format=kind, **options)
         return len(fine.points)
@@ -118,9 +118,10 @@ class CellFields:
 
         Returns:
             New fields whose `cells` are the ten nodes of each tetrahedron in VTK's order, shape (3
-            m, 10), three after another for each of the m prisms. The centres of the prisms' sides,
-            where diagonals of the division have their midpoints, come last among the points. Their
-            coordinates and values are interpolated as in the prism, and their `node` is −1.
+            m, 10) for m prisms. The three tetrahedra of a prism follow one another. The centres of
+            the prisms' sides become new points, the last ones, since the division has diagonals
+            with their midpoints there. Their coordinates and values are interpolated in the prism,
+            and their `node` is −1.
         """
         # `SIDES` has the four corners and then the four edge midpoints of each of the three
         # rectangular sides. Sides that two prisms share get one number, by their corners.
@@ -129,8 +130,9 @@ class CellFields:
         _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
         nodes = np.column_stack([self.cells, len(self.points) + number.reshape(-1, 3)])
 
-        # Diagonals rise from the smaller to the larger number of the mesh's nodes, so that both
-        # prisms of a side have the same one.
+        # A diagonal rises from the column with the smaller node number to the one with the larger,
+        # so that both prisms of a side have the same diagonal. `_tetrahedra_nodes` gives the nodes
+        # of the three tetrahedra, shape (3, 10).
         columns = np.argsort(self.node[self.cells[:, :3]], axis=1)
         cells = np.empty((len(nodes), 3, 10), int)
         for order in permutations(range(3)):
@@ -181,15 +183,14 @@ def _tetrahedra_nodes(columns: tuple[int, ...]) -> Ints:
     counterclockwise seen from the fourth, and the midpoints of the edges 01, 12, 20, 03, 13, 23.
 
     Args:
-        columns: Vertical edges of the prism, a permutation of 0, 1, 2, in the order in which the
-            diagonals of the sides rise: from the lower end of an earlier edge to the upper end of a
-            later one.
+        columns: The vertical edges 0, 1, 2 in some order. The diagonal of each side rises from the
+            lower end of the edge that comes earlier to the upper end of the later one.
     """
     edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # of Basix
     midpoints = {frozenset(edge): 6 + number for number, edge in enumerate(edges)}
     for number, side in enumerate(SIDES):
-        # Both diagonals of a side, between its corners 0 and 3 and 1 and 2, have their midpoint in
-        # its centre.
+        # A side has its corners first. One diagonal joins its corners 0 and 3, the other 1 and 2.
+        # The midpoint of both is the centre of the side.
         midpoints[frozenset((int(side[0]), int(side[3])))] = 15 + number
         midpoints[frozenset((int(side[1]), int(side[2])))] = 15 + number
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])

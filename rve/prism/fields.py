@@ -30,8 +30,8 @@ def solved_fields(
         options: PETSc's options of the linear solver.
 
     Returns:
-        Total displacements in halves of the cell's side and stresses in Pa for each load at the
-        nodes; nodes where phases meet stand once for each phase.
+        Total displacements in halves of the cell's side and stresses in Pa at the nodes, for each
+        load. A node where phases meet stands once for each of them.
 
     Raises:
         ConvergenceError: The linear solver did not reach its tolerance.
@@ -65,8 +65,8 @@ def fields_of_solution(
         load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
 
     Returns:
-        Total displacements in halves of the cell's side, and stresses in Pa as means over the
-        prisms of one phase that meet in a node, for the one load.
+        Total displacements in halves of the cell's side and stresses in Pa at the nodes, for the
+        one load. A stress is the mean over the prisms of one phase that meet in the node.
 
     Raises:
         RefusedError: The names in `stress` are not exactly those of the phases, or an expression
@@ -78,8 +78,8 @@ def fields_of_solution(
         shape = expression.ufl_shape
         require(shape == (3,), f"shape of the stress of {name}", shape, "(3,): σ11, σ22, σ12")
     phase = phase_at_nodes(problem)
-    # Every law is evaluated in all prisms, since a level set may cut a prism; shape (phases,
-    # prisms, 15, 3). Of these the law of the phase at each node is taken.
+    # Every phase's stress is evaluated in all prisms, since a level set may cut a prism; shape
+    # (phases, prisms, 15, 3). Then the stress of the phase at each node is taken.
     of_phases = np.stack([_at_nodes_of_prisms(problem, stress[name]) for name in names])
     prism, node = np.indices(phase.shape)
     values = of_phases[phase, prism, node][..., np.newaxis]
@@ -90,8 +90,8 @@ def fields_of_solution(
 def phase_at_nodes(problem: PrismProblem) -> Ints:
     """Return the index of the phase at each node of this rank's prisms, shape (prisms, 15).
 
-    It is the phase of the prism, or for a level set z(x1, x2, θ) the inclusion (1) where z < 0 at
-    the node and the matrix (0) elsewhere (eq. 14).
+    It is the phase of the prism. For a level set z(x1, x2, θ) it is 1 (inclusion) at nodes with z <
+    0 and 0 (matrix) at all others (eq. 14).
 
     Args:
         problem: The cell, moved to its radius map or level set.
@@ -142,7 +142,7 @@ def nodal_fields(
     displacement = np.empty((grid.nodes, 2, len(loads)))
     displacement[problem.node] = fluctuation + uniform
 
-    # Each node has one point for each phase that meets there, since stresses jump between phases.
+    # A point is a pair of a phase and a node, numbered phase · nodes + node.
     point_keys = grid.cells[problem.wedge] + phase * grid.nodes
     points, cells = np.unique(point_keys, return_inverse=True)
     cells = cells.reshape(point_keys.shape)

@@ -403,17 +403,15 @@ def prism_result(
         solved: Mean strains of the phases on each slice of θ under each load, and what the solver
             did.
         phases: Materials, in the order of those of `solved`.
-        loads: Macroscopic strains (ε11, ε22, 2 ε12): two of shape (2, 3), of which the first
-            stretches both axes and the second shears; or three, shape (3, 3), which give the whole
-            plane stiffness.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), a row each, in this order: (s, s, 0), (0, 0, 2
+            s) and, for the whole plane stiffness, (s, −s, 0). Shape (2, 3) or (3, 3).
         options: Options of the linear solver, for its name.
 
     Returns:
-        Stress over θ (σ11 under the first load, σ12 under the second, and the stiffness (3, 3) at
-        each θ for three loads), strain energies by phase without errors, and `checks`: relative
-        violations of the Hill-Mandel condition, of symmetry and of the bounds of Reuss, Voigt and
-        Hashin-Shtrikman, and the residual of the solver. They are measured here and compared with
-        no limit.
+        Stress over θ: σ11 under the first load, σ12 under the second, and for three loads the
+        stiffness (3, 3) at each θ. Strain energies by phase, whose errors are NaN. And `checks`:
+        relative violations of the Hill-Mandel condition, of symmetry and of the bounds of Reuss,
+        Voigt and Hashin-Shtrikman, and the residual of the solver. No limit is applied here.
 
     Raises:
         numpy.linalg.LinAlgError: Three loads are linearly dependent.
@@ -421,7 +419,8 @@ def prism_result(
     strains = solved.strains
     stiffness = [phase.stiffness for phase in phases]
     stress = strains.stress(stiffness)
-    # Columns of `stress` and rows of `loads` are load cases: Σ = C Lᵀ, so C = Σ L⁻ᵀ at each θ.
+    # `stress` has the shape (θ, component, load). With Σ its matrix at a θ and L = `loads`, Σ = C
+    # Lᵀ, so C = Σ L⁻ᵀ.
     stiffness_by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
     curve = StressCurve(
         strains.theta,
@@ -432,8 +431,9 @@ def prism_result(
         error=solved.curve_error,
     )
 
-    # By Hill and Mandel's lemma the work of mean stress in mean strain is the mean energy. Both are
-    # computed by other sums, so that a wrong constraint or weight shows.
+    # By Hill and Mandel's lemma the work of mean stress in mean strain is the mean energy, for each
+    # pair of loads; both have the shape (loads, loads). They come from different sums, so that a
+    # wrong constraint or weight shows.
     work = loads @ mean(strains.weights, stress)
     energy = total_energy(strains.products, stiffness)
     checks = {"hill_mandel": float(abs(work.T - energy).max() / abs(energy).max())}
@@ -457,7 +457,7 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
 
     It is the multipole series for a circle of isotropic phases, and triangles of order 4 at single
     θ ("slices") for all others. The accuracy of the series (1e-9) and the number of nodes in θ of
-    the slices (14) are chosen so that the reference's own error, which is added, hardly counts.
+    the slices (14) are chosen so that the reference's own error hardly counts.
 
     Args:
         cell: Two phases, the radius map and the outline of the particle.
@@ -481,27 +481,27 @@ def with_distance(
 ) -> HomogenisedStiffness:
     """Return a copy of a result with declared errors: its distance from a more accurate one.
 
-    With the ratio q of a modulus and the reference's, the distance is d = max(q, 1/q) − 1, and the
-    declared relative error is (1 + safety · d) (1 + e) − 1 with the error e that the reference
-    declares itself, or 0 if it declares none. The moduli are C11 + C12, C11 − C12 and C33. Where
-    C11 and C22 differ, the largest distance along both axes counts. A modulus that was not computed
-    has the error NaN.
+    The moduli are C11 + C12, C11 − C12 and C33. With q a modulus over the same one of the
+    reference, its distance is d = max(q, 1/q) − 1. Its declared relative error is (1 + safety · d)
+    (1 + e) − 1, where e is the error that the reference declares, or 0 if it declares none. Where
+    C11 and C22 differ, the larger distance of both axes counts. A modulus that was not computed has
+    the error NaN.
 
     Args:
         result: Result with two or three loads.
-        reference: More accurate result with three loads, or with as many as `result`.
+        reference: More accurate result with three loads.
         safety: Factor of the distance, 1 or more where the reference has an error of similar size.
 
     Returns:
-        The result with `errors` = {"space": shape (3,)}, and with absolute errors of its energies:
-        the largest distance of any energy of the same modulus times `safety`, plus the reference's
-        error. Energies stay as they are where one of both has none.
+        The result with `errors` = {"space": array of shape (3,)}. If both results have energies, it
+        also has their absolute errors: for each modulus `safety` times the largest distance of any
+        energy in it, plus the reference's error if it declares one.
     """
     moduli = _mean_moduli(result.curve)
     reference_moduli = _mean_moduli(reference.curve)
     if len(moduli) == 1:
-        # Two loads give σ11 alone, so the modulus is that with C11: the second row of the
-        # reference's three, which are with the mean of C11 and C22, with C11, and with C22.
+        # Two loads give C11 and no C22. The reference's three rows of moduli have the mean of C11
+        # and C22, C11, and C22 in this order, so the second one is compared.
         reference_moduli = reference_moduli[1:2]
     ratios = moduli / reference_moduli
     distance = (np.maximum(ratios, 1 / ratios) - 1).max(axis=0)  # nan where not computed
@@ -509,8 +509,8 @@ def with_distance(
     error = np.asarray((1 + safety * distance) * (1 + reference_errors) - 1)
     energies = result.energies
     if energies is not None and reference.energies is not None:
-        # What one phase gains of the energy another loses, so that the distance of one of them can
-        # be small by chance: the largest distance counts for all.
+        # An energy of one phase can be near the reference by chance, though others are not: the
+        # largest distance over the phases and over K and G counts for all.
         distances = abs(energies.values - reference.energies.values)
         largest = distances.max(axis=(0, 1), keepdims=True)
         energy_errors = safety * np.broadcast_to(largest, energies.values.shape)
@@ -527,9 +527,9 @@ def _mean_moduli(curve: StressCurve) -> Array:
         curve: Stress over θ under two loads, or the whole stiffness over θ from three loads.
 
     Returns:
-        Of three loads shape (3, 3): with the mean of C11 and C22 in the first row, with C11 in the
-        second and with C22 in the third. Of two loads shape (1, 3), with C11, and NaN for C11 −
-        C12, which a stretch of both axes and a shear do not tell.
+        For three loads shape (3, 3): the first row takes the mean of C11 and C22, the second C11,
+        and the third C22 in the place of C11. For two loads shape (1, 3) with C11. C11 − C12 is
+        then NaN, since a stretch of both axes and a shear do not give it.
     """
     if curve.stiffness is None:
         s11, s12 = curve.mean

@@ -88,8 +88,8 @@ class SliceStrains:
         """
         for phase in range(len(areas)):
             phase_areas: Array = areas[phase]
-            # Each triangle lies in one phase, unless a level set cuts it. So the products are taken
-            # once for each triangle and not once for each phase.
+            # Only triangles with a part in this phase are used. Most triangles lie in one phase, so
+            # they are used once and not once for each phase.
             has_phase = phase_areas.any(axis=1)
             points = strain[has_phase]
             weights = phase_areas[has_phase]
@@ -299,7 +299,7 @@ class PrismProblem:
         density = positive_density(distribution, self._rule.nodes).reshape(-1, SLICES_PER_LAYER)
         self.density.x.array[:] = np.repeat(density[self.layer], POINTS_PER_SLICE)
 
-        # det J of a prism is that of its slice times the height of its layer.
+        # det J of a prism is the determinant of its slice times the height of its layer.
         determinants = self._strains.determinants().reshape(len(self.wedge), SLICES_PER_LAYER, -1)
         heights = np.diff(levels)[self.layer, np.newaxis, np.newaxis]
         self.areas: Array = determinants / heights * slice_weights()
@@ -324,7 +324,7 @@ class PrismProblem:
         shapes: Array = wedge(1).tabulate(0, points)[0].reshape(-1, 15)
         nodes = positions[self.grid.cells[self.wedge]]
         values = level_set.values(np.einsum("qn,cnd->cqd", shapes, nodes))
-        # A rank may have no prisms, or those of one phase alone.
+        # A rank may have no prisms, or prisms of one phase alone.
         lowest = self.comm.allreduce(float(values.min(initial=np.inf)), MPI.MIN)
         highest = self.comm.allreduce(float(values.max(initial=-np.inf)), MPI.MAX)
         level_set.require_both_signs(lowest, highest)

@@ -142,9 +142,8 @@ class ProductSpace:
         """Return a form compiled by DOLFINx, after a check; it is kept for the next call.
 
         A kept form uses the values that its coefficients have when it is assembled, not the values
-        of this call. The check is needed since DOLFINx assembles by the number of the form's
-        arguments (test and trial functions) and by their spaces without looking, and would write
-        beyond its arrays.
+        of this call. DOLFINx does not check the number of the form's arguments (test and trial
+        functions) nor their spaces when it assembles, and would write beyond its arrays.
 
         Args:
             form: Form of the user.
@@ -210,7 +209,7 @@ def _separate_problem(
             density that is zero at a quadrature point; or the mesh of the model does not follow the
             particles, as that of a level set.
     """
-    # Phases of a level set are those of points, while measures are those of whole prisms.
+    # A level set gives phases to points, while `dx` of a phase covers whole prisms.
     require(
         isinstance(model, PrismModel | MeshModel),
         "model",

@@ -317,8 +317,8 @@ class SliceProblem:
     def solver(self, options: SolverOptions, matrix: PETSc.Mat, *, loads: int) -> PETSc.KSP:
         """Return PETSc's solver of an assembled stiffness for some loads at once.
 
-        A solver that was made before for the same grid and options can no longer be used, since
-        both have the same preconditioner, which is factorised anew.
+        The preconditioner is shared by all solvers for the same grid and options, and is factorised
+        anew here. So a solver that was made before can no longer be used.
 
         Args:
             options: PETSc's options, the ones of the default solver included.
@@ -335,8 +335,9 @@ class SliceProblem:
         ksp = krylov_solver(
             repeated(matrix, loads), options, lambda: preconditioner.set_up(law, blocks)
         )
-        # The tolerance becomes that of each load. All loads have norm 1, so that for the residual r
-        # of n loads together |r_j| ≤ |r| ≤ (rtol / √n) · √n = rtol.
+        # The tolerance rtol must hold for each load j of n that are solved together. Each load has
+        # norm 1, all together √n. So with rtol / √n the residual is |r_j| ≤ |r| ≤ (rtol / √n) · √n
+        # = rtol.
         ksp.setTolerances(rtol=ksp.getTolerances()[0] / loads**0.5)
         return ksp
 

@@ -138,9 +138,9 @@ class PlaneCell:
             phases: Materials: matrix, particle.
 
         Returns:
-            Stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3). And the parts X ∂c/∂X of
-            the bulk modulus X = K and the shear modulus X = G of each phase in the moduli c = C11 +
-            C12, C11 − C12, C33 of the cell, shape (phases, 2, 3).
+            Stiffness in Voigt order (11, 22, 12 with 2 ε12), shape (3, 3). And the energies X
+            ∂c/∂X, shape (phases, 2, 3): for X the bulk modulus K and the shear modulus G of each
+            phase, and for c the moduli C11 + C12, C11 − C12 and C33 of the cell.
 
         Raises:
             ConvergenceError: The linear system was not solved.
@@ -364,7 +364,9 @@ def _mean_of_slices(
     # The error of a mean is at most the mean of the absolute errors: the weights are positive.
     space_errors = rule.mean(absolute_errors[nodes]) / mean
     if cell.square:
-        # C11 and C22 differ by the mesh alone. s11 has C11, and the moduli have their mean.
+        # In a cell with the symmetry of a square C11 and C22 differ only by the error of the mesh.
+        # The curve's s11 comes from C11 and the moduli from the mean of both, so their relative
+        # distance is added.
         space_errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
     theta_errors = theta_error(cell, rule, radii=radii, moduli=moduli)
     energies = np.array([one.energies for one in slices])
@@ -385,7 +387,7 @@ def _radius_of_nodes(cell: Cell, rule: ThetaRule, radii: Array) -> Ints:
 
 
 def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array) -> PhaseEnergies:
-    """Return mean energies of the phases over θ with their declared errors.
+    """Return the mean over θ of the phases' energies X ∂c/∂X, with declared errors.
 
     Args:
         cell: Phases, radius map and outline.
@@ -406,9 +408,9 @@ def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array
 
     values = energies[:, 0]
     errors = energies[:, 1]
-    # `theta_error` takes moduli, which are positive, but the energies X ∂c/∂X may change sign. The
-    # sum c + X ∂c/∂X is to first order the modulus with a stiffer phase, so that the error of an
-    # energy is at most that of this sum and that of c.
+    # `theta_error` needs positive moduli, but an energy X ∂c/∂X may change sign. The sum c + X
+    # ∂c/∂X is to first order the modulus with a stiffer phase, so it is positive. The energy is
+    # this sum less c, so its error is at most the sum of their errors.
     moduli = values.sum(axis=(1, 2))
     theta_errors = np.empty(values.shape[1:])
     for part in np.ndindex(theta_errors.shape[:2]):
@@ -420,20 +422,21 @@ def _mean_energies(cell: Cell, rule: ThetaRule, *, radii: Array, energies: Array
 def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> Array:
     """Return the declared relative errors of the mean of three moduli by a rule in θ, shape (3,).
 
-    The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
-    particles or an incompressible matrix make the modulus itself steep. Its weighted least-squares
-    polynomials of several degrees are averaged by a rule of 128 nodes. The error is the largest
-    distance of these means from that by `rule`, times a tuned safety factor, so it is an estimate.
+    It is an estimate. The modulus is divided by the modulus of Mori and Tanaka, and the logarithm
+    of this ratio, which is smooth in √(1 − r²), is fitted by polynomials of several degrees. Each
+    fit gives the modulus at 128 nodes in θ, and so a mean. The error is the largest relative
+    distance of these means from the mean by `rule`, times a tuned safety factor.
 
     Args:
         cell: Phases and radius map.
         rule: Nodes and weights in θ of the mean that is judged.
-        radii: Radii of the slices, rising, inside (0, 1), shape (m,): those of the nodes and the
-            two extreme ones, at least one.
+        radii: Radii of the slices, rising, inside (0, 1), shape (m,): the radii at the nodes, and
+            the smallest and the largest radius of the map.
         moduli: C11 + C12, C11 − C12 and C33 at `radii`, or others that behave like them, positive,
             shape (m, 3).
     """
-    # Radii that are no node of the rule have a small weight, so that fits do not leave them.
+    # A radius weighs as much as its nodes. The extreme radii, which are at no node, get a small
+    # weight, so that fits stay near them.
     nodes = _radius_of_nodes(cell, rule, radii)
     weights = np.maximum(np.bincount(nodes, rule.weights, minlength=radii.size), 1e-6)
     root = np.sqrt(weights)[:, np.newaxis]
@@ -457,8 +460,8 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
     half_width = max(np.ptp(x), 1e-12) / 2  # not 0 where all radii are equal
     mean = rule.weights @ moduli[nodes]
 
-    # From a degree that leaves some freedom up to that of the interpolating polynomial, one less
-    # than the number of radii. The limits of both, 9 and 14, are tuned.
+    # The degrees go from three below the interpolating polynomial, whose degree is one less than
+    # the number of radii, up to it; but the first is at most 9 and the last at most 14, both tuned.
     first_degree = min(max(0, radii.size - 4), 9)
     stop_degree = min(radii.size, 15)
     distances = []

@@ -76,8 +76,8 @@ class CellForm:
     def load(self, uniform: Array) -> Array:
         """Return the forces of a macroscopic strain on this rank's nodes, shape (2 nodes,).
 
-        They are the right-hand side −∫ f_Θ C ε̄ : ε(v) of eq. 7 for each nodal displacement v: two
-        entries after another for each node. The stiffness C is the one that is set.
+        They are the right-hand side −∫ f_Θ C ε̄ : ε(v) of eq. 7 for each nodal displacement v; the
+        two entries of a node follow one another. The stiffness C is the one that is set.
 
         Args:
             uniform: Macroscopic strain ε̄ = (ε11, ε22, 2 ε12), shape (3,).
@@ -126,8 +126,8 @@ def strain_products(strains: Array, weights: Array) -> Array:
         weights: Quadrature weights of the points in each phase, shape (phases, n).
 
     Returns:
-        Products, shape (phases, 3, fields, 3, fields): components of ε_a, a, components of ε_b, b.
-        Without points they are zero.
+        Integrals, shape (phases, 3, fields, 3, fields). The axes are phase, component of ε_a, a,
+        component of ε_b, b. Without points they are zero.
     """
     fields = strains.shape[-1]
     flat = strains.reshape(-1, 3 * fields)
@@ -139,8 +139,8 @@ def total_energy(products: Array, stiffness: Sequence[Array]) -> Array:
     """Return the mean of σ_a : ε_b over all phases for all pairs of fields, in Pa.
 
     Args:
-        products: Means of products of two strains, shape (phases, 3, fields, 3, fields), with
-            components (11, 22, 12 with 2 ε12) of ε_a, a, components of ε_b, b.
+        products: Means of ε_a ⊗ ε_b, shape (phases, 3, fields, 3, fields). The axes are phase,
+            component (11, 22, 12 with 2 ε12) of ε_a, a, component of ε_b, b.
         stiffness: Stiffness of each phase in the same order of components, (3, 3), in Pa.
 
     Returns:
@@ -156,22 +156,23 @@ def energies_by_phase(products: Array, phases: Sequence[AnyPhase], loads: Array)
     where C_X is what the bulk modulus K or the shear modulus G gives to the stiffness of its phase.
 
     Args:
-        products: Means of products of two strains, shape (phases, 3, loads, 3, loads), under the
-            loads: components of ε_a, a, components of ε_b, b.
+        products: Means of ε_a ⊗ ε_b under the loads a and b, shape (phases, 3, loads, 3, loads).
+            The axes are phase, component of ε_a, a, component of ε_b, b.
         phases: Materials, in the order of the first axis of `products`. A phase with any stiffness
             has all its energy in the place of G.
         loads: Macroscopic strains (ε11, ε22, 2 ε12): (s, s, 0), (0, 0, 2 s) and, if there are
             three, (s, −s, 0), for any s; shape (2 or 3, 3).
 
     Returns:
-        Energies, shape (phases, 2 for K and G, 3), in Pa, in C11 + C12, C11 − C12 and C33; NaN for
-        C11 − C12 without the third load.
+        Energies in Pa, shape (phases, 2, 3): of K and G, in C11 + C12, C11 − C12 and C33. Those in
+        C11 − C12 are NaN without the third load.
     """
     parts = np.array([phase.stiffness_parts for phase in phases])
     energies = np.einsum("pxij,piaja->pxa", parts, products)
     moduli = np.full((len(phases), 2, 3), np.nan)
-    # The loads give C11 + C12, C33 and C11 − C12 in this order. The energy of (s, s, 0) is
-    # 2 s² (C11 + C12), and |load|² is 2 s²; so for the other two, as (2 s)² C33 and 4 s².
+    # The loads give C11 + C12, C33 and C11 − C12 in this order. Energy over |load|² is the modulus:
+    # 2 s² (C11 + C12) over 2 s² for (s, s, 0), 4 s² C33 over 4 s² for (0, 0, 2 s), and 2 s² (C11 −
+    # C12) over 2 s² for (s, −s, 0).
     columns = [0, 2, 1][: len(loads)]
     moduli[..., columns] = energies / (loads**2).sum(axis=1)
     return moduli

@@ -35,12 +35,12 @@ class SolverOptions:
 
     @property
     def all(self) -> dict[str, str]:
-        """Everything that is put to PETSc: values of options by their names without prefix.
+        """Values of all options that PETSc is given, by their names without prefix.
 
         The default solver (conjugate gradients to a relative residual of 1e-8, preconditioned along
-        θ) is overridden by the environment, and both by `overrides`. Options that print get
-        standard error as their value if they have none. Unless something else is said, iterations
-        end at 500 with the preconditioner along θ, and at 5000 with others.
+        θ) is overridden by the environment, and both by `overrides`. Options that print and have no
+        value get standard error as their value. The default limit of iterations is 500 with the
+        preconditioner along θ, and 5000 with others.
         """
         defaults = {
             "ksp_type": "cg",
@@ -80,7 +80,7 @@ class SolverOptions:
 def require_petsc(petsc: object) -> None:
     """Raise unless `petsc` is a mapping of PETSc's options by their names without dash and prefix.
 
-    Values are not looked at, and whether PETSc knows the names turns out when it is set up.
+    Values are not checked, nor whether PETSc knows the names.
 
     Raises:
         RefusedError: It is no mapping, or a name begins with a dash or with `rve_`. For a command
@@ -167,18 +167,19 @@ def solve(
 ) -> Solutions:
     """Solve K x = f for each load f.
 
-    Where the vectors of the solver are n times as long as a load, n loads are solved at once:
-    divided by their norms, they stand one after another in a vector. A load of zeros has the
-    solution zero.
+    Where the vectors of the solver are n times as long as a load, n loads are solved at once. They
+    stand one after another in a vector, each divided by its norm (by 1 if it is zero).
 
     Args:
-        ksp: Solver of K, or of n times K. Its choice between a zero and another first guess is set.
+        ksp: Solver of K, or of the block-diagonal matrix of n times K. Whether it starts from zero
+            or from a guess is set in it.
         loads: Right-hand sides f, at least one; their number is a multiple of n.
         guesses: First guess of each solution; zero if not given.
 
     Returns:
         A new vector for each load, the iterations for each load, and the largest |K x − f| / |f|,
-        computed anew from the solutions; of n loads at once it is the root of the sum of squares.
+        computed anew from the solutions. For n loads at once it is the root of the sum of their
+        squares.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
@@ -247,7 +248,8 @@ def _split(
 def in_database(options: SolverOptions) -> Iterator[None]:
     """Put the options into PETSc's database for a `with` block, and restore it at the block's end.
 
-    Options that the environment gave stay there, unless an override has their place meanwhile.
+    Options of the environment stay in the database, but in the block an override replaces its
+    namesake.
 
     Args:
         options: The default solver, the options of the environment, and the overrides.

@@ -65,8 +65,8 @@ class LayerConstraint:
                 0, of the mid-level above it, of level 1, and so on. At least one field.
 
         Returns:
-            Displacements, shape (fields, layers, 2 nodes), with both components of a node after one
-            another.
+            Displacements, shape (fields, layers, 2 nodes); the two components of a node are
+            adjacent.
         """
         # The unknowns of a layer follow one another, and those of the level above it are also the
         # first ones of the next layer: x_k are overlapping windows of x.
@@ -82,8 +82,8 @@ class LayerConstraint:
         displacements of DOLFINx's nodes on its slices.
 
         Args:
-            on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes), with both
-                components of a node after one another.
+            on_slices: Forces f_k on DOLFINx's nodes, shape (fields, layers, 2 nodes); the two
+                components of a node are adjacent.
 
         Returns:
             Forces on the unknowns level by level, shape (fields, unknowns).
@@ -119,9 +119,9 @@ class BlockSum:
     def of_parents(cls, pattern: sp.bsr_matrix, parents: Ints) -> BlockSum:
         """Prepare the product Bᵀ A B, for a matrix B of zeros and ones.
 
-        B has a one from each parent of a node to that node. A couples nodes, Bᵀ A B couples
-        parents. Each of its blocks is the sum of the blocks of A between all nodes with these two
-        parents.
+        Rows of B are nodes, columns are parents, and a one stands where a node depends on a parent.
+        A couples nodes, Bᵀ A B couples parents. A block of Bᵀ A B is the sum of the blocks of A
+        between all nodes that depend on these two parents.
 
         Args:
             pattern: Sparsity pattern of A in blocks of 2 × 2; its values are not used.
@@ -272,9 +272,10 @@ class LayerMatrix:
 def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
     """Return the matrix from nodal values of a layer of prisms to nodal values on its slices.
 
-    Along ζ a field is linear between the two levels, plus 4 ζ (1 − ζ) times what the value at the
-    mid-level differs from their mean. The mid-level has values at the vertices of the triangles
-    alone; at midpoints of edges they are the mean of the ends.
+    At the height ζ the value is (1 − ζ) below + ζ above + 4 ζ (1 − ζ) (middle − (below + above) /
+    2), with the values on the level below, the level above and the mid-level. At a midpoint of an
+    edge the last factor is the mean of its values at the two ends, since the mid-level has values
+    at vertices alone.
 
     Args:
         plane: The plane mesh of six-node triangles, its vertices numbered first.
@@ -298,11 +299,12 @@ def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
 
 
 def _periodicity(numbering: LevelNumbering) -> sp.csr_matrix:
-    """Return the matrix of ones from the pairs of unknowns of a layer to the nodes of its prisms.
+    """Return the matrix of zeros and ones from the pairs of unknowns of a layer to its nodes.
 
     Args:
-        numbering: Numbers of the pairs of unknowns of a plane, the same for periodic partners and
-            −1 where a node is held, and the sizes of a level and of a mid-level.
+        numbering: `planar`, the number of the pair of unknowns (two displacements) of each node of
+            a plane, the same for periodic partners and −1 where a node is held; and the numbers of
+            unknowns of a level (`level_size`) and of a level with its mid-level (`stride`).
 
     Returns:
         Sparse matrix. Rows are the nodes of the level below, the vertices of the mid-level and the
@@ -332,8 +334,8 @@ def _scalar_pattern(pattern: sp.bsr_matrix) -> sp.csr_matrix:
         pattern: Matrix of blocks; its values are not used.
 
     Returns:
-        Matrix whose values are no entries but places: where each entry stands in the array of all
-        blocks, of shape (blocks, 2, 2), read in the order of C.
+        Matrix whose values are places: the index of each entry in the flattened array of all
+        blocks, which has the shape (blocks, 2, 2).
     """
     places = np.arange(pattern.data.size).reshape(-1, 2, 2)
     blocks = sp.bsr_matrix((places, pattern.indices, pattern.indptr), pattern.shape)

@@ -96,13 +96,13 @@ class Elimination:
         return matrix
 
     def forces(self, values: Array) -> PETSc.Vec:
-        """Return the reduced forces Pᵀ f: forces on periodic partners and of ranks are added.
+        """Return the reduced forces Pᵀ f, added up over periodic partners and over ranks.
 
         The matrix P leads from the unknowns to the displacements of nodes. All ranks must call.
 
         Args:
-            values: Forces on this rank's nodes, shape (2 nodes,), with both components of a node
-                after one another. Forces on held nodes are left out.
+            values: Forces on this rank's nodes, shape (2 nodes,); the two components of a node are
+                adjacent. Forces on held nodes are left out.
         """
         vector = PETSc.Vec().createMPI(
             self._local_and_global_size, bsize=2, comm=self._local_to_global.comm
@@ -194,8 +194,8 @@ class LevelNumbering:
     def nodal_values(self) -> sp.csr_matrix:
         """Return the matrix from coefficients of hats and bubbles along θ to nodal values.
 
-        The value on a level is its hat coefficient. That on a mid-level, half-way between two
-        levels, is its bubble coefficient and half of the hats above and below.
+        The value on a level is its hat coefficient. The value on a mid-level, half-way between two
+        levels, is its bubble coefficient plus the mean of the hats above and below.
 
         Returns:
             Square sparse matrix. Its columns are the hats of all levels, then the bubbles of all

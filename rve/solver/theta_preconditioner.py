@@ -88,7 +88,7 @@ def theta_mass(distribution: ThetaDistribution, levels: Array) -> ThetaMass:
     """
     layers = len(levels) - 1
     # Three points of Gauss in a layer are exact for products of two bubbles, of degree 4, where the
-    # density is constant. They are those of the stiffness, so that both have the same error.
+    # density is constant. The stiffness uses the same points, so that both have the same error.
     points = 3
     t = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2
     shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat and bubble of a layer
@@ -129,9 +129,10 @@ def precondition(
 ) -> Fields:
     """Apply the preconditioner to residuals in hat and bubble functions of θ.
 
-    With the masses M and G along θ, M⁻¹ M_hb = W, the injection J of linear into quadratic
-    triangles and the diagonal blocks K_k of the hats and K_b of the bubbles, over their masses, it
-    is
+    M is the mass of the hats along θ, G the mass of the bubbles made orthogonal to the hats, and W
+    = M⁻¹ M_hb the projection of bubbles on hats. J is the injection of linear into quadratic
+    triangles. K_k and K_b are the diagonal blocks of the stiffness for hats and bubbles, each
+    divided by its mass. The preconditioner is
 
         P⁻¹ = (M^-½ ⊗ 1) diag(K_k⁻¹) (M^-½ ⊗ 1) + Z J (G^-½ ⊗ 1) diag(K_b⁻¹) (G^-½ ⊗ 1) Jᵀ Zᵀ,
 
@@ -232,8 +233,8 @@ class ThetaPreconditioner:
     def _solve(self, hat_loads: Array, bubble_loads: Array) -> Fields:
         """Solve the systems of all levels and mid-levels, of which each rank solves its own.
 
-        The systems are those of the preconditioner's diagonal blocks, one for each level of θ and
-        one half-way between any two of them.
+        There is one system, a diagonal block of the preconditioner, for each level of θ and for
+        each mid-level, half-way between two levels.
 
         Args:
             hat_loads: Right-hand sides of the hats, shape (loads, levels, unknowns of a plane).
@@ -333,9 +334,9 @@ def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.cs
         Sparse matrix with sorted indices, of the unknowns of a level or, for bubbles, of those of
         its vertices.
     """
-    # A hat has half of its value on the mid-level below too. Below the first level of this rank
-    # that mid-level belongs to another rank, so that its unknowns are taken as well. The submatrix
-    # on this rank alone then has all entries of its products Tᵀ K T.
+    # The hat of a level also has values on the mid-level below it. Below the first level of this
+    # rank that mid-level belongs to another rank, so its unknowns are fetched as well. Then this
+    # rank has all entries that its products Tᵀ K T need.
     rows = numbering.rows
     first = max(0, rows.start - numbering.mid_level_size)
     size = rows.stop - first
@@ -376,8 +377,8 @@ def interpolated_vertices(numbering: LevelNumbering) -> Ints:
     """Return the two vertices whose mean each free node of a plane gets, shape (free nodes, 2).
 
     Vertices and nodes are given by the numbers of their pairs of unknowns, under which vertices
-    come first. A vertex has itself twice, a midpoint of an edge the two ends of the edge, and −1
-    stands for an end that is held.
+    come first. For a vertex both are the vertex itself. For a midpoint of an edge they are the two
+    ends of the edge, with −1 for an end that is held.
 
     Args:
         numbering: Numbers of the unknowns of a plane, with its six-node triangles.

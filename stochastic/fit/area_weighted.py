@@ -190,8 +190,8 @@ class AreaWeighted:
         )
         distances = []
         for weights in self.bootstrap_weights(number, generator):
-            # Both functions are constant between the values, and step up at the last of equal
-            # values.
+            # Both functions are constant between the values. Of equal values only the last one
+            # counts, where the step is complete.
             differences = (np.cumsum(weights) - self.cumulated)[self._is_step]
             distances.append(np.abs(differences).max())
         return float(np.quantile(distances, level))

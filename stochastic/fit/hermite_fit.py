@@ -74,7 +74,7 @@ class HermiteFit:
         if weights is not None:
             cumulated = np.minimum(np.cumsum(weights), 1.0)
         probability = np.append(0.0, cumulated)
-        # Rounding of the sum must not cut off the end of the last step.
+        # The last one is 1 but for rounding.
         probability[-1] = 1.0
 
         # The normal equations have the right-hand sides ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ for h2 and
@@ -184,11 +184,11 @@ class HermiteFit:
     def _nearest_monotone(self, best: Array) -> Array:
         """Return the slopes a2, a4 of the monotone map nearest to another map, shape (2,).
 
-        The distance is the root of the mean square over θ. With the Gram matrix L Lᵀ of the
-        functions that a2 and a4 multiply and x = Lᵀ (slopes − best), this is the shortest x with G
-        x ≥ h, a row for each of 401 even ξ in [0, 1] at which dr/dξ must be at least 2e-5 (a3 −
-        a1). It follows from a problem of non-negative least squares (least distance programming:
-        Lawson, Hanson 1974, chapter 23).
+        The distance is the root of the mean square over θ. At 401 even ξ in [0, 1] dr/dξ must be at
+        least 2e-5 (a3 − a1). With L Lᵀ the Gram matrix of the functions that a2 and a4 multiply,
+        the distance is |x| for x = Lᵀ (slopes − best), and the condition is G x ≥ h with a row for
+        each ξ. The shortest such x comes from non-negative least squares (least distance
+        programming: Lawson, Hanson 1974, chapter 23).
 
         Args:
             best: Slopes a2, a4 of the other map, which need not be monotone, shape (2,).
@@ -218,9 +218,9 @@ class SlopeBand:
     def monotone_part(self, fit: HermiteFit) -> SlopeBand:
         """Return the largest part of the band around the fitted slopes with four monotone corners.
 
-        Slopes beyond it belong to no radius map. The ends are cut at slopes from zero to three
-        times the chord's (Fritsch and Carlson 1980), and then moved towards the fitted slopes in
-        steps of 1/200 of the way, all together, until the maps at all corners rise.
+        The ends are first clipped to slopes between zero and three times the slope of the chord
+        (Fritsch and Carlson 1980). Then all ends move together towards the fitted slopes, in steps
+        of 1/200 of the way, until the maps at all four corners rise.
 
         Args:
             fit: Fit that the band belongs to; its fitted slopes give a monotone map.
@@ -332,8 +332,8 @@ class PBox:
         """
         steps = sample.steps
         distribution = self.fit.distribution
-        # The functions are inverted by a table of radii, whose spacing is about 1e-4 in
-        # probability.
+        # The p-box's functions come from a table of 20,001 radii. The largest radius gives the
+        # lower one.
         theta = np.asarray(np.linspace(distribution.lower, distribution.upper, 20_001), float)
         smallest_radius, largest_radius = self.bounds(theta)
         probability = distribution.cdf(theta)
@@ -350,17 +350,18 @@ def least_pbox(
     """Return the p-box of least area that contains a sample and the map fitted to it.
 
     The sample is of reduced radii r_n, the radius of a particle over half the side of a square or
-    cube as large as its cell. A p-box is the region between two distribution functions: here those
-    of the cubic maps r(θ) with the smallest and with the largest radii that slopes a2 and a4 in two
-    intervals (the supports) give. The supports are the solution of a linear program in their ends.
+    cube as large as its cell. The slopes a2 and a4 of a cubic map r(θ) may lie in two intervals,
+    the supports. The p-box is the region between the distribution functions of the smallest and of
+    the largest such map. A linear program gives the four ends of the supports.
 
     Args:
         fit: Ends a1 and a3 of the map, which are the limits of r_n, and distribution of θ.
         sample: Reduced radii within the limits.
         band: Half-width of the band by which the p-box may miss the sample's distribution function,
             in probability, in [0, 1).
-        required: Slopes that the supports must contain as well, as far as their maps are monotone,
-            such as their bootstrap band: where data are few, the misfit alone is little fuzzy.
+        required: Slopes that the supports must contain as well, such as their bootstrap band; its
+            part with monotone maps is used. It matters where data are few: the misfit alone then
+            gives narrow supports.
 
     Returns:
         The fit with both supports, each with the fitted slope inside. All maps at their corners
@@ -371,7 +372,8 @@ def least_pbox(
     """
     from scipy.optimize import linprog
 
-    # The supports contain the fitted slopes and the required ones.
+    # The unknowns are a2 lower, a2 upper, a4 lower and a4 upper, in this order. The supports
+    # contain the fitted slopes and the required ones.
     a2, a4 = fit.slopes(sample)
     inner_a2 = [a2]
     inner_a4 = [a4]
@@ -424,9 +426,9 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
         A of shape (inequalities, 4), for the ends x = (a2 lower, a2 upper, a4 lower, a4 upper) of
         the supports of both slopes, and b of shape (inequalities,).
     """
-    # The p-box's function of the largest radius may exceed the sample's function before a step by
-    # the band, so that its quantile at this probability is the step's value or more. Likewise the
-    # function of the smallest radius may fall below the sample's function at the step.
+    # With F the sample's distribution function: the largest radius at the probability (F before a
+    # step) + band must be the step's value or more, and the smallest radius at (F at the step) −
+    # band must be the step's value or less.
     steps = sample.steps
     rises_in_lower_edge = steps.before + band < 1
     rises_in_upper_edge = steps.at - band > 0
@@ -436,7 +438,8 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
     values = np.concatenate([steps.values[rises_in_lower_edge], steps.values[rises_in_upper_edge]])
     is_lower_edge = np.arange(len(values)) < rises_in_lower_edge.sum()
 
-    # r = a1 h1 + a2 h2 + a3 h3 + a4 h4, of which a2 h2 + a4 h4 must be above or below `remaining`.
+    # r = a1 h1 + a2 h2 + a3 h3 + a4 h4, so a2 h2 + a4 h4 must be above or below `remaining`. As h4
+    # is not positive, the largest radius has a2 upper and a4 lower.
     distribution = fit.distribution
     width = distribution.upper - distribution.lower
     xi = (distribution.quantile(probability) - distribution.lower) / width

@@ -36,7 +36,7 @@ def read_particles(
 ) -> Particles:
     r"""Read the circles of a section from a CSV file, or find them in an image of it.
 
-    Exactly one of `size` and `pixel` is given, and says which of the two the file is.
+    Give `size` with a CSV file, or `pixel` with an image, and not both.
 
     Args:
         path: CSV file with the columns ``x [mm], y [mm], r [mm]`` (or d, a diameter), where `size`
@@ -274,8 +274,8 @@ def _convexity(phase: Mask) -> float:
 def _unevenness(smooth: Array, matrix: Mask) -> float:
     """Return the range of the matrix's median grey value over 8 × 8 tiles of the image.
 
-    Pixels within 4 of particles, where smoothing mixes greys, and tiles with fewer than 64 other
-    pixels do not count. It is 0 if no tile or one is left.
+    Pixels within 4 of particles, where smoothing mixes greys, do not count, nor do tiles with fewer
+    than 64 pixels that count. With fewer than two tiles the range is 0.
 
     Args:
         smooth: Smoothed grey values, shape (rows, columns).

@@ -220,9 +220,9 @@ def _add_block(obstacles: _Obstacles, radii: Array, generator: np.random.Generat
 def _accepted_in_order(proposal: Array, radii: Array, box: Array) -> Mask:
     """Return which proposed particles overlap no earlier accepted one, shape (n,).
 
-    This is what a loop over the proposals would accept, for all proposals at once: in each round
-    those are accepted that wait for no earlier proposal, and the ones that overlap them rejected. A
-    round settles the first open proposal at least, so the loop ends.
+    This is what a loop over the proposals would accept, for all proposals at once: a round accepts
+    each open proposal that overlaps no earlier open one, and then rejects the later ones that
+    overlap it. Each round settles at least the first open proposal.
 
     Args:
         proposal: Centres in m, shape (n, d), the earliest first.
@@ -277,8 +277,8 @@ def _push(particles: Particles, growth: float) -> Particles:
 
     Args:
         particles: Particles in a periodic box, at least one, which may overlap.
-        growth: Factor of the radii, above 1, with which they repel each other. They may overlap
-            with the larger radii at the end, but not with their own.
+        growth: Factor of the radii, above 1, with which they repel each other. At the end they may
+            still overlap with the grown radii, but not with their own.
 
     Returns:
         New particles with the same radii at new places.
@@ -290,8 +290,8 @@ def _push(particles: Particles, growth: float) -> Particles:
     box = particles.size
     radii = particles.radii * growth
     centres = particles.centres
-    # Grown particles that overlap by less than what both radii grew, (growth − 1) (r_i + r_j), do
-    # not touch with their own radii. This is the smallest such sum.
+    # Two particles do not touch with their own radii if their grown radii overlap by less than the
+    # growth of both, (growth − 1) (r_i + r_j). This is the smallest such growth.
     allowed_overlap = (growth - 1) * 2 * float(particles.radii.min())
     velocity = np.zeros_like(centres)
     time_step = 0.1
@@ -381,7 +381,8 @@ def _shake(particles: Particles, generator: np.random.Generator) -> Array:
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
     centres = particles.centres
     for _ in range(n_searches):
-        # Between two searches a pair may come closer by two moves each time.
+        # In each move a pair comes closer by twice the reach at most; twice that distance is
+        # searched.
         gap = 4 * moves_per_search * reach
         first, second = close_pairs(Particles(centres, radii, box), gap)
         contact = radii[first] + radii[second]  # distance of centres that touch

@@ -94,8 +94,7 @@ def nearest_image(offset: Array, size: Array) -> Array:
 def size_classes(radii: Array) -> Iterator[Ints]:
     """Yield the indices of particles by class: radii of a class lie within a factor of two.
 
-    Radii below about 1e-6 (2⁻²⁰) of the largest one are in one class, as are all if the largest is
-    0. Each index comes once; without particles there is no class.
+    Radii below 2⁻²⁰ (about 1e-6) of the largest one are all in one class. Each index comes once.
 
     Args:
         radii: Radii, not negative, shape (n,).
@@ -103,7 +102,7 @@ def size_classes(radii: Array) -> Iterator[Ints]:
     number = np.zeros(len(radii))
     largest = radii.max(initial=0.0)
     if largest > 0:
-        # In one search of all sizes the largest radius would decide how many pairs are looked at.
+        # A single search for all sizes would look as far as the largest radius from every particle.
         number = np.floor(np.log2(np.maximum(radii, largest * 2.0**-20) / largest))
     for value in np.unique(number):
         yield np.flatnonzero(number == value)
@@ -190,8 +189,8 @@ class Pairs:
     def joined(self, other: Pairs) -> Pairs:
         """Return the pairs of both, grouped by their first disc again.
 
-        A pair is a disc, another disc or an image of it, and the vector between the centres. Those
-        of `self` come before those of `other` with the same first disc.
+        A pair is a disc, a second disc or its image, and the vector between the centres. Among the
+        pairs of one first disc those of `self` come first.
         """
         both = Pairs(
             first=np.concatenate([self.first, other.first]),
@@ -204,8 +203,8 @@ class Pairs:
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]:
     """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
-    They come in portions of three million pairs or so, which fit into memory. A disc and its own
-    images are pairs too, a disc and itself is none. In a window there are no images.
+    They come in portions of some three million pairs, which fit into memory. A disc is paired with
+    its own images too, but not with itself. In a window there are no images.
 
     Args:
         discs: The discs, at least one.
@@ -215,8 +214,8 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]
         The indices i of a portion, and its pairs, grouped by i, with the vectors between the
         centres.
     """
-    # Images as points of their own, and not a periodic tree: that one finds the nearest image of
-    # each disc alone, and cells of few large discs have walls towards several.
+    # Each image is a point of the tree. A periodic tree would find only the nearest image of each
+    # disc, but cells of few large discs have walls towards several images of one disc.
     disc_of_image, shift = _periodic_images(discs, float(reach.max()))
     tree = KDTree(discs.centres[disc_of_image] + shift)
     n_pairs = tree.query_ball_point(discs.centres, reach, return_length=True)
@@ -226,7 +225,7 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]
         counts, images = points_in_balls(tree, discs.centres[portion], reach[portion])
         first = np.repeat(portion, counts)
         second = disc_of_image[images]
-        # Computed by the centres, the pair (j, i) has exactly the negative offset.
+        # In this order of terms the pair (j, i) has exactly the negative offset.
         offset = discs.centres[second] - discs.centres[first] + shift[images]
         is_pair = (first != second) | (offset != 0).any(axis=1)
         yield portion, Pairs(first, second, offset).select(is_pair)

@@ -79,9 +79,10 @@ def apollonius(discs: Particles) -> Apollonius:
     """Return the Apollonius diagram of discs, of which none lies inside another one.
 
     The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j, in a
-    periodic box or within a window. Cells bounded by the discs nearby contain the true ones, and a
-    disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the
-    largest radius of that first cell: all such discs are then taken into account.
+    periodic box or within a window. First each cell is bounded by the discs nearby alone, which
+    gives a cell that contains the true one. With ρ_max,i its largest distance from c_i, a disc j
+    can cut it only if |c_j − c_i| < 2 ρ_max,i − r_i + r_j. The cell is then bounded by all such
+    discs.
 
     Args:
         discs: Discs in a periodic box or a window, at least one.
@@ -92,8 +93,8 @@ def apollonius(discs: Particles) -> Apollonius:
     Raises:
         FailedError: The envelope of the walls of a cell does not close.
     """
-    # The first cells are bounded by the discs within three mean spacings. With fewer discs first
-    # cells are large, and with more they take longer than they save.
+    # The first cells are bounded by the discs within three mean spacings. With fewer the second
+    # pass takes longer, with more the first.
     largest_disc = float(discs.radii.max())
     rho_max = np.zeros(len(discs))
     for walls in _walls(discs, np.full(len(discs), largest_disc + 3.0 * discs.spacing)):
@@ -118,11 +119,11 @@ def apollonius(discs: Particles) -> Apollonius:
 
 
 def _near_far(radii: Array, first: Ints, second: Ints, offset: Array) -> tuple[Array, Array]:
-    """Return d + Δ and d − Δ of pairs of discs, shape (m,) each, in m: near and far of their walls.
+    """Return near = d + Δ and far = d − Δ of pairs of discs, in m, shape (m,) each.
 
-    d is the distance of the centres, and Δ = r_first − r_second, which is 0 at an edge. Half of
-    them are the distances of the wall's nearest point from both centres. One of them is not
-    positive where one disc lies inside the other, and there is no wall.
+    d is the distance of the centres, and Δ = r_first − r_second, or 0 at an edge. near / 2 is the
+    distance of the wall's nearest point from the first centre, and far / 2 from the second. Where
+    one disc lies inside the other, one of them is not positive, and there is no wall.
 
     Args:
         radii: Radii of all discs, in m, shape (n,).
@@ -184,15 +185,15 @@ class _Walls:
     def largest_radius(self) -> Array:
         """Return an upper bound of the distance from each centre to its cell's boundary.
 
-        The boundary is farthest at a corner. The distance there is (d cosh s + Δ)/2, with d the
-        distance of the centres, Δ the difference of the radii and s the anomaly on either of the
-        two walls that meet; the wall with the smaller |s| gives it with the smaller rounding. A per
-        mille is added for rounding.
+        The boundary is farthest at a corner, where two walls meet. The distance there is (d cosh s
+        + Δ)/2, with d the distance of the centres, Δ the difference of the radii and s the anomaly
+        on one of the walls. The wall with the smaller |s| is taken, since its rounding is smaller.
+        A thousandth is added for rounding.
 
         Returns:
             Distances in m, shape (n,); 0 for discs without walls here.
         """
-        # Of each arc, the next one of the same cell; after the last one comes the first.
+        # `following` is the next arc of the same cell; after the last one comes the first.
         ends = self._arc_ends()
         owner = self.arcs.owner
         following = np.append(np.arange(1, len(owner)), 0)
@@ -291,11 +292,11 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     if discs.periodic:
         return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
 
-    # A disc beyond the window's edge, no larger than the largest one seen, cannot reach deeper into
-    # the window than that one's radius. If all beyond the edge were one such disc, the wall towards
-    # it would be a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge
-    # less the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all
-    # four edges.
+    # No disc outside is larger than the largest one inside, so none reaches deeper into the window
+    # than the largest radius R. At worst all points up to that depth are covered. The wall of a
+    # cell towards them is the parabola ρ = (D + r)/(1 + cos ψ), where D is the distance from the
+    # centre to the edge less R. So the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for
+    # all four edges.
     reach = _reach(diagram)
     largest_radius = discs.radii.max()
     inner = discs.size - 2 * largest_radius
@@ -310,7 +311,9 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     allowed = "windows in which the edge leaves a cell whole"
     require(len(disc) > 0, "size", value, allowed=allowed, cure="take a larger section")
 
-    # An equal cell counts where its reach to both sides, across and along, stays inside.
+    # p is the fraction of positions at which the reach of an equal cell stays inside: `inner` less
+    # its reach to the left and right, times the same for lower and upper, over the area of the
+    # window.
     extent = reach[disc].reshape(-1, 2, 2).sum(axis=2)
     return disc, discs.measure / (inner - extent).prod(axis=1)
 
@@ -362,8 +365,8 @@ def neighbours(discs: Particles) -> Neighbours:
     """Return the Delaunay neighbours of the disc centres.
 
     In a window the centres on the convex hull are not counted. A periodic section is triangulated
-    with a layer of images, eight mean spacings wide: its triangles are those of the plane if no
-    circumcircle is wider, as in any packing.
+    with a layer of images, eight mean spacings wide. This is right if no circumcircle is wider, as
+    in any packing.
 
     Args:
         discs: Discs in a periodic box or a window, at least one; their radii do not matter.
@@ -376,8 +379,8 @@ def neighbours(discs: Particles) -> Neighbours:
     from scipy.spatial import Delaunay, QhullError
 
     tiles = (0, 1, -1) if discs.periodic else (0,)
-    # Wider empty circles do not occur in a packing of so many discs, so that no triangle near the
-    # box has a corner beyond the layer.
+    # Wider empty circles do not occur in a packing, so no triangle near the box has a corner beyond
+    # the layer.
     layer = 8.0 * discs.spacing
     images = [discs.centres + discs.size * tile for tile in product(tiles, repeat=2)]
     points = np.concatenate(images)
@@ -402,8 +405,8 @@ def neighbours(discs: Particles) -> Neighbours:
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
     """Return pairs of values of cells that share a wall, each pair in both orders, shape (2, m).
 
-    Cells that share several walls, of different images, are one pair; a cell that meets its own
-    image is none, and walls at the edge of a window do not count.
+    Cells that share several walls, through different images, are one pair. Walls towards a cell's
+    own images and walls at the edge of a window do not count.
 
     Args:
         diagram: The cells of n discs.

@@ -115,8 +115,8 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
             arcs.
 
     Returns:
-        Arcs sorted by group and then by angle. The arcs of a group cover the circle once. Angles
-        are those of a turn from wherever it began, so that they may lie outside [−π, π].
+        Arcs sorted by group and then by angle. The arcs of a group cover the circle once. They
+        start at any angle, so that some may lie outside [−π, π].
 
     Raises:
         FailedError: A sweep around the circle does not end.
@@ -128,8 +128,9 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Ints) -> Arcs:
     pending = pending[counts[pending] > 0]
     parts = []
     while len(pending):
-        # Groups of similar size share one padded table: those up to the size of the 64th part of
-        # the pending groups, or up to two functions more than the smallest group.
+        # Groups of similar size share one padded table. Pending groups are sorted by size. Those up
+        # to `width` functions are taken: the size at the end of their first 64th, but at least two
+        # more than the smallest size.
         width = int(counts[pending[: max(1, len(pending) // 64)]][-1])
         width = max(width, int(counts[pending[0]]) + 2)
         n_fitting = int(np.searchsorted(counts[pending], width, side="right"))
@@ -213,10 +214,10 @@ def _sweep(a: Array, b: Array, c: Array, *, table: Ints, group: Ints) -> Arcs:
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Ints, Array]:
     """Return the uppermost function of each row at an angle, and how far ahead it is crossed.
 
-    The functions are a cos φ + b sin φ + c. At φ the difference g ≤ 0 of another function to the
-    uppermost one has the value −h, the slope q, the oscillating part p and the constant d. Ahead by
-    δ, with t = tan(δ/2), it is zero where (d − p) t² + 2 q t − h = 0, at the root where it rises;
-    the largest 1/t is the nearest crossing.
+    The functions are a cos φ + b sin φ + c. Another function less the uppermost one has, at φ, the
+    value −h ≤ 0 and the slope q; −h = p + d with the oscillating part p and the constant d. At φ +
+    δ, with t = tan(δ/2), this difference is zero where (d − p) t² + 2 q t − h = 0. The root where
+    it rises is taken, and of all functions the largest 1/t, which is the nearest crossing.
 
     Args:
         a: Coefficients of cos φ, shape (n, w).
@@ -235,7 +236,8 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Ints, Arra
     slope = b * cos - a * sin
     value = wave + c
 
-    # Of the functions that are uppermost but for rounding, the one that rises most is so ahead.
+    # Of the functions that are uppermost but for rounding, the one that rises most is uppermost
+    # just ahead of φ.
     scale = np.abs(a) + np.abs(b)
     top = np.argmax(value, axis=1)
     rounding = 2e-15 * (scale + scale[row, top][:, None])
@@ -248,7 +250,7 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Ints, Arra
     h = np.abs(np.minimum(p + d, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(q**2 + (d - p) * h)  # NaN where the two never meet
-        # Both forms of the root of the quadratic are equal; neither cancels where it is taken.
+        # Two equal forms of the root; each is used where its terms do not cancel.
         inverse_t = np.where(q >= 0, (q + root) / h, (d - p) / (root - q))
     is_tangent = (h == 0) & (q == 0)
     inverse_t[is_tangent] = np.where((d - p)[is_tangent] > 0, np.inf, -np.inf)

@@ -41,8 +41,7 @@ class ThetaDistribution(Protocol):
 def require_distribution(distribution: object) -> None:
     """Raise for what is no distribution of θ, such as a name or a frozen distribution of SciPy.
 
-    It must have numbers `lower` and `upper` and a function `pdf`. Whether these fit, and whether
-    there are `cdf` and `quantile`, is not looked at.
+    It must have numbers `lower` and `upper` and a function `pdf`. Nothing else is checked.
 
     Raises:
         RefusedError: One of the three is missing.
@@ -63,8 +62,8 @@ def require_distribution(distribution: object) -> None:
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     """Raise for a support of θ that is not finite, not in order, or too narrow for its rounding.
 
-    Its width must be 1e-4 of its larger end: then the rounding of θ, 1e-16 of the end, is 1e-12 of
-    the width.
+    Its width must be at least 1e-4 of its larger end. Then the rounding of θ, 1e-16 of that end, is
+    at most 1e-12 of the width.
 
     Args:
         lower: Lower end of the support.
@@ -111,8 +110,8 @@ class TruncatedNormal:
     def _below(self, theta: ArrayLike) -> Array:
         """Return the probability that the standard normal distribution gives to [lower, theta].
 
-        It is not divided by the probability of the support. It is a difference of the smaller
-        tails, which keeps its digits: far above 0 the lower tails are both nearly 1.
+        It is not divided by the probability of the support. For a support above 0 it is the
+        difference of two upper tails, since lower tails would both be nearly 1 and lose digits.
 
         Args:
             theta: Values in the support, any shape.

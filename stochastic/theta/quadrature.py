@@ -105,8 +105,8 @@ def _stieltjes_rule(distribution: ThetaDistribution, points: int) -> ThetaRule:
     Raises:
         RefusedError: The density is not the derivative of the distribution function.
     """
-    # A fine rule that integrates the density and polynomials of degree 2·points stands in for the
-    # integral. Nodes of no weight are so far off that the polynomials overflow there.
+    # Integrals of the density times polynomials of degree 2·points are taken by a fine rule. Nodes
+    # of almost no weight are left out: they are so far off that the polynomials overflow there.
     panels = min(math.ceil(distribution.upper - distribution.lower), 64)
     edges = np.asarray(np.linspace(distribution.lower, distribution.upper, panels + 1), float)
     legendre = np.polynomial.legendre.leggauss(16 + 2 * points)
@@ -207,9 +207,10 @@ def _mass_gaps(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Arr
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     """Interpolate values at rising nodes.
 
-    The polynomial through all nodes is taken if there are 10 to 40 nodes, and its Lebesgue function
-    is at most 30 at the points, as for the nodes of one Gauss rule. Otherwise the interpolation is
-    by monotone cubic pieces (PCHIP), which are better with fewer nodes and safe with any others.
+    With 10 to 40 nodes the polynomial through all of them is taken, if its Lebesgue function (the
+    sum of the magnitudes of the Lagrange polynomials) is at most 30 at the points, as for the nodes
+    of one Gauss rule. Otherwise monotone cubic pieces (PCHIP) are taken, which are safe with any
+    nodes.
 
     Args:
         nodes: At least two rising nodes, shape (n,).
