@@ -70,10 +70,10 @@ class Content(CellContent):
     def limited_outputs(self) -> tuple[str, ...]:
         """Return the names of the peaks over time whose bounds the questions need, each once.
 
-        Questions are the sections with limits of the response, such as [decision]. Those that
-        compute responses themselves, instead of reading peaks of the envelope, are left out. The
-        peak of an output is the largest magnitude over time, named as the output, such as "q3"; the
-        largest and the smallest value have names of their own, "max q3" and "min q3".
+        Questions are the sections with limits of the response, such as [decision]. Questions that
+        compute responses themselves, instead of reading peaks of the envelope, are left out. A peak
+        is named "q3" if it is the largest magnitude of the output q3, "max q3" or "min q3" if it is
+        its largest or smallest value.
         """
         peaks: dict[str, None] = {}
         for section in self.questions.values():

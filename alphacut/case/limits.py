@@ -255,10 +255,10 @@ class QuestionSection(Section):
         """
         key = f"{self.key}.limits"
         limits = tuple(limit.limit(structure, key) for limit in self.limits)
-        # The output need not be observed by the structure: limited peaks are computed anyway.
         structure.require_quantities(key, list(dict.fromkeys(x.output for x in self.limits)))
+        # Refuses limits that do not fit each other or the question; () stands for any outputs.
         with _naming(key):
-            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)  # of any outputs
+            limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
         return limits
 
     def require_answerable(self, structure: Structure) -> None:

@@ -333,6 +333,7 @@ def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldIn
     """
     for key, info in model.described_fields().items():
         name = f"{prefix}{key}"
+        # the annotation itself and all types inside it, as in tuple[ForceSection, ...]
         parts = itertools.chain([info.annotation], _annotation_parts(info.annotation))
         models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
         yield name, info, bool(models)

@@ -358,6 +358,7 @@ class Frame(StructureSection):
         # times softer than a storey: 300 lies between both.
         max_ratio = 300.0
         for key in ("masses", "lengths", "second_moment", "stiffness", "yield_force"):
+            # Without values a single 1 stands for them, so that their ratio is 1.
             sizes = [number.nominal for number in getattr(self, key) or (Crisp(1.0),)]
             if max(sizes) > max_ratio * min(sizes):
                 ratio = max(sizes) / min(sizes)
@@ -381,6 +382,7 @@ class Frame(StructureSection):
         Args:
             height: Height of the tallest storey in m, or a guess.
         """
+        # `per_floor` gives one value for each floor, where the case may state one for all.
         starts = [x.nominal for x in self.per_floor(self.displacements)]
         drift = np.abs(np.diff(starts, prepend=0.0)).max()
         # storeys stand drifts of some 5 % of their height, and yield below 2 %

@@ -193,8 +193,9 @@ class Quantity:
             ends: The number, or the ends of its support.
 
         Returns:
-            For a value without a unit whose hundredth part is positive and in the range: 'write "5
-            %" or 0.05'. Empty for all others, for quantities with a unit and for whole numbers.
+            A text such as 'write "5 %" or 0.05' for a value without a unit whose hundredth part is
+            positive and in the range. Empty for all other values, for quantities with a unit and
+            for whole numbers.
         """
         if self.si or self.is_integer or "%" in str(value):
             return ""

@@ -139,12 +139,12 @@ def document_of(result: HomogenisedStiffness) -> Document:
         result: Homogenised stiffness of the cell, in SI units.
 
     Returns:
-        "E_GPa" and "nu", None where no isotropic solid has these moduli; "stress_GPa", the mean σ11
-        and σ12; "fibres", the constants of a transversely isotropic cell with their errors, else
-        empty; "stiffness_GPa", the plane stiffness, shape (3, 3), and its absolute errors, None
-        where there are none; "plane", E_x, E_y, ν_xy and G_xy by definition; "curve", the stresses
-        over θ with the weights of the mean; the facts of the computation; and the declared errors,
-        None without any.
+        E and ν are None if no isotropic solid has the moduli of the cell. "stress_GPa" has the mean
+        σ11 and σ12; "fibres" the constants of a transversely isotropic cell, else nothing;
+        "stiffness_GPa" the plane stiffness, shape (3, 3); "plane" E_x, E_y, ν_xy and G_xy by
+        definition; and "curve" the stresses over θ with the weights of the mean. Errors are
+        absolute, and None where the model declares none. The other entries are facts of the
+        computation.
     """
     curve = result.curve
     document: Document = {"E_GPa": None, "nu": None}
@@ -288,9 +288,9 @@ def table_rows(document: Document) -> Iterator[Row]:
             or None.
 
     Yields:
-        Label, text and declared error in the unit of the label: of E, ν and the mean stresses; of
-        the constants of fibres; and, if "plane" is not empty, of the entries C11, C12, C16, C22,
-        C26 and C66 of the stiffness and of the constants along x and y.
+        Label, text and declared error in the unit of the label. The rows are E, ν and the mean
+        stresses; the constants of fibres; and, if "plane" is not empty, the entries C11, C12, C16,
+        C22, C26 and C66 of the stiffness and the constants along x and y.
     """
     errors = document["declared_error"] or {"stress_GPa": {}}
     for key, digits in (("E_GPa", "#.8g"), ("nu", ".6f")):

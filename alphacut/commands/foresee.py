@@ -146,9 +146,9 @@ class InterruptedWorkError(Exception):
 def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.0) -> float:
     """Return about how many seconds a stage takes: it is begun, and interrupted by its progress.
 
-    The stage reports the completed fraction p of its work. Once it has worked for two seconds, its
-    whole time is reckoned as t / p^power from the time t until then, and it is interrupted. A stage
-    that ends before is timed as it is.
+    The stage reports the completed fraction p of its work. Once it has worked for t = 2 s or a
+    little more, its whole time is taken as t / p^power, and it is interrupted. A stage that ends
+    before is timed as it is.
 
     Args:
         stage: A stage that reports its progress evenly. Its result is not kept.
@@ -293,11 +293,11 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
 
     # From fewer than three parts nothing is extrapolated, and the time of an image is about
     # proportional to its pixels: three are timed however long they take.
-    found = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
+    foreseen = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
     if content.has_stated_modulus and not content.has_material_damping:
-        return found, Material()
+        return foreseen, Material()
     largest = solved[-1]
-    return found, Material(largest.modulus, largest.loss_factor)
+    return foreseen, Material(largest.modulus, largest.loss_factor)
 
 
 def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
@@ -370,8 +370,9 @@ def _structure(content: Content, material: Material | None) -> Structure:
         material: Young's modulus in Pa and loss factor from a part of the stage; None if unknown.
 
     Returns:
-        The structure. If neither the case nor `material` says how fuzzy Young's modulus E and the
-        damping ratios are that the stage computes, they become triangular, a tenth to either side.
+        The structure. If the stage has other levels than α = 1 alone, Young's modulus E and the
+        damping ratios that it computes are fuzzy: crisp ones become triangular numbers, a tenth to
+        either side.
 
     Raises:
         RefusedError: There is no such structure.
@@ -467,6 +468,7 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
     question = content.incremental_question
     if question is not None:
         analyses = suite.analyses_of(question, structure, task, records)
+        # the number of responses and their seconds, for each record
         foreseen = [analysis.foresee() for analysis in analyses.values()]
         motions = round(sum(count for count, _ in foreseen))
         yield Foreseen("fragility", motions, "motions", sum(time for _, time in foreseen))

@@ -99,7 +99,7 @@ def split_petsc(arguments: Sequence[str]) -> CommandLine:
 
 
 def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) -> None:
-    """Refuse options of PETSc where a command solves no prisms, by which alone they are used.
+    """Refuse options of PETSc, which act on prisms alone, for a command that solves no prisms.
 
     Args:
         petsc: The options without their prefix; if empty, nothing is refused.

@@ -316,9 +316,9 @@ class Pipeline:
             task: The response of [envelope]: names of the fuzzy inputs, time step and α-levels.
 
         Returns:
-            The response with the peaks over the suite and, where columns yield and fragility is
-            asked for, those over the intensities of each record. The peaks are put into
-            `results.suite`.
+            The response with the peaks over the suite, which are put into `results.suite`, too. If
+            columns yield and fragility is asked for, it also has the peaks at rising intensity of
+            each record.
 
         Raises:
             RefusedError: A record or a limit does not fit the structure.

@@ -75,7 +75,7 @@ def colours(alpha: Array) -> list[Colour]:
 
 
 def alpha_legend(axes: Axes, alpha: Array, further: Sequence[Line2D] = ()) -> None:
-    """Add a legend beside the axes: a patch for each α-level, a line for the highest one.
+    """Add a legend of the α-levels beside the axes: a line for the highest, patches for the others.
 
     Args:
         axes: The axes.

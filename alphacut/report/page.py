@@ -135,10 +135,9 @@ def plot(
         units: Unit in which each output is shown.
 
     Returns:
-        Document with a title, the number of fuzzy inputs, the guarantee, the names of the outputs,
-        their units and the factors from SI, the α-levels, the step between time nodes in s, and the
-        series "lower", "upper" and "error": for each level and then each output all values over
-        time in SI units, as 32-bit floats, low byte first, in base64. The error is zero if the
+        Document whose "factors" turn SI into the units shown and whose "step" is in s. "lower",
+        "upper" and "error" are lists over levels of lists over outputs; an entry has all values
+        over time in SI units, as 32-bit floats, low byte first, in base64. The error is zero if the
         envelope is guaranteed, since it then contains the error.
     """
     time = dataset["time"].values

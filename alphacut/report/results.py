@@ -162,8 +162,8 @@ def material(parts: Parts, *, every_constant: bool = False) -> Table:
         rows.extend(_constants(part, every_constant=every_constant))
     if found:
         lowest_level, highest_level = found[0].alpha[[0, -1]]
-    # Loss factors are those of samples and of first order: damping ratios, which follow from them,
-    # claim no more than to be attained.
+    # Damping ratios follow from loss factors, which come from samples and are of first order: they
+    # are called attained, and not guaranteed.
     for name, (low, nominal, high) in parts.damping.items():
         value = range_text(nominal, nominal, Nature.ATTAINED)
         ends = range_text(low, high, Nature.ATTAINED)
@@ -293,9 +293,9 @@ def width_text(image: ImageResult) -> str:
     """Return a sentence, without its full stop, on the width of E or on its missing bounds.
 
     Args:
-        image: Bounds of the stiffness matrix on the highest level, which are all 0 without a lower
-            bound and infinite without an upper one; and the width of E on the lowest level by its
-            cause, in GPa, which is known if both bounds are.
+        image: Bounds of the stiffness matrix on the highest level, and the width of E on the lowest
+            level by its cause, in GPa. Without a lower bound the lower matrix is 0 throughout;
+            without an upper bound an entry of the upper one is infinite.
     """
     has_lower = image.lower_GPa.any()
     has_upper = np.isfinite(image.upper_GPa).all()
@@ -322,11 +322,12 @@ def peak_table(parts: Parts) -> Table:
         parts: Numbers of the results.
 
     Returns:
-        Rows for each peak: one for each unit in which it is shown and, below it, one for each
-        further limit. Columns are the cuts on the highest and the lowest level, and on a middle one
-        if no peak is guaranteed; the error; of guaranteed peaks the attained value and the gap;
-        the record that moves a structure farthest; the limit with its verdict. Columns that are
-        empty are left out. Peaks over a suite come last. Without peaks the table is empty.
+        Each peak has a row for each unit in which it is shown, with its first limit, and below it a
+        row for each further limit. Columns are the cuts on the highest and the lowest level, and on
+        a middle one if no peak is guaranteed; the error; of guaranteed peaks the attained value and
+        the gap; the record under which a structure moves farthest; the limit; and whether it is
+        exceeded. Empty columns are left out. Peaks over a suite come last. Without peaks the table
+        is empty.
     """
     studies: dict[str, EnvelopeResult | SuitePeaks] = dict(parts.envelopes)
     if parts.records is not None:
@@ -484,10 +485,10 @@ def display_units(
 def natures(parts: Parts) -> Iterator[str]:
     """Yield sentences, without full stops, on what is guaranteed and how it was tested.
 
-    They say that the stiffness on an own mesh is an upper bound; which peaks are guaranteed,
-    estimated or attained; what bounds mean if the box of the inputs encloses a set that was learned
-    from a measurement; what a mean over records is; and how many exact responses agree with
-    guaranteed bounds. Each stands only if it applies.
+    Each stands only if it applies: that the stiffness on an own mesh is an upper bound; which peaks
+    are guaranteed, estimated or attained; what bounds mean if the box of the inputs encloses a set
+    that was learned from a measurement; what a mean over records is; and how many exact responses
+    agree with guaranteed bounds.
 
     Args:
         parts: Numbers of the results.
@@ -687,9 +688,10 @@ def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
     if parts.records is not None:
         for output, statistics in parts.records.statistics.items():
             unit = shown_units[output_of(output)]
-            for name, ends in statistics.items():  # mean, median …
+            # Each statistic, such as the mean over the records, has a value for each level.
+            for name, ends in statistics.items():
                 what = f"{name} of the records' peaks of {output}"
-                yield ComparedEntry(what, unit, float(ends[0]))  # of the bounds over the levels
+                yield ComparedEntry(what, unit, float(ends[0]))  # on the lowest level
     if parts.decision is not None:
         for limit in parts.decision.limits.values():
             yield ComparedEntry(limit.words, no_unit, limit.verdict_words)

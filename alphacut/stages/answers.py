@@ -88,8 +88,8 @@ def decision(section: DecisionSection, response: Response, _: Progress) -> Decis
     structure = response.structure
     found = response.suite or response.peaks
     assert found is not None  # a question that reads peaks has them computed before
-    # Limits over a suite are on the worst record, and means over the records. Units go along, since
-    # the analysis knows the names of outputs and inputs alone.
+    # Of a suite the largest peak over the records is judged, or the mean over them. Units are given
+    # as well, since the analysis knows the names of outputs and inputs alone.
     limits = section.limits_of(structure)
     return decide(
         found,

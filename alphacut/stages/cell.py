@@ -90,14 +90,13 @@ class CellProblem:
         """Return the fuzzy parameters of the cell by name, in SI units.
 
         If all are crisp, a single crisp one stands for them: the modulus of the inclusion, else of
-        the matrix, else any. There is none at all only of a mesh whose phases have no fuzzy
-        numbers.
+        the matrix, else any. It is empty only without any parameter, as a mesh from a file may be.
         """
         numbers = self.numbers
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         if fuzzy:
             return fuzzy
-        # A campaign of samples has one input at least; of crisp cells it is one at a single value.
+        # A campaign of samples needs one input at least, though it may be crisp.
         for name in ("inclusion_modulus", "matrix_modulus", *numbers):
             if name in numbers:
                 return {name: numbers[name]}

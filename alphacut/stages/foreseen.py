@@ -36,9 +36,9 @@ def foreseen_material(content: Content) -> Material | None:
     The analytic series solves the cell in milliseconds, so that `check` can use it.
 
     Returns:
-        Young's modulus in Pa and the loss factor, each None where the structure does not take it
-        from the cell; or None alone where the series does not solve the cell, or the radius map is
-        yet to be computed.
+        Young's modulus in Pa and the loss factor, each None if the structure does not take it from
+        the cell. None instead of a material if the series does not solve the cell, or the radius
+        map is yet to be computed.
 
     Raises:
         RefusedError: The cell does not fit the series.
@@ -57,8 +57,8 @@ def foreseen_material(content: Content) -> Material | None:
     result = replace(CellProblem.of(content), modulus=section).solve()
     loss = None
     if content.has_material_damping:
-        # The case states one loss factor for each phase, of its Young's modulus at a real ν. It is
-        # then that of both the bulk and the shear modulus: losses has the shape (phases, 2).
+        # The case states one loss factor for each phase: of its Young's modulus, at a real ν. Then
+        # the bulk and the shear modulus have the same one: `losses` has the shape (phases, 2).
         losses = np.array([[number.nominal] * 2 for number in cell.losses])
         loss = Crisp(loss_factors(result, losses).values["E"])
     if content.has_stated_modulus:
@@ -101,8 +101,8 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
         RefusedError: The cell does not fit the series.
         FailedError: The series does not converge.
     """
-    # Refusals that depend on the material are those of a modulus that is too small or of a loss
-    # factor that is too large, or the reverse: one of two extremes admits what any material does.
+    # A structure may be refused for a modulus that is too small and a loss factor that is too
+    # large, or the reverse. What any material allows, one of the two extremes allows.
     known = foreseen_material(content)
     if known is not None:
         return (known,)

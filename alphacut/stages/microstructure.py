@@ -94,9 +94,9 @@ def fragment(numbers: Mapping[str, Any]) -> str:
 
     Args:
         numbers: Results of a fitted radius map. `radius` has a1 … a4, each a number or the three
-            corners of a triangular one; `mean_area_fraction_of_map`, or volume, is the fraction
-            that the map holds; `area_fraction`, or volume, that of the particles;
-            `fraction_of_case` that of the case or None; `cells` the number of fitted cells, and
+            corners of a triangular one. Fractions are `mean_area_fraction_of_map`, of the map;
+            `area_fraction`, of the particles; and `fraction_of_case`, or None. Of spheres the first
+            two have "volume" in place of "area". `cells` is the number of fitted cells, and
             `share_kept` the fraction of their area or volume in cells within the limits.
 
     Returns:

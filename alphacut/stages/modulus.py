@@ -200,8 +200,8 @@ def identity(problem: CellProblem) -> Document:
     """Return what all samples of a campaign have in common: the key of their store.
 
     A stored sample is taken if this document and its own inputs are equal. Plan and α-levels are
-    left out, so that a campaign with other ones finds the samples that both share. Parameters stand
-    in it as they are in the case, since those that are crisp keep their value in each sample.
+    left out, so that a campaign with other ones finds the samples that both share. All parameters
+    of the case are in it, since crisp ones are no inputs of a sample.
 
     Args:
         problem: The cell.

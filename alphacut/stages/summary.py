@@ -233,8 +233,8 @@ class Parts:
             else:
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
                 found[output] = ShownUnit(label, factor)
-        # Later entries replace earlier ones, so the limits are taken in reversed order: of several
-        # limits of an output the first one of the case stays.
+        # Later entries replace earlier ones, so the limits are taken in reversed order: if an
+        # output has several limits, the first one of the case stays.
         limits: list[LimitResult] = []
         if self.probability is not None:
             limits += reversed(self.probability.events.values())
@@ -300,6 +300,7 @@ class Summary(Parts):
         Raises:
             RefusedError: Naming the results of another run.
         """
+        # `made_from` returns the files that the manifest lists with a digest.
         changed = [
             name
             for name, source in self.fingerprints.items()
