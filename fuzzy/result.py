@@ -422,12 +422,14 @@ class Bounds:
     def to_dataset(self) -> xarray.Dataset:
         """Return the bounds as an xarray dataset.
 
-        Its variables are `lower`, `upper` and `error` over (alpha, time, output), or (alpha,
-        output) without times; the inputs `lower_at` and `upper_at` that reach the ends, over a
-        further axis parameter; and of each output its `nature` (attained, estimated or guaranteed)
-        and its `label` (the name with its unit, as "q1 [m]"). The attributes are method,
-        evaluations, seconds, basis, and encloses where it is not empty: the name of the set that
-        the box of the inputs encloses.
+        Its variables are:
+
+        - `lower`, `upper` and `error` over (alpha, time, output), or (alpha, output) without times;
+        - the inputs that reach the ends, `lower_at` and `upper_at`, over a further axis parameter;
+        - `nature` (attained, estimated or guaranteed) and `label` (as "q1 [m]") of each output.
+
+        The attributes are method, evaluations, seconds and basis, and `encloses`, the name of the
+        set that the box of the inputs encloses, if there is one.
 
         Raises:
             MissingLibraryError: xarray is not installed.

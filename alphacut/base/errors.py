@@ -209,7 +209,7 @@ def path_of(key: str, value: object) -> Path:
 def is_number(value: object, *, whole: bool = False) -> bool:
     """Return whether a value is a real number of Python or of NumPy; with `whole`, an integer.
 
-    NaN and infinities are numbers; True and False, arrays and the float 2.0 as an integer are not.
+    NaN and infinities are numbers; True, False and arrays are not. The float 2.0 is no integer.
     """
     kind = Real
     if whole:

@@ -69,8 +69,8 @@ def require_text(path: Path) -> None:
         RefusedError: The file is a pipe or a device, or too large.
         OSError: The file does not exist.
     """
-    # Telling the numbers in a text apart takes a list of texts: two digits and a blank take 64
-    # bytes, longer numbers less for each byte of the file.
+    # The numbers in a text are split into a list of texts. Two digits and a blank, three bytes of
+    # the file, take 64 bytes of memory there; longer numbers take less for each byte.
     bytes_per_byte = 30
     status = path.stat()
     if not (S_ISREG(status.st_mode) or S_ISDIR(status.st_mode)):

@@ -47,7 +47,7 @@ def user_folder(name: str) -> Path | None:
 def remove_unused(folder: Path) -> None:
     """Remove files and folders in `folder` that were not used for 14 days.
 
-    The time of the last use is that of the last change: who uses a file sets it.
+    The time of the last change counts: whoever uses a file or folder sets it.
 
     Raises:
         OSError: The folder cannot be read, or an old file cannot be removed, such as one that
@@ -81,6 +81,7 @@ def cached_arrays(name: str, content: bytes, make: Callable[[], Arrays]) -> Arra
     folder = user_folder(name)
     if folder is None:
         return make()
+    # The digest is the name of the file and also, as `key`, its first array.
     digest = sha256(content)
     file = folder / f"{digest.hexdigest()}.npz"
     key = np.frombuffer(digest.digest(), np.uint8)

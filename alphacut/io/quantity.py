@@ -206,9 +206,9 @@ def _is_unit_of(spelling: str, si: str) -> bool:
 def _pint_target(one_unit: pint.Quantity, si: str) -> str:
     """Return the unit to which Pint must convert a unit so that the result is in the SI unit `si`.
 
-    It is `si` but for frequencies. Pint's radian is the number 1, so that it takes 1 rad/s for
-    1 Hz, and 1 Hz for 1 rad/s. A frequency counts turns: where its unit contains an angle, as rad/s
-    and rpm, it is converted to turns per second.
+    It is `si`, but turn/s for a frequency whose unit contains an angle, such as rad/s or rpm.
+    Pint's radian is the number 1, so that it would take 1 rad/s for 1 Hz. It would also take 1 Hz
+    for 1 rad/s, which is refused here.
 
     Args:
         one_unit: One of the unit that was written, as Pint has read it. Whether it is of the
@@ -247,6 +247,7 @@ def _parse_decimal(text: str, si: str) -> Decimal:
     """
     text = text.strip()
     match = re.fullmatch(rf"({NUMBER})\s*(.*)", text)
+    # What to write instead, if the text has the pattern of a common mistake; else empty.
     cure = number_cure(text)
     # "1,5 GPa" begins with the number 1 and the unit ",5 GPa".
     if match is None or match[2].startswith((",", "_")):

@@ -130,6 +130,7 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
     arguments = get_args(kind)
     if origin is Annotated:
         value = _read(arguments[0], document, path)
+        # `_checked` puts the path in front of the error of a check.
         for check in arguments[1:]:
             _checked(check, value, path)
         return value

@@ -181,8 +181,8 @@ class Call:
         if self.shared:
             columns = [self.names.index(name) for name in self.shared]
             groups: dict[bytes, list[int]] = {}
-            # The bytes serve as the key: campaigns pass no -0.0, whose bits differ from those of
-            # the equal 0.0, and a group that rounding divides costs a call, but no accuracy.
+            # The bytes of the shared inputs are the key. Campaigns pass no -0.0, which has other
+            # bytes than 0.0. Inputs that differ by rounding cost a further call, but no accuracy.
             for row in range(len(points)):
                 groups.setdefault(points[row, columns].tobytes(), []).append(row)
             yield from groups.values()
@@ -277,10 +277,11 @@ def _outcome(output: object) -> Outcome:
     try:
         if isinstance(output, Exception):
             raise output
+        # Outputs by name; a number or an array alone has the name "y".
         named = _by_output_name(output).items()
         arrays = {str(name): _finite_array(str(name), value) for name, value in named}
         layout = tuple((name, array.shape) for name, array in arrays.items())
-        # An array "a" and a number "a[0]" would have one name.
+        # Names of all entries: an array "a" and a number "a[0]" would have one name.
         columns = Values(layout, np.zeros((0, 0))).columns
         are_distinct = bool(columns) and len(set(columns)) == len(columns)
         allowed = "one number or more, all of different names"

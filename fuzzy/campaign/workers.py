@@ -180,6 +180,7 @@ def completed(
                 return
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 batch = pending.pop(future)
+                # The outcomes of each task of the batch, and the time that they took.
                 outcomes, seconds = _result(future, call, batch)
                 # Quick calls come in batches of 0.1 s; sending a shorter one would cost more.
                 ideal_size = 0.1 * len(batch) / max(seconds, 1e-9)

@@ -37,8 +37,8 @@ def from_data(
 
     For the next value, the median and a quantile this holds for any distribution and any number of
     values, drawn independently, or at least exchangeably, from one distribution. Without bounds n
-    values decide the cuts of the next value from α = 2/(n + 1) on, of the median from 2^(1 − n), of
-    the quantile q from qⁿ + (1 − q)ⁿ.
+    values decide the cuts from a level α on: 2/(n + 1) for the next value, 2^(1 − n) for the
+    median, and qⁿ + (1 − q)ⁿ for the quantile q.
 
     Args:
         values: The measured numbers, one or more, in any order; equal ones are allowed.

@@ -42,8 +42,8 @@ def jointly(
         decide the cuts, grows with the cuts.
 
     Raises:
-        RefusedError: Claims of different kinds are joined without a meaning, or one number stands
-            for several independent inputs.
+        RefusedError: Claims of different kinds are joined without `means`, or inputs that are said
+            to be independent have the same number.
 
     Example:
         >>> from alphacut.fuzzy import from_data
@@ -192,8 +192,8 @@ class JointClaim:
         if self.rule is None:
             names = ", ".join(self.opinions)
             return names and f"{names}: opinions, so that no level has a probability"
-        # A name from the user says what the joint claim is about. Otherwise the rule has only the
-        # kind that all inputs' claims share, such as "mean", and the result has none of its own.
+        # If the user has named what the joint claim is about, the name is taken. Otherwise
+        # `means` is the kind that all inputs' claims share, such as "mean".
         subject = self.rule.means
         if not self.rule.named:
             subject = f"result of the {subject} of {', '.join(self.rule.names)}"

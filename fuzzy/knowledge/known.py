@@ -120,9 +120,9 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
     evenly = np.linspace(0, len(rows) - 1, min(len(rows), max_samples)).astype(int)
     rows = rows[np.unique(evenly)]
 
-    # Of a pair (i, j) the output may not fall from i to j if no input steps against its sign: the
-    # way from i to j then changes one input after another, each without letting the output fall.
-    # Entry (i, j) of the arrays below belongs to the pair.
+    # If no input steps against its sign on the way from sample i to sample j, the output may not
+    # fall: the inputs can be changed one after another, and none of these steps lets it fall. Entry
+    # (i, j) of the arrays below is for the way from i to j.
     point_steps = points[rows][None] - points[rows][:, None]
     signed_steps = point_steps * np.where(signs, signs, 1)
     is_allowed_step = (signed_steps >= 0) & ((signs != 0) | (signed_steps == 0))

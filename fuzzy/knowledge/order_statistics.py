@@ -143,8 +143,9 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
         open_ends: Whether there is no physical bound below, and none above, the values.
 
     Returns:
-        Ranges with rising levels from 0 on, below 1. Of ranges with equal levels the narrowest is
-        returned. The arrays are cached and must not be changed.
+        The first gap `low` and the last gap `high` of each range, and its level. The levels rise
+        from 0 on and stay below 1. Of ranges with equal levels the narrowest is returned. The
+        arrays are cached and must not be changed.
     """
     # For gap k: the probabilities that the quantity lies inside it, in a gap below, and above it.
     gaps = _GapProbabilities.of(n, quantile)
@@ -153,8 +154,9 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
     level = 0.0
     windows_by_level = {level: (low, high)}
     while low < high:
-        # Remove the gap at an open end first, then the less probable gap of the two ends, then the
-        # gap at the end where less was removed. Tuples are compared in this order, False first.
+        # Of the two gaps at the ends one without a bound is removed first, else the less probable
+        # one, else the one on whose side less was removed. Tuples are compared in this order, and
+        # False counts as less than True.
         is_low_closed = not open_ends[0] or low > 0
         is_high_closed = not open_ends[1] or high < n
         lowest = (is_low_closed, gaps.inside[low], gaps.below[low])

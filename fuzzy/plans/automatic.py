@@ -165,11 +165,11 @@ class _AutomaticSearch:
     def is_estimated(self) -> Mask:
         """Return the outputs whose bounds are estimated, and not only attained, shape (outputs,).
 
-        They are the monotone ones (`is_monotone`), which two corners of each cut bound, and those
-        whose search by descents (`linkage`) is complete and has shown no jumps or waves beside a
-        trend (`is_rough`). A search is complete if, for the minimum and the maximum in all cuts,
-        the expected fraction of the cut in basins that were not seen is below 0.002, and the output
-        is smooth at the best optimum. Without a search only the monotone ones are returned.
+        They are the monotone ones (`is_monotone`), which two corners of each cut bound. Besides
+        they are those whose search by descents (`linkage`) is complete and has shown no jumps or
+        waves beside a trend (`is_rough`). A search is complete if, for the minimum and the maximum
+        in all cuts, the expected fraction of the cut in basins that were not seen is below 0.002,
+        and the output is smooth at the best optimum.
         """
         linkage = self.linkage
         if linkage is None:
@@ -424,7 +424,7 @@ def _climb_staircases(
         n_turns = (by_input[1:] != by_input[:-1]).sum(axis=0)
         # An effect that turns once is that of a hump, which descents find. Waves and jumps turn
         # back.
-        turns_once &= (n_turns <= 1).all(axis=0)
+        turns_once &= (n_turns <= 1).all(axis=0)  # for all inputs
     for cut in cuts_with_width(campaign, widest.domain):
         # In a narrower cut fewer inputs may have a width, so that its corners have fewer columns.
         extremes = corners[:, np.isin(widest.uncertain_inputs, cut.uncertain_inputs)]

@@ -83,8 +83,8 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
 
     Returns:
         The bounds with the nature "guaranteed" for the proved outputs and "attained" for the
-        others, with the stated knowledge and the number of samples in `basis`, and the bounds
-        themselves as attained ends, `inner`. If nothing is proved, `bounds` itself is returned.
+        others. `basis` has the stated knowledge and the number of samples as a text, and `inner`
+        the ends, which are attained, too. If nothing is proved, `bounds` itself is returned.
 
     Raises:
         RefusedError: A sample contradicts a stated sign of a proved output, or lies beyond its

@@ -275,10 +275,10 @@ class SingleLinkage:
 
         Each cut is sampled, and descents start from the best samples, in rounds. The search of a
         bound ends when the expected fraction of the cut in basins that were not seen is below 0.002
-        (Boender and Rinnooy Kan, 1987), or is given up where the best optimum lies at a kink or
-        jump (unless kinks are expected, `has_kinks`), or 1,000 samples have equal values. If
-        `outputs` is empty, each cut gets 100 samples and no descents. Results are in `states`, and
-        all samples in the campaign.
+        (Boender and Rinnooy Kan, 1987). It is given up if the best optimum lies at a kink or jump
+        (unless kinks are expected, `has_kinks`), or if 1,000 samples lie on plateaus, with the
+        value of another sample. If `outputs` is empty, each cut gets 100 samples and no descents.
+        Results are in `states`, and all samples in the campaign.
 
         Args:
             first: Uniform samples of the widest cut in unit coordinates (0 at the lower, 1 at the
@@ -298,11 +298,11 @@ class SingleLinkage:
     def search(self) -> None:
         """Sample and descend until no bound of an output is open in any cut.
 
-        A bound is open in a cut until there are 100 samples and the expected fraction of the cut in
-        basins that were not seen is below 0.002, or the best optimum lies at a kink or jump (unless
-        kinks are expected, `has_kinks`), or 1,000 samples lie on plateaus. Each round visits the
-        cuts with open bounds from the widest on, adds samples, and descends. It may be called again
-        after optima have been recorded by other means; it returns at once if all bounds are closed.
+        With 100 samples and an optimum a bound is closed in a cut if the expected fraction of the
+        cut in basins that were not seen is below 0.002, or if the best optimum lies at a kink or
+        jump (unless kinks are expected, `has_kinks`). With 1,000 samples on plateaus it is closed,
+        too. Each round visits the cuts with open bounds from the widest on, adds samples, and
+        descends. The search may be called again after optima have been recorded by other means.
         Progress is reported to the campaign.
 
         Raises:
@@ -453,11 +453,11 @@ class SingleLinkage:
     def _open_bounds(self, cut: CutSearch) -> list[Bound]:
         """Return the bounds (output, and sign of minimum or maximum) whose search in a cut goes on.
 
-        First, for each bound with an optimum, a descent starts from the best sample of the campaign
-        in the cut, if it is better than the best optimum by more than the tolerance of values; the
-        optimum that it finds is recorded. A search goes on until its stopping rule holds (100
-        samples, and an expected fraction of unseen basins below 0.002), or it is given up at a
-        kink, a jump or on plateaus. Where kinks are expected (`has_kinks`), they do not end it.
+        First the best sample of the campaign in the cut is compared with the best optimum of each
+        bound. If it is better by more than the tolerance of values, a descent starts from it, and
+        its optimum is recorded. A search goes on until its stopping rule holds (100 samples, and an
+        expected fraction of unseen basins below 0.002), or it is given up at a kink, a jump or on
+        plateaus. Where kinks are expected (`has_kinks`), they do not end it.
 
         Raises:
             SpentError: The budget does not carry the evaluations.
@@ -590,9 +590,10 @@ class SingleLinkage:
         return self._falls(cut, cut.unit(optimum.point[None])[0], better)
 
     def _falls(self, cut: CutSearch, start: Array, optima: Sequence[Optimum]) -> bool:
-        """Return whether sign · output falls, or stays, all along a line to one of some optima.
+        """Return whether sign · output never rises along a straight line to one of some optima.
 
-        It is evaluated at six points of each straight line, from the start to 0.75 of its length.
+        One such line is enough. Each is evaluated at six points, from its start to 0.75 of its
+        length.
 
         Args:
             cut: The α-cut.
@@ -617,10 +618,10 @@ class SingleLinkage:
     def _index_of_equal(self, cut: CutSearch, optimum: Optimum) -> int | None:
         """Return the index of an equal optimum in the list of a cut; None if there is none.
 
-        Optima are equal if their values differ by no more than the tolerance (1e-5 of the range of
-        the output and 1e-9 of its magnitude), and if their inputs differ by up to 1 % of the width
-        of the cut or no larger value is found at three points between them. So all ends of descents
-        in one flat valley count as one optimum, and the bottoms of two valleys as two.
+        The values of equal optima differ by no more than the tolerance (1e-5 of the range of the
+        output plus 1e-9 of its magnitude). Besides, their inputs differ by up to 1 % of the width
+        of the cut, or no larger value is found at three points between them. So all ends of
+        descents in one flat valley count as one optimum, and the bottoms of two valleys as two.
 
         Args:
             cut: The α-cut whose list is searched.

@@ -261,8 +261,8 @@ class Signed:
         stated = campaign.knowledge.stated_signs(domain.names, at_corners.outputs)
         proved = corners_suffice(domain, stated) & np.isin(at_corners.outputs, outputs)
         guaranteed = guaranteed_bounds(at_corners, campaign, proved)
-        # The samples that found and tested the signs may attain more than the corners, of the
-        # outputs that are not proved.
+        # For outputs that are not proved, the samples that found and tested the signs may attain
+        # more than the corners.
         bounds = bounds_of_samples(domain, campaign.samples, self.name)
         return replace(
             bounds,
@@ -350,8 +350,8 @@ def effect_notes(domain: Domain, outputs: Sequence[str], signs: Signs) -> tuple[
 def find_effects(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> Signs:
     """Return the sign of each input's effect on each output, on each level.
 
-    Signs that the caller states (`campaign.knowledge`) are taken; pairs of points that differ in a
-    stated input alone are evaluated, by which they can be tested later. Other signs are observed at
+    Signs that the caller states (`campaign.knowledge`) are taken as they are. For their later test,
+    pairs of points that differ in the stated input alone are evaluated. Other signs are observed at
     probes, from the widest box to the narrowest. A sign holds on all narrower boxes.
 
     Args:

@@ -104,7 +104,7 @@ class FuzzyNumber(ABC):
         cuts = self.cuts
         x = np.asarray(x, float)
         # Where ends of several levels are equal, `interp` takes the last one: the highest level.
-        # The upper ends fall with α, so that they are reflected.
+        # It needs rising ends. The upper ends fall with α, so that all signs are changed.
         left = np.interp(x, cuts.lower, cuts.alpha, left=0)
         right = np.interp(-x, -np.asarray(cuts.upper), cuts.alpha, left=0)
         return np.asarray(np.minimum(left, right))
