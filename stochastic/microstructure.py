@@ -533,7 +533,7 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
     slopes = slope_band(
         fit, truncated, level=confidence, resamples=RESAMPLES, generator=slope_generator
     )
-    # The supports of the slopes contain their bootstrap band as well, but for spheres.
+    # For discs, but not for spheres, the supports must contain the bootstrap band of the slopes.
     required = slopes if rule.shape == DISCS else None
     pbox = least_pbox(fit, truncated, band, required=required)
     return FuzzyFit(truncated, pbox, slopes, band)

@@ -50,9 +50,9 @@ class ParticleCells:
 def with_cells(particles: Particles) -> ParticleCells:
     """Return particles with their cells: Apollonius cells of discs, power cells of spheres.
 
-    Cells of discs near the edge of a window are left out, and each cell that counts stands for more
-    than one in return (its weight), since large cells are left out more often. In a periodic box
-    all count, with the weight 1. Spheres must be in a periodic cube.
+    In a periodic box all cells count, with the weight 1. In a window cells of discs near the edge
+    are left out, large ones more often than small ones. The weight of each counted cell, above 1,
+    makes up for that. Spheres must be in a periodic cube.
 
     Args:
         particles: Discs or spheres, of which none lies inside another one.

@@ -65,8 +65,9 @@ def wedge(components: int) -> Any:
         components: Number of values at each node, at least 1; the element is blocked.
     """
     # Basix wants the span as rows of coefficients in its orthonormal polynomials of degree 2 on the
-    # prism, shape (15, 18). They are the integrals of the products; the rule of degree 4 is exact
-    # for them. QR makes the rows orthonormal, which keeps Basix's inversion well conditioned.
+    # prism, shape (15, 18). A coefficient is the integral of a function of the span times a
+    # polynomial; the rule of degree 4 is exact for it. QR makes the rows orthonormal, which keeps
+    # Basix's inversion well conditioned.
     at, weights = basix.make_quadrature(PRISM, 4)
     orthonormal = basix.tabulate_polynomials(basix.PolynomialType.legendre, PRISM, 2, at)
     coefficients = np.linalg.qr((_span(at) * weights @ orthonormal.T).T)[0].T

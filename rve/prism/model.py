@@ -215,8 +215,9 @@ class PrismModel(CellModel):
                 result = with_distance(result, _reference_result(cell))
 
             # Bounds of the stiffness may be violated by the error of the mesh. Where no error is
-            # declared, 0.1 h³ stands for it, which is tuned: energies of quadratic triangles
-            # converge with h⁴ where fields are smooth, so the margin grows as meshes get finer.
+            # declared, 0.1 h³ stands for it, which is tuned. Energies of quadratic triangles
+            # converge with h⁴ where fields are smooth, so in finer meshes 0.1 h³ exceeds the error
+            # by more.
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
             checks = checks_within_limits(result.checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))

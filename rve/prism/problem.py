@@ -93,11 +93,11 @@ class SliceStrains:
             has_phase = phase_areas.any(axis=1)
             points = strain[has_phase]
             weights = phase_areas[has_phase]
-            number = slices[has_phase]
+            slice_number = slices[has_phase]
             of_triangles = np.einsum("tp,tpif->tif", weights, points)
-            np.add.at(self.strain[phase], number, of_triangles)
-            np.add.at(self.fractions[phase], number, weights.sum(axis=1))
-            theta_weights = self.weights[number, np.newaxis] * weights
+            np.add.at(self.strain[phase], slice_number, of_triangles)
+            np.add.at(self.fractions[phase], slice_number, weights.sum(axis=1))
+            theta_weights = self.weights[slice_number, np.newaxis] * weights
             all_points = points.reshape(-1, 3, points.shape[-1])
             self.products[phase] += strain_products(all_points, theta_weights.reshape(1, -1))[0]
 

@@ -181,17 +181,21 @@ class SliceMesh:
             RefusedError: The density of θ is not positive at a quadrature point.
         """
         grid = self.grid
-        law = radius_map.distribution
+        distribution = radius_map.distribution
         self.map = radius_map
-        self.rule = level_rule(law, grid.level_thetas(law), points=SLICES_PER_LAYER)
-        positive_density(law, self.rule.nodes)
+        self.rule = level_rule(
+            distribution, grid.level_thetas(distribution), points=SLICES_PER_LAYER
+        )
+        positive_density(distribution, self.rule.nodes)
         levels, mid_levels = grid.positions_by_level(radius_map)
         # Nodes of each layer of prisms: of the level below, of the mid-level, of the level above.
+        # The interpolation leads from them to the nodes of the layer's slices.
         by_layer = np.concatenate([levels[:-1], mid_levels, levels[1:]], axis=1)
         self._positions = [self._geometry_interpolation @ positions for positions in by_layer]
         determinants = [self.point_strains.determinants() for _ in self.layers()]
         self.areas = np.array(determinants) * slice_weights()[0]
-        # DOLFINx reorders cells. Undo it, and sort the cells by prism: (prisms, slices, points).
+        # DOLFINx reorders cells; `_cell` undoes it. Then areas are sorted by prism: (prisms,
+        # slices, points).
         sorted_areas = self.areas[:, np.argsort(self._cell)]
         by_slice = sorted_areas.reshape(grid.layers, SLICES_PER_LAYER, -1, POINTS_PER_SLICE)
         by_prism = by_slice.swapaxes(1, 2).reshape(-1, SLICES_PER_LAYER, POINTS_PER_SLICE)
@@ -331,9 +335,9 @@ class SliceProblem:
         """
         preconditioner = _preconditioner(self.numbering, str(options))
         blocks = matrix.getPythonContext().level_blocks()
-        law = self.mesh.map.distribution
+        distribution = self.mesh.map.distribution
         ksp = krylov_solver(
-            repeated(matrix, loads), options, lambda: preconditioner.set_up(law, blocks)
+            repeated(matrix, loads), options, lambda: preconditioner.set_up(distribution, blocks)
         )
         # The tolerance rtol must hold for each load j of n that are solved together. Each load has
         # norm 1, all together √n. So with rtol / √n the residual is |r_j| ≤ |r| ≤ (rtol / √n) · √n

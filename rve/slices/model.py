@@ -450,7 +450,7 @@ def theta_error(cell: Cell, rule: ThetaRule, *, radii: Array, moduli: Array) -> 
 
     scale = mori_tanaka_moduli(fine_radii)
     logarithm = np.log(moduli / mori_tanaka_moduli(radii))
-    # Fits are cut off at this distance from the values: beyond it a polynomial only oscillates.
+    # Fits are clipped at one range beyond the values: farther out a polynomial only oscillates.
     span = np.ptp(logarithm, axis=0)
     lowest = logarithm.min(axis=0) - span
     highest = logarithm.max(axis=0) + span

@@ -289,8 +289,8 @@ def layer_interpolation(plane: Triangulation, heights: Array) -> sp.csr_matrix:
     num_nodes, num_vertices = len(plane.points), plane.vertices
     midpoints = np.repeat(np.arange(num_nodes - num_vertices), 2)
     halves = sp.csr_matrix((np.full(plane.ends.size, 0.5), (midpoints, plane.ends.ravel())))
-    injection = sp.vstack([sp.eye(num_vertices), halves])  # J
-    vertex_injection = injection @ sp.eye(num_vertices, num_nodes)  # J V
+    injection = sp.vstack([sp.eye(num_vertices), halves])  # from vertices to all nodes of a plane
+    vertex_injection = injection @ sp.eye(num_vertices, num_nodes)  # from the nodes of a level
     ζ = heights[:, np.newaxis]
     correction = sp.kron(2 * ζ * (1 - ζ), vertex_injection)
     below = sp.kron(1 - ζ, sp.eye(num_nodes)) - correction

@@ -322,9 +322,9 @@ def level_blocks(matrix: PETSc.Mat, numbering: LevelNumbering) -> Iterator[sp.cs
     """Yield the diagonal blocks of a stiffness in hat and bubble functions of θ, for this rank.
 
     First come the blocks of the hats at this rank's levels of θ, then those of the bubbles at its
-    mid-levels, each half-way between two levels. A block is Tᵀ K T for the nodal values T of one
-    function at all nodes of a plane.
-    All ranks must take their first block together.
+    mid-levels, each half-way between two levels. A block is Tᵀ K T. T has a column for each unknown
+    of a plane, with the values of the block's function of θ at its nodes on all levels and
+    mid-levels. All ranks must take their first block together.
 
     Args:
         matrix: Assembled reduced stiffness K, with the unknowns level by level.

@@ -77,8 +77,9 @@ class HermiteFit:
         # The last one is 1 but for rounding.
         probability[-1] = 1.0
 
-        # The normal equations have the right-hand sides ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ for h2 and
-        # h4. Q is constant between two probabilities, so the integrals of h_i f_Θ there suffice.
+        # The normal equations for a2 and a4 have the right-hand sides ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
+        # dθ with i = 2, 4, and the Gram matrix of h2 and h4 on the left. Q is constant between two
+        # probabilities. `_integrals` gives ∫ h_i f_Θ dθ up to each of them.
         rule_weights, h = self._hermite_at_nodes
         of_ends = h[[1, 3]] * rule_weights @ (self.a1 * h[0] + self.a3 * h[2])
         of_sample = np.diff(self._integrals(probability), axis=1) @ sample.values
@@ -234,7 +235,8 @@ class SlopeBand:
         lower, fitted, upper = np.array([self.a2, self.a4]).T
         lower = np.minimum(np.clip(lower, min_end, max_end), fitted)
         upper = np.maximum(np.clip(upper, min_end, max_end), fitted)
-        # At 0 only the fitted slopes are left, which are monotone.
+        # `fraction` is the part of the way that is left. At 0 only the fitted slopes are left,
+        # which are monotone.
         for fraction in np.linspace(1, 0, 201):
             low = fitted + fraction * (lower - fitted)
             high = fitted + fraction * (upper - fitted)
@@ -322,10 +324,10 @@ class PBox:
         return (self.a2.upper - self.a2.lower) * h2 + (self.a4.upper - self.a4.lower) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Return the largest distance, a probability, of the sample's distribution from the p-box.
+        """Return by how much the sample's distribution function leaves the p-box, a probability.
 
-        It is 0 where the distribution function of the sample lies between the two of the p-box,
-        which are 0 below and 1 above the limits of the map.
+        It is the largest distance over all radii, and 0 if the function lies between the two of the
+        p-box everywhere. These two are 0 below and 1 above the limits of the map.
 
         Args:
             sample: Reduced radii, at least one.
@@ -395,7 +397,7 @@ def least_pbox(
     contains, bounds = _containment(fit, sample, band)
     h2, h4 = fit.mean_shapes
     result = linprog(
-        [-h2, h2, -h4, h4],  # the area
+        [-h2, h2, -h4, h4],  # the area: the mean of the largest less the smallest radius
         A_ub=np.concatenate([contains, is_monotone.reshape(-1, 4)]),
         b_ub=np.append(bounds, base_slopes),
         bounds=limits,

@@ -273,10 +273,10 @@ def _bounding_pairs(discs: Particles, portion: Ints) -> Pairs:
 def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
     """Return the cells that no disc outside the window can change, and how many each stands for.
 
-    Large cells are changed more often than small ones; each counted cell therefore stands for 1/p
-    cells, p the fraction of positions in the window where an equal cell would count (Miles 1974,
-    Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose centre lies
-    in the window, and no disc outside larger than the largest one inside.
+    Large cells are changed more often than small ones. So each counted cell stands for 1/p cells,
+    where p is the fraction of positions in the window at which an equal cell would count (Miles
+    1974, Lantuéjoul 1978). This holds for a homogeneous section, with every disc listed whose
+    centre lies in the window, and no disc outside larger than the largest one inside.
 
     Args:
         diagram: Cells of discs in a window or in a periodic box.

@@ -55,7 +55,7 @@ def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
     M_minus_C = 2 / far
     M = (M_plus_C + M_minus_C) / 2
     # The area is M (cosh(midpoint) sinh(half) − half) + (M − C) half, over ((M + C) (M − C))^1.5.
-    # With cosh x − 1 = 2 sinh²(x/2) nothing cancels.
+    # With cosh x − 1 = 2 sinh²(x/2), and sinh x − x by `_sinh_less_argument`, nothing cancels.
     sinh_term = 2 * np.sinh(midpoint / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)
     return np.asarray((M * sinh_term + M_minus_C * half) / (M_plus_C * M_minus_C) ** 1.5)
 

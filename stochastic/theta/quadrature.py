@@ -184,9 +184,9 @@ def _panel_edges(distribution: ThetaDistribution, edges: Array, rule: Rule) -> A
 def _mass_gaps(distribution: ThetaDistribution, edges: Array, rule: Rule) -> Array:
     """Return the error of a rule for the density f on each panel, shape (panels,).
 
-    It is the larger of the errors of ∫ f, which is [F], and of ∫ x f, which is [x F] − ∫ F dx; F is
-    the distribution function, and x runs from −1 to 1 over the panel. A jump right in the middle of
-    a panel shows in the second error alone.
+    F is the distribution function, and x runs from −1 to 1 over the panel. Exactly, ∫ f is F at the
+    upper end less F at the lower end, and ∫ x f is the sum of both less ∫ F dx. The larger of the
+    two errors is returned. A jump right in the middle of a panel shows in the second one alone.
 
     Args:
         distribution: Distribution of θ.
