@@ -238,7 +238,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         parser, by_name = build_parsers(program, named or names)
     options, unknown = parser.parse_known_args(words)
     if unknown:
-        # Values of an unknown option are unknown words as well: the option is what to tell.
+        # Values of an unknown option are unknown words as well: the option is named.
         first = next((word for word in unknown if word.startswith("-")), unknown[0])
         by_name[options.command].refuse(first)
     if "case" not in options:  # no prisms are solved

@@ -178,7 +178,7 @@ class Content(CellContent):
         a structure has nothing to refuse.
 
         Raises:
-            RefusedError: Nothing moves the structure. The key is that of the initial displacements.
+            RefusedError: Nothing moves the structure. Its key names the initial displacements.
         """
         section = self.structure_section
         # Without loads a structure at rest stays at rest, and bounds of that look like results.

@@ -47,7 +47,7 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         an impulse, "" if a file with a unit of force has the forces themselves, else "N".
 
     Raises:
-        RefusedError: The text is another one, or the file is missing or holds no history.
+        RefusedError: The text has another form, or the file is missing or holds no history.
     """
     allowed = (
         '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'

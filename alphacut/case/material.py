@@ -401,8 +401,8 @@ class ImageCell(Section):
             n_values = len(getattr(self, key) or ())
             allowed = f"one for each of {n_phases} phases"
             require(n_values in fitting, f"cell.{key}", f"{n_values} values", allowed)
-        # Bounds of E are found between those of the phases. Pores and rigid phases have none on one
-        # side, so that without any other phase nothing is bounded.
+        # Bounds of E follow from the moduli of the phases. A pore gives no lower bound and a rigid
+        # phase no upper one, so that without any other phase nothing is bounded.
         allowed = "a phase that is neither a pore nor rigid"
         require(any(self.is_solid), "cell.modulus", "none between 0 and rigid", allowed)
         # A pore and a rigid phase store no energy, so that their loss factors would mean nothing.

@@ -62,8 +62,8 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     try:
         content = model.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        # Pydantic tries each member of a union, whose errors may be the same: each text is told
-        # once. All problems are told together, so that a case is mended in one round.
+        # Pydantic tries each member of a union, whose errors may be the same: each text is kept
+        # once. All problems are reported together, so that a case is mended in one round.
         problems: dict[str, RefusedError] = {}
         for x in _refusals(model, error):
             place = str(path)
@@ -112,8 +112,8 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
     """Yield a problem for each error of Pydantic, by the key that has it.
 
     A misspelt key makes two errors of Pydantic: an unknown key, and the right one that is missing.
-    They become one problem, that of the unknown key, which names the key that may be meant. If no
-    known key is near, it lists the keys of the section.
+    They become one problem of the unknown key, which names the key that may be meant. If no known
+    key is near, it lists the keys of the section.
 
     Args:
         model: Class of the content that was validated.

@@ -196,7 +196,7 @@ class Structure:
 def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     """Return the ground acceleration record of a file that the case names.
 
-    What is unusual in the record is told by a Python warning, each time it is read.
+    Each unusual property of the record is reported by a Python warning, each time it is read.
 
     Args:
         value: Name of the file, relative to the folder of the case.
@@ -207,7 +207,7 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     """
     path = case_file(value, info)
     ground = read_record(path)
-    # What is unusual need not be wrong: it is told, and the record is taken as it is.
+    # What is unusual need not be wrong: the record is taken as it is.
     for remark in ground.remarks:
         warnings.warn(f"of {path.name} {remark}", stacklevel=2)
     return ground
@@ -406,8 +406,7 @@ class Frame(StructureSection):
         Args:
             coefficients: Weight over stiffness and height of each storey, shape (floors,), the
                 largest that the inputs allow. From 1 on the storey buckles: then, and if all are
-                below 1e-5, a unit is doubted. Those between 0.1 and 1 are told one by one; smaller
-                ones need no word.
+                below 1e-5, a unit is doubted. Each storey between 0.1 and 1 has its own sentence.
         """
         lightest = 1e-5  # buildings have coefficients above 1e-4
         largest = coefficients.max()
@@ -437,8 +436,8 @@ class Frame(StructureSection):
         """Return the frame with its fuzzy parameters, and the heights of its storeys.
 
         Args:
-            modulus: Young's modulus in Pa; None for that of the section, or a stand-in of 20 GPa
-                where the section has none. It is ignored if stiffnesses are given.
+            modulus: Young's modulus in Pa; None for the modulus that the section states, or for
+                20 GPa if it states none. It is ignored if stiffnesses are given.
             loss: Loss factor of the material, for `damping_ratio` "material"; None for a stand-in
                 of 2 %. It is ignored otherwise.
 

@@ -32,8 +32,8 @@ def with_structures(content: type[C], *, built: bool) -> type[C]:
             are imported; otherwise they are kept as the tables that stand in the file.
 
     Returns:
-        The class. The new fields stand after those that `content` inherits and before its own;
-        errors are told in this order.
+        The class. The new fields stand after the fields that `content` inherits, and before its
+        own. Errors are reported in this order.
     """
     return cast("type[C]", _whole_case(content, tuple(STRUCTURES.items()), built=built))
 
@@ -63,7 +63,7 @@ def _whole_case(
         if built:
             kind = resolve_name(place) | None
         fields[name] = (kind, None)  # the type of the field, and its default
-    # Pydantic takes fields from the last base on: those of the cell, of structures, of the rest.
+    # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest.
     bases: Any = (content, create_model("Structures", __base__=CellContent, **fields))
     whole: type[CellContent] = create_model(content.__name__, __base__=bases)
     whole.__doc__ = content.__doc__

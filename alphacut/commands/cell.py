@@ -110,7 +110,7 @@ def export(problem: CellProblem, path: Path) -> Document:
         Document with the "file" and the number of its "nodes".
 
     Raises:
-        RefusedError: The ending is another one, or a library is missing.
+        RefusedError: The ending is none of these, or a library is missing.
         OSError: The file cannot be written.
     """
     # DOLFINx takes seconds to import, and only this option needs it here.
@@ -141,10 +141,10 @@ def document_of(result: HomogenisedStiffness) -> Document:
     Returns:
         E and ν are None if no isotropic solid has the moduli of the cell. "stress_GPa" has the mean
         σ11 and σ12; "fibres" the constants of a transversely isotropic cell, else nothing;
-        "stiffness_GPa" the plane stiffness, shape (3, 3); "plane" E_x, E_y, ν_xy and G_xy by
-        definition; and "curve" the stresses over θ with the weights of the mean. Errors are
-        absolute, and None where the model declares none. The other entries are facts of the
-        computation.
+        "stiffness_GPa" the plane stiffness, shape (3, 3); "plane" E_x, E_y, ν_xy and G_xy for each
+        of their definitions, such as plane strain; and "curve" the stresses over θ with the weights
+        of the mean. Errors are absolute, and None where the model declares none. The other entries
+        are facts of the computation.
     """
     curve = result.curve
     document: Document = {"E_GPa": None, "nu": None}

@@ -83,7 +83,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         study = require_runnable(content)
         structure = _structure_of_envelope(content)
     except RefusedError:
-        # A wrong unit may be the cause of what is refused, and is told before it.
+        # A wrong unit may be the cause of what is refused, and is shown before it.
         for doubt in doubts_before_refusal(content, rows):
             say(f"warning: {doubt}")
         raise
@@ -225,7 +225,7 @@ def motion_text(content: Content, structure: Structure) -> str:
         strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
         duration = step * round(strongest.duration / step)
         moved = linear.moved_by(strongest.ground)
-    # Of a very long response the first steps tell enough, and `check` is to end in seconds.
+    # The first steps of a very long response are enough, and `check` is to end in seconds.
     duration = min(duration, MOST_TIMED_STEPS * step)
     return text + "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
 
@@ -299,8 +299,8 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
 
     Args:
         modes: Undamped modes by rising frequency, at the most plausible values.
-        is_shaken: Whether the ground moves, as under buildings, whose first periods are longer than
-            those of parts of machines.
+        is_shaken: Whether the ground moves. The structure is then taken for a building, whose
+            first period is longer than that of a part of a machine.
 
     Returns:
         Lines that end with a newline, with a warning if the first period is unusual.
@@ -488,9 +488,9 @@ def _entries(value: object) -> dict[str, object]:
     """Return the values of a key by what follows the key in a row of the table.
 
     Args:
-        value: Value of the key. The entries of a dictionary follow as ".name", those of a tuple as
-            "[1]", "[2]" …; a tuple with one entry, and any other value, follow the bare key as "".
-            An empty tuple or dictionary has no rows.
+        value: Value of the key. Entries of a dictionary have ".name", entries of a tuple "[1]",
+            "[2]" … A single entry of a tuple, and any other value, has "". An empty tuple or
+            dictionary gives nothing.
     """
     if isinstance(value, dict):
         return {f".{name}": entry for name, entry in value.items()}

@@ -116,7 +116,7 @@ def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
     """
     parts = list[float]()
     seconds = list[float]()
-    # After two seconds no more is timed: it would tell more, but let the user of `check` wait.
+    # After two seconds no more is timed, so that the user of `check` need not wait.
     for fraction in (1 / 64, 1 / 64, 1 / 32, 1 / 16):
         start = perf_counter()
         parts.append(run(fraction))
@@ -132,8 +132,8 @@ def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
         return compiling + seconds[-1] / parts[-1]
     if len(parts) < 3:  # parts so long consist of what every part takes once
         return compiling + seconds[-1]
-    # The weights 1/t make the least squares those of the relative errors: the short parts would
-    # else not count, and they tell a.
+    # With the weights 1/t relative errors are squared. Otherwise short parts would hardly count,
+    # from which the constant a is found.
     timed = np.array(seconds[1:])
     slope, constant = np.polyfit(parts[1:], timed, 1, w=1 / timed)
     return compiling + float(max(slope + constant, timed.max()))
@@ -404,7 +404,7 @@ def shortened(task: EnvelopeTask, fraction: float) -> tuple[EnvelopeTask, float]
         eight steps at least, if the response has as many. If the response has more than 16,000
         steps, the fraction is taken of 16,000, since parts of all steps would take long as well.
     """
-    # In fewer than eight steps nothing moves, and the cost of starting hides that of steps.
+    # In fewer than eight steps nothing moves, and the cost of starting hides the cost of steps.
     steps = round(task.duration / task.section.step)
     count = min(steps, max(8, round(fraction * min(steps, MOST_TIMED_STEPS))))
     return replace(task, duration=count * task.section.step), count / steps

@@ -377,7 +377,8 @@ class Pipeline:
     def _compute_shares(self) -> None:
         """Compute by how much each input widens E, ν and the peaks, into `results.shares`.
 
-        The peaks are those of the study with the most fuzzy inputs, of several the longest.
+        The peaks are taken from the study with the most fuzzy inputs; of several such studies from
+        the longest one.
 
         Raises:
             CampaignError: Samples of the cell failed.
@@ -464,8 +465,8 @@ def _require_motion(content: Content) -> None:
     and the case is refused only if neither works.
 
     Raises:
-        RefusedError: Of the first material, if all are refused.
-        FailedError: Likewise, if the computation cannot be built with it.
+        RefusedError: All materials are refused; it is the error of the first one.
+        FailedError: The same, if the computation cannot be built with the first one.
     """
     if content.structure is None or content.envelope is None:
         return

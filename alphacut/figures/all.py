@@ -21,7 +21,8 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
     The names are those of the files: "modulus", "image", "update-inputs", the key of each answered
-    question, "fragility-curves", and those of the envelopes of each study.
+    question, "fragility-curves", and "envelope-STUDY-OUTPUT" for each drawn output of a study, with
+    "figNUMBER-" before it if it is a figure of the paper.
 
     Args:
         results: Results of a run; stages that are missing have no figures.
@@ -49,8 +50,8 @@ def draw_figures(results: Results, store: StageStore) -> list[str]:
         store: Store of its results, which has a folder.
 
     Returns:
-        Paths of the figures relative to the folder, those of stage microstructure first. It draws
-        its own, since they need the particles, which are not kept.
+        Paths of the figures relative to the folder. The first ones were drawn by stage
+        microstructure itself, since they need the particles, which are not kept.
     """
 
     def compute(context: StageContext) -> StageResult[list[str]]:

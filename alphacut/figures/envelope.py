@@ -86,7 +86,7 @@ def envelope(
 
     nature = Nature(dataset.attrs["nature"])
     error = ""
-    # Guaranteed bounds contain their error, and attained ones have none that is known.
+    # Guaranteed bounds contain their error, and the error of attained bounds is not known.
     if nature is Nature.ESTIMATED and "error" in dataset:
         error = draw_error_band(axes, time, shown.isel(alpha=0), unit)
         if peak is not None:  # its error contains what lies between nodes

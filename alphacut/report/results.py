@@ -199,11 +199,11 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
         nature_of_constants = Nature.ATTAINED
         error = sum(part.error.values()) * float(young.upper.max())
         error_words = error_text(error, part.nature)
-        # A mesh from a file is solved once, without a finer one that would tell the error.
+        # A mesh from a file is solved once; the error would need a finer mesh.
         if part.particles == "mesh":
             error_words = "not declared"
         constants["ν"] = part.nu_cuts
-        # E is that of an isotropic solid with the moduli of the plane. E_T is the modulus across
+        # E belongs to an isotropic solid with the moduli of the plane. E_T is the modulus across
         # fibres whose ends are free, which a designer needs beside it.
         for name, cuts in part.fibres.items():
             if every_constant or name == "E_T_GPa":
@@ -228,7 +228,7 @@ def _loss_rows(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
     Args:
         part: α-cuts of the loss factors by "E", "G" and "K"; of an image there may be other
             constants. Those of an image are guaranteed to first order, at nominal moduli.
-        every_constant: Whether all are shown, instead of that of E alone.
+        every_constant: Whether all are shown, instead of the loss factor of E alone.
     """
     if isinstance(part, ImageResult):
         for name, cuts in part.proved_losses.items():
@@ -597,7 +597,7 @@ def drivers(parts: Parts) -> Iterator[str]:
             results are "E", "ν" and, for each output, "the peak of NAME". Without them nothing is
             yielded.
     """
-    # The last output of a case is in general that of the top floor, which moves most.
+    # The last output of a case in general belongs to the top floor, which moves most.
     peaks = [name for name in parts.shares if name not in ("E", "ν")]
     if "E" in parts.shares:
         yield _driver_sentence("E", parts.shares["E"], count=3)

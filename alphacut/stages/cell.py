@@ -199,7 +199,7 @@ class CellProblem:
     def solve(self, **options: bool) -> HomogenisedStiffness:
         """Return the homogenised stiffness at the nominal values of all parameters.
 
-        Its E and ν are those of the average that the case asks for.
+        Its E and ν belong to the average of the stiffness that the case asks for.
 
         Args:
             options: `estimate`, whether errors are declared, if need be by a reference solution (by
@@ -329,8 +329,8 @@ def require_bounds(young: tuple[float, float], references: References, particles
     Args:
         young: Lower and upper bound of E at the nominal inputs, in GPa.
         references: Bounds of E in GPa as `hashin_shtrikman_E_GPa`; the stated fraction as
-            `fraction_of_case`, without which nothing is checked; and that of the radius map as
-            `fraction`.
+            `fraction_of_case`, without which nothing is checked; and the fraction of the radius map
+            as `fraction`.
         particles: Particles as the case has them; nothing is checked unless they are "spheres".
 
     Raises:
@@ -338,8 +338,8 @@ def require_bounds(young: tuple[float, float], references: References, particles
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
-    # The interval of E and that of the bounds, which is widened by the slack, must have a point in
-    # common: the bounds are at the stated fraction, E is at that of the map.
+    # The interval of E and the interval of the bounds, widened by the slack, must have a point in
+    # common. The bounds are for the stated fraction, E for the fraction of the map.
     low, high = references["hashin_shtrikman_E_GPa"]
     fraction = references["fraction_of_case"]
     slack = 5e-3

@@ -147,8 +147,8 @@ def structure_as_computed(content: Content, material: Material) -> Structure:
     losses: tuple[FuzzyNumber, ...] = ()
     if content.cell is not None:
         losses = content.cell.losses
-    # The loss factor of the cell is a mean of those of its phases, weighted by energies that depend
-    # on the elastic inputs: it is fuzzy if either are.
+    # The loss factor of the cell is a mean of the loss factors of its phases, weighted by energies,
+    # which depend on the elastic inputs. It is fuzzy if these inputs or the loss factors are.
     has_fuzzy_losses = has_cuts and any(loss.support.width > 0 for loss in losses)
     if content.has_material_damping and (is_fuzzy or has_fuzzy_losses):
         for name, number in structure.numbers.items():

@@ -150,13 +150,13 @@ def image_result(found: FuzzyImageStiffness) -> ImageResult:
             infinite, and stay so.
 
     Returns:
-        The cuts of E on all levels. The whole stiffness matrices in Voigt's notation, 6×6 of a
-        volume or 3×3 of an image, and the bounds of ν and of the shear modulus are those of the
-        highest level alone. `plane` has the cuts of the constants along the axes under "along the
-        axes" for a volume, "plane strain" for an image.
+        E and the constants in `plane` have cuts on all levels. The stiffness matrices in Voigt's
+        notation, 6×6 of a volume or 3×3 of an image, and the bounds of ν and of the shear modulus
+        belong to the highest level alone. `plane` has the constants along the axes, by the key
+        "along the axes" for a volume and "plane strain" for an image.
     """
-    # On the highest level the phases are crisp or nearly so: there matrices are close bounds, while
-    # below they would tell the width of the inputs rather than the stiffness.
+    # On the highest level the phases are crisp or nearly so, and matrices are close bounds of the
+    # stiffness. On lower levels their distance would come from the width of the inputs.
     top = found.cuts[-1]
     if len(found.lengths) == 3:  # voxels of a volume have three sides, pixels of an image two
         average = HILL

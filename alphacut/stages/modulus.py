@@ -98,7 +98,7 @@ def in_units_of_results(constants: Mapping[str, Array]) -> dict[str, Ends]:
             "nu_xy", shape (levels, 2) each.
 
     Returns:
-        The cuts of moduli in GPa by NAME_GPa, those of Poisson's ratios by their own names.
+        The cuts: of moduli in GPa by NAME_GPa, and of Poisson's ratios by their own names.
     """
     cuts: dict[str, Ends] = {}
     for name, bounds in constants.items():
@@ -121,10 +121,10 @@ def modulus_result(problem: CellProblem, stiffness: FuzzyStiffness) -> ModulusRe
         stiffness: α-cuts of its constants in SI units.
 
     Returns:
-        `plane` has the constants along the axes by definition, "plane strain" or "no stress along
-        the fibres", and by name; definitions without constants are left out. `fibres` has those
-        across and along fibres, empty where they are not known. `error` is the largest relative
-        error of E of all samples by source.
+        `plane` has the constants along the axes by name, for each of their definitions: "plane
+        strain" and "no stress along the fibres". A definition without constants is left out.
+        `fibres` has the constants across and along fibres, empty if they are not known. `error` is
+        the largest relative error of E of all samples, by source.
     """
     # Results have moduli in GPa, while the dataset beside them has SI units. The names of constants
     # without stress along the fibres end in a suffix.

@@ -243,7 +243,7 @@ class StageStore:
     def _read(self, stage: Stage[T]) -> StageResult[T] | None:
         """Return the result of a stage from its files, if they are up to date.
 
-        The name of the stage is then added to `up_to_date`. A damaged file is told by a warning.
+        The name of the stage is then added to `up_to_date`. A warning names a damaged file.
 
         Args:
             stage: The stage, whose key has all that its result depends on.
@@ -360,8 +360,8 @@ class StageStore:
         if computed.data is not None:
             with whole_file(files / f"{stage.name}.nc") as partial:
                 computed.data.to_netcdf(partial)
-        # `before` tells what the earlier result was made from: those of its files that this result
-        # does not replace are removed.
+        # `before` is the digest of what the earlier result was made from. Files of it that this
+        # result does not replace are removed.
         before = ""
         if name in self.folder.files:
             before = self.folder.files[name].source

@@ -183,7 +183,7 @@ def incremental_stage(
     Args:
         section: The question, whose limits name the outputs.
         structure: The frame.
-        name: Name of the record; that of the stage is "incremental_NAME".
+        name: Name of the record. The stage is named "incremental_NAME".
         analysis: The incremental dynamic analysis of the frame under this record, with its fuzzy
             inputs and the same limits.
 

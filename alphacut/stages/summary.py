@@ -109,7 +109,7 @@ class Results:
         structure = self.structure
         if structure is None or structure.linear is None or not structure.floor_masses:
             return None
-        # Heights are shown as references of drifts: those of drifts that nobody observes are not.
+        # Heights are shown as references of drifts, so that only observed drifts need theirs.
         omega = frequencies(structure.linear)
         observed = set(structure.outputs)
         heights = {x: height.nominal for x, height in structure.heights.items() if x in observed}
@@ -205,9 +205,9 @@ class Parts:
         """Return the unit in which each output is shown, wherever it is.
 
         Returns:
-            Label and factor from SI by output. The unit is that of the first limit of the output
-            that states one; else g for accelerations, and for others the SI unit with a prefix that
-            fits the largest peak. Outputs that no study has are left out.
+            Label and factor from SI by output. It is the unit of the first limit of the output that
+            states one; without such a limit g for accelerations, and for others the SI unit with a
+            prefix that fits the largest peak. Outputs that no study has are left out.
         """
         units: dict[str, str] = {}
         largest: dict[str, float] = {}
