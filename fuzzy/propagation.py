@@ -225,8 +225,8 @@ def width_fractions(
     ends_by_group = [ends_with(group) for group in members.values()]
     lowers = np.array([x.lower for x in ends_by_group])
     uppers = np.array([x.upper for x in ends_by_group])
-    # What is reached with an input fixed is reached in the whole box, too, although a search of the
-    # whole box may have missed it: so no fraction is negative.
+    # The whole box holds the boxes with inputs fixed. A search may have missed values in it that
+    # were found in these. They are added to its width here, so that no fraction is negative.
     width = np.maximum(ends.upper, uppers.max(axis=0)) - np.minimum(ends.lower, lowers.min(axis=0))
     reduction = width - (uppers - lowers)
     fraction = np.divide(reduction, width, out=np.zeros_like(reduction), where=width > 0)

@@ -97,7 +97,7 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
         yield partial
         os.replace(partial, path)
     # Libraries report a full disk in their own words, HDF5 by a RuntimeError without a reason. So
-    # the disk is asked, of which a full one may have some small blocks left.
+    # the free space is looked at; a full disk may have some small blocks left.
     except (OSError, RuntimeError):
         if shutil.disk_usage(path.parent).free < 1 << 20:
             cure = "free some space"

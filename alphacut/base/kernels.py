@@ -170,7 +170,7 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
 def _remove_damaged(path: Path) -> None:
     """Remove a file whose last 32 bytes are not the SHA-256 of all others; it may be missing.
 
-    An empty file, and one with fewer bytes, is removed, too.
+    A file of fewer than 32 bytes is removed, too.
 
     Raises:
         OSError: The file cannot be read or removed.

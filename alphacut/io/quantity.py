@@ -165,8 +165,8 @@ def _factor_by_pint(unit: str, si: str) -> Decimal:
 def _wrong_unit(unit: str, si: str) -> str:
     """Return a clause that says what is wrong with a unit, and what to write in its place.
 
-    It says of which dimension the unit is, if it is a common unit of another one, and then the unit
-    that was probably meant, or the common units of the dimension.
+    If the unit is a common one of another dimension, this dimension is named. Then the unit follows
+    that was probably meant, or the units that are allowed.
 
     Args:
         unit: The unit as it was written, which is none of the dimension.
@@ -435,8 +435,8 @@ def parse_fuzzy_in_any_unit(
     # Each dimension gave a reason. They are the same if the number is wrong, else the unit is.
     if len(set(reasons)) == 1:
         raise ValueError(reasons[0])
-    # Of the reasons that differ, one that names what was probably meant helps most. That of a pure
-    # number says nothing about units.
+    # If reasons differ, one that names what was probably meant helps most. The reason of the pure
+    # number, whose `si` is empty, says nothing about units.
     for si, reason in zip(units, reasons, strict=True):
         if si and re.search("did you mean|; write", reason):
             raise ValueError(reason)

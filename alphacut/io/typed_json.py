@@ -81,8 +81,8 @@ def _read(kind: Any, document: Any, path: str) -> Any:
 
     Args:
         kind: A dataclass, typed dict, named tuple, enumeration, float, int, bool, str, None's type,
-            list, dict, or a kind with arguments such as ``list[float]``. Any and object stand for
-            every document.
+            list, dict, or a kind with arguments such as ``list[float]``. With Any or object the
+            document itself is returned.
         document: What `json` has read: dict, list, str, int, float, bool or None.
         path: Keys that lead to the document, for messages; empty for a whole one.
 

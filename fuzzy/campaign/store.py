@@ -265,7 +265,7 @@ def _is_store(path: Path) -> bool:
         return True
     head = read_regular(path, head_size)
     if not head.startswith(b"SQLite format 3\0"):
-        return not head
+        return not head  # True for an empty file
     return int.from_bytes(head[head_size - 4 :], "big") == _APPLICATION
 
 

@@ -347,7 +347,7 @@ def _changed_in_turn(turns: Array) -> Array:
     count, inputs = turns.shape
     path = np.empty(((count - 1) * inputs + 1, inputs))
     for column in range(inputs):
-        # This input is changed by every step number column, column + inputs, …
+        # The steps column, column + inputs, …, counted from 0, change this input.
         changes = np.arange(len(path)) + inputs - 1 - column
         path[:, column] = turns[changes // inputs, column]
     return path

@@ -358,9 +358,9 @@ class SingleLinkage:
         for cut, bound in product(self.cuts, self.bounds):
             if bound.output == output and self.is_estimate(output):
                 self._leave_stalls(cut, bound)
-        # The search itself has started no descent there, as the best optimum is nearby. And waves
-        # exceed the optimum only nearby: farther away the trend has changed the output by more than
-        # they do.
+        # The search has started no descent there, since the best optimum is nearby. Only nearby can
+        # a wave lead to a better value: farther away the trend changes the output by more than the
+        # wave does.
         for cut, bound, side in product(self.cuts, self.bounds, (-1.0, 1.0)):
             # A recorded optimum may open the search again, hence the question in the loop.
             if bound.output != output or not self.is_estimate(output):
@@ -375,8 +375,9 @@ class SingleLinkage:
         """Go on from optima at kinks and jumps, by one input after another.
 
         Along a kink of one input a descent stalls although another input still lowers the value,
-        perhaps to below the best optimum, which is smooth. Where a value improves along an input,
-        a descent starts, and its end is recorded: a bound that lies at a kink is attained only.
+        perhaps to below the best optimum, which is smooth. Each input in turn is set to the best of
+        nine places in its cut. If the value has then improved by more than the tolerance, a descent
+        starts, and its end is recorded.
 
         Args:
             cut: The α-cut.

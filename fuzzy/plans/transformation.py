@@ -462,9 +462,9 @@ def _observed_signs(
 
 
 def _slopes(model: Model, lower: Array, upper: Array, *, points: Array, inputs: Ints) -> Array:
-    """Return one-sided difference quotients by some inputs inside a box.
+    """Return the slopes of all outputs at points of a box, along some inputs.
 
-    Steps are 1e-3 of the width of the box, and go to its inside.
+    They are one-sided differences over a step of 1e-3 of the width of the box, to its inside.
 
     Args:
         model: Function from points, shape (n, inputs), to the outputs there, shape (n, outputs).
