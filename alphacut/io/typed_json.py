@@ -148,7 +148,7 @@ def _read_parametrised(kind: Any, document: Any, path: str) -> Any:
         values = {}
         for name, entry in document.items():
             key = _read(arguments[0], name, path)
-            values[key] = _read(arguments[1], entry, _below(path, key))
+            values[key] = _read(arguments[1], entry, _entry_path(path, key))
         return values
     _require(isinstance(document, list), document, path)
     # One kind for all entries, or one for each
@@ -205,14 +205,14 @@ def _read_fields(kind: Any, document: Any, path: str) -> Any:
     known = _known_fields(kind)
     for name in document:
         is_known = name in known.types or name in known.derived
-        _require(is_known, name, _below(path, name))
+        _require(is_known, name, _entry_path(path, name))
     for name in known.required:
-        _require(name in document, None, _below(path, name))
+        _require(name in document, None, _entry_path(path, name))
     # What a dataclass makes itself follows from the other fields, and is made again by its class.
     values = {}
     for name, entry in document.items():
         if name not in known.derived:
-            values[name] = _read(known.types[name], entry, _below(path, name))
+            values[name] = _read(known.types[name], entry, _entry_path(path, name))
     return kind(**values)
 
 
@@ -259,6 +259,6 @@ def _checked(check: Callable[[Any], Any], value: Any, path: str) -> Any:
         raise ValueError(f"{path}: {value!r:.40}") from None
 
 
-def _below(path: str, key: object) -> str:
+def _entry_path(path: str, key: object) -> str:
     """Return the path of the entry with a key in the document of a path."""
     return f"{path}.{key}".lstrip(".")

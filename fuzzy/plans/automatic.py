@@ -142,11 +142,11 @@ class _AutomaticSearch:
         self.is_rough = walk.is_rough
         if walk.is_monotone.any():
             self.notes.append(
-                f"corners alone bound {_listed(self.outputs[walk.is_monotone])}: the differences of"
-                f" each input keep their sign at {walk.n_points} points"
+                f"corners alone bound {_few_names(self.outputs[walk.is_monotone])}: the differences"
+                f" of each input keep their sign at {walk.n_points} points"
             )
         if walk.is_constant.any():
-            constant = _listed(self.outputs[walk.is_constant])
+            constant = _few_names(self.outputs[walk.is_constant])
             self.notes.append(f"{constant} does not change along the walk, and is not searched")
         is_searched = ~(walk.is_monotone | walk.is_constant)
         if not is_searched.any():
@@ -190,14 +190,14 @@ class _AutomaticSearch:
         if self.linkage is not None and self.linkage.outputs:
             notes.append(self.linkage.summary())
             if self.is_rough.any():
-                rough = _listed(self.outputs[self.is_rough])
+                rough = _few_names(self.outputs[self.is_rough])
                 notes.append(f"descents may pass over jumps or waves beside a trend of {rough}")
         if self.was_ended:
             notes.append("the budget ended the search: a larger one may find more")
         elif self.linkage is not None:
             kinked = [name for name in self.linkage.outputs if self.linkage.is_rough(name)]
             if kinked:
-                notes.append(f"a bound of {_listed(kinked)} lies at a kink or a jump")
+                notes.append(f"a bound of {_few_names(kinked)} lies at a kink or a jump")
         return notes
 
 
@@ -228,7 +228,7 @@ def _with_errors(bounds: Bounds, is_estimated: Mask, domain: Domain) -> Bounds:
     )
 
 
-def _listed(names: Iterable[str]) -> str:
+def _few_names(names: Iterable[str]) -> str:
     """Return the first four names, with an ellipsis if there are more."""
     all_names = list(names)
     text = ", ".join(all_names[:4])

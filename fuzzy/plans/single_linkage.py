@@ -498,7 +498,7 @@ class SingleLinkage:
             CampaignError: The model failed at some points.
         """
         state = self.states[cut.level, bound]
-        rows = self._rows(cut)
+        rows = self._uniform_rows(cut)
         unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
         # Descents are remembered by the rows of the samples, and of corners by negative numbers.
         keys = [int(row) for row in np.append(rows, np.arange(-len(cut.corners), 0))]
@@ -652,7 +652,7 @@ class SingleLinkage:
         values = self._values[bound]
         return value_tolerance(float(np.ptp(values)), float(np.abs(values).max()))
 
-    def _rows(self, cut: CutSearch) -> Ints:
+    def _uniform_rows(self, cut: CutSearch) -> Ints:
         """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 
@@ -678,7 +678,7 @@ class SingleLinkage:
         """
         # The stopping rule of the search is for uniform samples. That further ones lie far apart
         # does no harm, since the rule is never met where plateaus are large.
-        rows = self._rows(cut)
+        rows = self._uniform_rows(cut)
         missing = count - len(rows)
         if missing <= 0:
             return
