@@ -90,7 +90,7 @@ class StiffnessBounds:
         if self.dimension == 3:
             return self._hill(1)
         # Both averages rise in C11 − C12 and C33, each of which is the value of C at a strain.
-        with np.errstate(divide="ignore"):  # a mean of 0, of infinity
+        with np.errstate(divide="ignore"):  # a mean with a modulus of 0
             low = float(shear_modulus(square_moduli(self.lower), average))
             high = float(shear_modulus(square_moduli(self.upper), average))
         if average == AXES:  # C33 itself, which is not rounded
@@ -122,7 +122,7 @@ class StiffnessBounds:
         min_shear, max_shear = self.shear(average)
         softest = [min_shear]
         stiffest = [max_shear]
-        # These stay where there is no bound of the stiffness.
+        # The results where the stiffness has no lower or no upper bound.
         low = 0.0
         high = np.inf
         if self.dimension == 2:
@@ -192,11 +192,11 @@ class StiffnessBounds:
         """
         low, high = self._compliance
         n = self.dimension
-        # A quotient is off by one unit, and so are the factors themselves. The largest compliance
-        # gives the smallest modulus.
-        outwards = np.array([1 - 4 * UNIT, 1 + 4 * UNIT])
+        # The quotients and these numerators are off by one unit each; the lower bounds are moved
+        # down and the upper ones up. The largest compliance gives the smallest modulus.
+        numerators = np.array([1 - 4 * UNIT, 1 + 4 * UNIT])
         with np.errstate(divide="ignore"):
-            moduli = outwards / np.diagonal([high, low], 0, 1, 2).T
+            moduli = numerators / np.diagonal([high, low], 0, 1, 2).T
         ratios = [self._lateral_ratio(i, j) for i, j in SHEARS[n]]
         return np.concatenate([moduli[:n], ratios, moduli[n:]])
 
@@ -243,10 +243,9 @@ class StiffnessBounds:
         low, high = self._compliance
         slack = 4 * UNIT
         middle = (low[i, j] + high[i, j]) / 2
-        variances = np.maximum(np.diagonal(high - low)[[i, j]], 0)
-        radius = np.sqrt(variances).prod() / 2 + slack * np.abs(high).max()
-        # The quotient of two intervals, of which the second one is positive, is extreme at their
-        # ends.
+        diagonal = np.maximum(np.diagonal(high - low)[[i, j]], 0)  # D_ii and D_jj
+        radius = np.sqrt(diagonal).prod() / 2 + slack * np.abs(high).max()
+        # S_ij and the positive S_ii lie in intervals; their quotient is extreme at the ends.
         cross_terms = [-middle - radius, -middle + radius]
         ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
         margin = slack * np.abs(ratios).max()
@@ -283,7 +282,7 @@ class StiffnessBounds:
 
 
 def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -> float:
-    """Return a bound of the mean of Voigt's and Reuss's bulk or shear modulus in space, in Pa.
+    """Return a lower or upper bound in Pa of Hill's mean bulk or shear modulus in space.
 
     Voigt's averages of a stiffness C and Reuss's of a compliance S are, with sums over the normal
     components i ≠ j and over the shear components k of Voigt's order 11, 22, 33, 23, 13, 12,
@@ -291,8 +290,8 @@ def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -
         9 K_V = Σ C_ii + Σ C_ij,      15 G_V = Σ C_ii − Σ C_ij/2 + 3 Σ C_kk,
         1/K_R = Σ S_ii + Σ S_ij,      15/G_R = 4 Σ S_ii − 2 Σ S_ij + 3 Σ S_kk.
 
-    Hill's (1952) average is the mean of both. The computed mean is moved to one side by a bound of
-    its rounding error.
+    Hill's (1952) mean is (K_V + K_R)/2 or (G_V + G_R)/2. The computed mean is moved to one side by
+    a bound of its rounding error.
 
     Args:
         stiffness: Stiffness C of Voigt's average, finite, shape (6, 6), in Pa.
@@ -327,7 +326,7 @@ def _rounding(stiffness: Array) -> float:
 def inverse_below(matrix: Array) -> Array:
     """Return a lower bound of the inverses of all positive definite matrices ≤ `matrix`.
 
-    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse falls. The
+    The order is Loewner's: A ≤ B if B − A is positive semidefinite, and then B⁻¹ ≤ A⁻¹. The
     argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
     `matrix` is singular to rounding.
     """
@@ -338,9 +337,9 @@ def inverse_below(matrix: Array) -> Array:
 def inverse_above(matrix: Array) -> Array:
     """Return an upper bound of the inverses of all symmetric matrices ≥ `matrix`.
 
-    The order is Loewner's, A ≤ B if B − A is positive semidefinite, in which the inverse of
-    positive definite matrices falls. The argument, symmetric positive definite, and the result have
-    the shape (n, n). FailedError if `matrix` is singular to rounding.
+    The order is Loewner's: A ≤ B if B − A is positive semidefinite, and then B⁻¹ ≤ A⁻¹. The
+    argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
+    `matrix` is singular to rounding.
     """
     inverse, error = _inverse(matrix)
     return np.asarray(inverse + error)
@@ -361,7 +360,7 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
         FailedError: The matrix is singular to rounding, or has a diagonal entry that is not
             positive.
     """
-    # Powers of two make the diagonal near 1 without rounding: loads of any size count alike.
+    # Powers of two bring the diagonal near 1 without rounding: rows of any size count alike.
     scale = 2.0 ** -np.round(np.log2(np.diagonal(matrix)) / 2)
     scaled = scale[:, None] * matrix * scale
     try:

@@ -38,8 +38,8 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     Args:
         path: Picture (PNG, TIFF …) or ``.npy``; of a volume a TIFF stack, a folder of pictures in
             the order of the numbers in their names, ``.npy``, ``.mhd`` or ``.nhdr``/``.nrrd``.
-        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit; their
-            number says which of both is read.
+        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit. With two
+            a picture is read, with three a volume.
 
     Raises:
         RefusedError: The file is missing, damaged, none of these, of another dimension, complex,
@@ -52,7 +52,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     if dimension == 2:
         allowed_file = "an image or an array"
         allowed_shape = "one plane of 2 × 2 numbers or more"
-        cures = {3: take_voxel}  # by the dimension of an array of another one
+        cures = {3: take_voxel}  # by the dimension that the file has instead
         require(not path.is_dir(), path.name, "a folder", "a picture", take_voxel)
     else:
         allowed_file = "a volume"
@@ -114,6 +114,7 @@ def _read_volume(path: Path, sides: Sequence[float]) -> Array:
         require_memory(head.shape)
         return head.read()
     from_hdf5 = 'np.save("v.npy", h5py.File("v.h5")["data"])'
+    # How to convert a file, by its ending.
     cures = {
         ".nii": 'np.save("v.npy", nibabel.load("v.nii").get_fdata().T)',
         ".h5": from_hdf5,
@@ -153,9 +154,9 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
     allowed = "a folder of slices, PNG, TIFF or BMP"
     require(count > 1, folder.name, f"{count} pictures", allowed)
     by_number = dict(zip(_numbers_in_names(files), files, strict=True))
-    # A repeated number leaves fewer entries than files, so that some number of the row is missing.
     lowest = min(by_number)
-    # A slice that is missing, or twice there, would move all above it.
+    # A slice that is missing, or there twice, would move all above it. A repeated number leaves
+    # fewer entries than files, so that another one is missing.
     missing = [k for k in range(lowest, lowest + count) if k not in by_number]
     what = f"{count} pictures, none with number {min(missing, default=lowest)}"
     require(not missing, folder.name, what, "slices with numbers that follow one another")
@@ -173,9 +174,9 @@ def _read_slices(folder: Path, *, has_square_pixels: bool) -> Array:
 
 
 def _numbers_in_names(files: Sequence[Path]) -> list[int]:
-    """Return the number of each slice: of the numbers in its name the last one that changes.
+    """Return the number of each slice: the last one in its name that changes between slices.
 
-    Where the names differ in words too, or no number changes, it is the last number.
+    Where the names differ in words too, or no number changes, it is the last number in the name.
 
     Args:
         files: Files of the slices, one at least. Names that have the same words have equally many
@@ -219,8 +220,8 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
         cure = "save the one meant as grey values; a volume takes cell.voxel"
         is_read = (is_grey or is_colour) and frames == 1
         require(is_read, path.name, what, "one page of grey values", cure)
-        # Many programs write equal resolutions whatever the pixels are, such as 0 and 0 in a BMP;
-        # unlike ones are meant.
+        # Many programs write equal resolutions whatever the pixels are, such as 0 and 0 in a BMP.
+        # Only unequal ones say something of the pixels.
         try:
             dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
         except ZeroDivisionError:  # a fraction over 0 in a TIFF: the pixels are not stated
@@ -238,7 +239,7 @@ def _read_picture(path: Path, *, has_square_pixels: bool) -> Array:
 
 
 def _require_right_sign(name: str, picture: Image, values: Array) -> None:
-    """Refuse a picture whose integers Pillow takes for signed where they are not, or reversely.
+    """Refuse a picture whose integers Pillow reads as signed if unsigned, or the other way round.
 
     Args:
         name: Name of the file, for the message.

@@ -137,8 +137,9 @@ def mean_loss(fractions: Array, lowest: Array, highest: Array) -> Enclosure:
         fractions: Lower and upper bound of each fraction, shape (phases, 2). The lower bounds sum
             to at most 1, the upper ones to at least 1.
         lowest: Lower bound of the loss factor of each phase, shape (phases,).
-        highest: Upper bound of it, shape (phases,).
+        highest: Upper bound of the loss factor of each phase, shape (phases,).
     """
+    # `_min_mean` gives a lower bound of the least mean; the greatest is minus the least of minus.
     lower = _min_mean(fractions, np.asarray(lowest))
     return Enclosure(lower, -_min_mean(fractions, -np.asarray(highest)))
 

@@ -37,7 +37,7 @@ def require_memory(shape: Sequence[int], division: int = 1) -> None:
         division: Number of finite elements along each side of a pixel or voxel.
 
     Raises:
-        RefusedError: The grid is too large; the message says which size is not.
+        RefusedError: The grid is too large; the message names a size that fits.
     """
     available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     needed = needed_memory(shape, division)

@@ -235,8 +235,8 @@ class ImageModel:
             bounds.append(solution.bounds)
             if progress is not None:
                 progress(len(bounds) / len(images))
-        # Each interval contains those of higher levels, since every image of a cut is one of the
-        # wider cuts.
+        # Every image of a cut is one of the wider cuts too; so `_nested` widens each interval to
+        # contain those of higher levels.
         young = _nested([x.young(self.average) for x in bounds])
         poisson = _nested([x.poisson(self.average) for x in bounds])
         constants = _nested([x.constants() for x in bounds])
@@ -251,7 +251,7 @@ class ImageModel:
 
         This tests the proof itself. Two images with the geometric means of the lower and upper
         moduli of the narrowest and of the widest cut are solved anew, without a first guess and
-        with ten times the energy error: a coarser solution is cheaper and sees less.
+        with ten times the energy error: this is cheaper, but detects less.
 
         Args:
             images: Lower and upper moduli at each level, for rising α.

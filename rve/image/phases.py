@@ -193,7 +193,8 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
     Returns:
         Lowest and highest number, two arrays of the shape of `grey`.
     """
-    # Thresholds surely at most the grey value have their upper end there, possible ones the lower.
+    # A threshold is surely at most the grey value if its upper end is, and possibly if its lower
+    # end is.
     lower, upper = np.array(thresholds).reshape(-1, 2).T
     first = np.searchsorted(upper, grey, side="right")
     last = np.searchsorted(lower, grey, side="right")

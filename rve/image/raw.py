@@ -98,7 +98,7 @@ class RawHead:
             file.seek(max(self.offset, 0))
             packed = file.read()
         # The limit stops a small file that would unpack to gigabytes.
-        gzip_or_zlib = 47  # zlib's number for the largest window and either of both heads
+        gzip_or_zlib = 47  # zlib's code: the largest window, 15, plus 32 to detect which head it is
         try:
             return zlib.decompressobj(gzip_or_zlib).decompress(packed, expected + 1)
         except zlib.error as error:
@@ -193,16 +193,18 @@ class _Entries:
 
     @classmethod
     def of_file(cls, path: Path) -> _Entries:
-        """Read the lines "key = value" of MetaImage, or "key: value" of NRRD, up to the last one.
+        """Return the entries of a head and its length.
 
-        The head ends with an empty line, or with the line of ElementDataFile; raw data may follow.
+        Its lines are "key = value" in MetaImage and "key: value" in NRRD. The head ends with an
+        empty line, or with the line of ElementDataFile; raw data may follow.
 
         Args:
             path: File that begins with the head.
 
         Returns:
-            Values by keys in small letters, of equal keys the last one; lines without a separator
-            have an empty value. And the bytes of the head, with the line that ends it.
+            Values by keys in small letters, and the number of bytes of the head with the line that
+            ends it. Of equal keys the last one counts; a line without a separator has an empty
+            value.
 
         Raises:
             RefusedError: The file does not end its head within 64 KiB; usual heads are shorter than

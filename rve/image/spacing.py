@@ -12,7 +12,7 @@ from alphacut.base.errors import require
 def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) -> None:
     """Refuse voxels of a file whose sides have other ratios than those of the case.
 
-    Only ratios are compared, of the sides that the file states; one alone has none.
+    Only the ratios of the sides that the file states are compared, so that one alone is allowed.
 
     Args:
         name: Name of the file, for messages.

@@ -91,7 +91,7 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
         path: Picture (PNG, TIFF), or an array in .npy; of a volume a TIFF stack, a folder of
             slices, .npy, .mhd or .nhdr.
         spacing: Side of a pixel or voxel in m; or its sides, along (x, y) of a picture or along (x,
-            y, z) of a volume. A TIFF file is a volume where there are three.
+            y, z) of a volume. A TIFF file is read as a volume if three sides are given.
 
     Returns:
         `values`, grey values or labels of shape (y, x) with y pointing up, or (z, y, x); and
@@ -378,6 +378,7 @@ def _labelled_study(
     for number, label in enumerate(labels):
         phase[grey == label] = number
     values = {float(x) for x in np.unique(grey)}
+    # values without a label, and labels that do not occur
     wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
     allowed = "every value of the image, and no other"
     require(not wrong, "cell.labels", value=wrong, allowed=allowed)

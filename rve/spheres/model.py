@@ -19,7 +19,7 @@ from alphacut.rve.spheres.result import HILL, HomogenisedSpheres, cubic_voigt, s
 def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> Array:
     """Return K, (C11 − C12)/2 and C44 of cubic cells with a sphere at the centre.
 
-    They are the matrix's less the mean dipole stress, which the spheres add at a given mean strain.
+    Each is the matrix's modulus less the mean stress of the sphere's dipole at unit mean strain.
 
     Args:
         radius: Radii over half the cell's side, in [0, 1), shape (n,).
@@ -34,8 +34,8 @@ def space_moduli(radius: Array, materials: Sequence[Material], degree: int) -> A
     nu = matrix.poisson
     axial = _dipoles(radius, matrix, spheres, degree, shear=False)
     shear = _dipoles(radius, matrix, spheres, degree, shear=True)
-    # Dipoles of hydrostatic and of tetragonal strain, (n, m, 2); the former are put into the scale
-    # of the latter. Those of shear are the third column.
+    # Three columns: the dipoles of hydrostatic strain, put into the scale of the others, of
+    # tetragonal strain and of shear.
     dipoles = np.concatenate([axial / [-3 * (1 - 2 * nu), 1], shear], axis=-1)
     scale = 8 * np.pi * mu * (1 - nu) * radius[:, np.newaxis] ** 3 / VOLUME
     return np.asarray(np.array([bulk, mu, mu]) - scale[..., np.newaxis] * dipoles)
@@ -131,8 +131,8 @@ def _dipoles(
     """
     poles = Multipoles.up_to(degree, shear=shear)
     loads = _loads(poles, matrix.poisson, shear=shear)
-    # Powers of r scale amplitudes to r = 1, over those of one load. Of a regular solution 1 the
-    # degree 0 is none, so that its power does not count.
+    # Powers of r scale amplitudes to r = 1, relative to the loads' own. There is no regular
+    # solution of kind 1 and degree 0, so that its power does not matter.
     regular_scale = radius[:, np.newaxis] ** np.maximum(poles.n + poles.kind - 2, 0)
     singular_scale = radius[:, np.newaxis] ** (poles.n + 3 - poles.kind)
     images = couplings(degree, matrix.poisson, shear=shear)

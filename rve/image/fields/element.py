@@ -65,7 +65,7 @@ class Basis:
 def _basis(dimension: int, *, stress: bool) -> Basis:
     """Return the functions of one coordinate whose products over the axes an element consists of.
 
-    Stresses are second derivatives of potentials, so that the slopes of these are continuous.
+    Stresses are second derivatives of potentials, so that potentials have continuous slopes.
 
     Args:
         dimension: 2 for pixels, 3 for voxels.
@@ -73,9 +73,9 @@ def _basis(dimension: int, *, stress: bool) -> Basis:
 
     Returns:
         `functions`, each by its coefficients of 1, x, x², … on [0, 1]; `owners`, for each function
-        the number of its unknown in a cell and how many cells further this cell is; and `places`,
-        the coordinate of each unknown in its cell, from 0 to 1, and whether it is odd, as a slope
-        is. In space a cell has one unknown, by default at 0 and not odd.
+        the number of its unknown, from 0, and how many cells further on the unknown's own cell is;
+        and `places`, the coordinate of each unknown in its cell, from 0 to 1, and whether it is
+        odd, as a slope is. In space a cell has one unknown, by default at 0 and not odd.
     """
     if dimension == 3 and not stress:  # values at both ends
         return Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
@@ -203,9 +203,9 @@ class Element:
 def isotropic_parts(dimension: int, *, stress: bool) -> Array:
     """Return the matrix from Voigt components of a tensor to its trace and parts of its deviator.
 
-    Row 0 is the trace. The squares of the other rows' values sum to 2 dev:dev, twice the squared
-    norm of the deviator. They belong to 11 − 22, in space to (11 + 22 − 2·33)/√3, and to the
-    shears.
+    Row 0 is the trace. The other rows are 11 − 22, in space (11 + 22 − 2·33)/√3, and twice each
+    shear component of the tensor. Their squares sum to 2 dev:dev, twice the squared norm of the
+    deviator.
 
     Args:
         dimension: 2 for the components 11, 22, 12, or 3 for 11, 22, 33, 23, 13, 12.
@@ -374,7 +374,7 @@ def stress_derivatives(dimension: int) -> Derivatives:
         σ_ii = ∂j² Φ_kk + ∂k² Φ_jj − 2 ∂j ∂k Φ_jk,
         σ_ij = ∂i ∂k Φ_jk + ∂j ∂k Φ_ik − ∂i ∂j Φ_kk − ∂k² Φ_ij.
 
-    In the plane Φ_33 is left alone, Airy's function, which varies with x and y.
+    In the plane Φ_33 alone is used: Airy's function of x and y.
 
     Args:
         dimension: 2 for the plane; 3 for space.
@@ -405,7 +405,7 @@ def stress_derivatives(dimension: int) -> Derivatives:
         by_component.append(terms)
     if dimension == 3:
         return by_component
-    # Of derivatives along x and y alone, of Φ_33, the indices (2, 2), each component has one.
+    # Each component has one term of Φ_33, with the indices (2, 2), without a derivative along z.
     plane = []
     for component in (0, 1, 5):  # 11, 22 and 12
         for factor, function, (x, y, z) in by_component[component]:

@@ -58,11 +58,11 @@ class Energies:
     def rounding(self) -> Array:
         """Bound of the absolute error of each energy product, shape (2, fields, fields).
 
-        The first axis is trace and deviator, as of `value`. With errors δa, δb of modes, a b is off
-        by |a| δb + |b| δa + δa δb at most. By Cauchy and Schwarz the mean of each summand is at
-        most a product of roots of mean squares, of modes and of their errors (`mode_errors`). So is
-        the mean of the magnitudes |a b|, to which `summed`, the relative rounding of products and
-        sums, belongs.
+        The first axis is trace and deviator, as in `value`. With errors δa, δb of the modes a, b
+        the product a b is off by |a| δb + |b| δa + δa δb at most. By Cauchy and Schwarz the mean of
+        each summand is at most a product of two root mean squares: of modes (`size`), or of their
+        errors (`mode_errors`). Rounding of products and sums adds `summed` times the mean of |a b|,
+        which is bounded likewise.
         """
         size = np.sqrt(SAFETY * np.maximum(np.diagonal(self.value, axis1=1, axis2=2), 0))
         by_one = _outer(size, self.mode_errors)
@@ -116,10 +116,10 @@ def energies(
             exact fields.
 
     Returns:
-        Energies with `value`, the symmetric products by trace and by deviator, shape (2, fields,
-        fields); `mode_errors`, bounds of the roots of the mean squares of the weighted errors of
-        modes, shape (2, fields); and `summed`, a bound of the relative rounding of products and
-        sums.
+        Energies with `value`, the products of the traces and those of the deviators, shape (2,
+        fields, fields), symmetric; `mode_errors`, for trace and deviator of each field a bound of
+        the root of the mean over cells of Σ coefficient · error² over modes, shape (2, fields); and
+        `summed`, a bound of the relative rounding of products and sums.
     """
     xp = namespace(fields)
     count = fields.shape[0]
@@ -129,6 +129,7 @@ def energies(
     additions = 0
     max_cells = 0
     for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
+        # `modes_of` gives the factors of this bound of the errors of modes.
         errors = xp.tensordot(amplification, local, axes=1) + UNIT * xp.abs(modes)
         for k, (rows, coefficient) in enumerate(zip(element.parts, coefficients, strict=True)):
             factor = xp.reshape(coefficient[slab], (-1,))
@@ -216,8 +217,8 @@ def modes_by_matrices(
     xp = namespace(fields)
     matrix = xp.asarray(element.modes)
     magnitude = xp.asarray(element.magnitude)
-    # Rounded are the sums of the product, in which zeros add no error, and each entry of the
-    # matrix, whose terms are off by up to 16 units.
+    # A sum of n terms is off by n units, where zeros do not count; each entry of the matrix is off
+    # by up to 16 units.
     terms = int((element.magnitude > 0).sum(axis=1).max())
     relative_error = (terms + 16) * UNIT
     for slab in slabs(fields):
@@ -323,7 +324,7 @@ def solve_side(
 
     Args:
         element: Element of displacements or of stresses.
-        bulk: Bulk modulus of each cell (of the plane: K + G/3), in any unit, shape (y, x) or (z, y,
+        bulk: Bulk modulus of each cell (in the plane K + G/3), in any unit, shape (y, x) or (z, y,
             x).
         shear: Shear modulus, of the same shape and unit. A cell where either modulus is 0 is a
             pore, which is allowed for stresses alone. All are finite.
@@ -334,8 +335,8 @@ def solve_side(
 
     Returns:
         `fields`, shape (loads, unknowns of a cell, *grid), the grid being finer by `division`, with
-        the unit loads in Voigt's order; and `energy` of all pairs of them. None for stresses where
-        a pore meets its own periodic image.
+        the unit loads in Voigt's order; and `energy`, that of all pairs of these fields. None for
+        stresses where a pore meets its own periodic image.
 
     Raises:
         FailedError: The solver does not converge.
@@ -351,15 +352,15 @@ def solve_side(
         if nodes is None:
             return None
         potentials = PorePotentials.of_nodes(element, nodes)
-        # The material of pores does not matter, as there is no stress in them that could have an
-        # energy. The stiffest one of the others keeps the spectrum narrow.
+        # Pores have no stress, so that their moduli do not matter while fields are solved for. The
+        # largest moduli of the other cells keep the spectrum narrow.
         bulk, shear = (xp.where(is_pore, x.max(), x) for x in (bulk, shear))
     trace, deviator = coefficients_of(element, bulk, shear)
     fields = _least_energy_fields(element, trace, deviator, solver, potentials, start)
     field_errors = None
     if potentials is not None:
-        # Potentials are prescribed to the last bit but for `field_errors`, and pores count nothing:
-        # the exact potentials have no stress there.
+        # `impose` sets the potentials at pores, and bounds their distance from exact ones. The
+        # exact ones have no stress in pores, whose energy is zero therefore.
         field_errors = potentials.impose(fields)
         trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
     unit_modes = element.mean_modes(np.eye(len(fields)))
@@ -421,8 +422,7 @@ def _least_energy_fields(
             fields[this] = solver.solve(system)
         else:
             fields[this] = _solve_beside_pores(solver, system, potentials, loads[this])
-    # The energies of all pairs of fields are computed of what rounding leaves here, so that this
-    # combination need not be exact.
+    # Energies are computed from the combined fields later, so that these may be rounded here.
     to_unit_loads = xp.asarray(np.linalg.inv(loads))
     for slab in slabs(fields):  # in place
         fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
@@ -467,12 +467,12 @@ def _solve_beside_pores(
 
 
 def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:
-    """Return a lower bound of the mean energy of any fields with given mean modes, shape (loads,).
+    """Return a lower bound of the energy of any fields with given mean modes, shape (loads,).
 
-    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
-    Legendre polynomials that are orthonormal on a cell, so that the energy is a mean of
-    coefficients times squared modes. By the inequality of Cauchy and Schwarz the mean of c m² is at
-    least the harmonic mean of c times the square of the mean of m.
+    The energy is the sum over cells and modes of a coefficient times the squared mode. Modes are
+    coefficients of the trace, and then of the parts of the deviator, in products of Legendre
+    polynomials that are orthonormal on a cell. By the inequality of Cauchy and Schwarz the sum of
+    c m² over N cells is at least N times the harmonic mean of c times the squared mean of m.
 
     Args:
         element: Element, which tells the modes of the trace from those of the deviator.
@@ -482,6 +482,6 @@ def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Arr
     """
     total = np.zeros(modes.shape[1])
     for rows, coefficient in zip(element.parts, (trace, deviator), strict=True):
-        harmonic_mean = float(coefficient.size / (1 / coefficient).mean())
-        total += harmonic_mean * np.sum(modes[rows] ** 2, axis=0)
+        least = float(coefficient.size / (1 / coefficient).mean())  # N times the harmonic mean
+        total += least * np.sum(modes[rows] ** 2, axis=0)
     return total

@@ -201,7 +201,8 @@ def scatter(element: Element, forces: Fields, result: Fields, slab: slice) -> No
         slab: Slice of the first axis of the grid, with explicit ends.
     """
     xp = namespace(result)
-    # One local unknown after another: of an index that repeats, an array adds one force alone.
+    # A single indexed sum would add one force alone where several local unknowns are the same
+    # unknown of the grid.
     for k, (unknown, offset) in enumerate(element.local):
         layers = _layers(slab, offset[0], result.shape[2])
         result[:, unknown, layers] += _roll(xp, forces[k], offset[1:])

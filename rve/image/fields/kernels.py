@@ -54,6 +54,7 @@ def apply_by_rows(
     # Kernels work in Voigt components: the constant modes of the uniform fields are turned back.
     uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
     tables, terms, groups, factors = element.products
+    # `_apply` writes the forces of one field. Entry [3, 3] of `parts` is the factor of a shear.
     for number, field in enumerate(fields):
         _apply(tables, terms, groups, factors, parts[3, 3] ** 2, uniform[:, number].copy(),
                trace, deviator, field, result[number])  # fmt: skip
@@ -217,6 +218,8 @@ def _fill_modes(
     lines = np.zeros((n, n * nx))
     shifted = np.empty((n, n, nx))
     for a in range(len(fields)):
+        # A row of voxels takes the strips of n rows of unknowns; the first n − 1 rounds, before the
+        # row `first`, fill strips alone.
         for y in range(first + 1 - n, last):
             _fill_strips(
                 tables, terms, groups, factors, fields[a], z, y + n - 1, shifted, lines, strips

@@ -103,7 +103,7 @@ class _Pieces(NamedTuple):
 def _unwrapped_pieces(
     label: Ints, cells: Ints, labels: Ints, *, count: int, reach: int
 ) -> _Pieces | None:
-    """Return how pieces of pores are joined through the sides of a periodic grid.
+    """Return which pore each piece belongs to in a periodic grid, and where the piece lies in it.
 
     A piece is a set of pore cells that are connected within the grid, without its sides.
 
@@ -113,7 +113,8 @@ def _unwrapped_pieces(
         labels: Number of the piece of each cell of the grid from 1, and 0 outside pores, of the
             grid's shape.
         count: Number of pieces, at least 1.
-        reach: Largest distance along an axis, in cells, of cells that belong together.
+        reach: Cells of pores that are at most this many cells apart along each axis belong to one
+            pore.
 
     Returns:
         For each piece the number of its pore, shape (count,), and the periods of the grid by which
@@ -204,7 +205,7 @@ def _polynomials(element: Element) -> _Polynomials:
             unit[index] = area / (term.factor * max(degrees))  # ∂² x² = 2, ∂x ∂y x y = 1
             units.append(unit)
         particular[component] = -units[0]
-        # Two polynomials of stress 1 in this component, and none in others, differ by one without.
+        # The difference of two polynomials with the same stress has no stress.
         gauge += [unit - units[0] for unit in units[1:]]
     for index in np.argwhere(is_free):
         alone = np.zeros(shape)
@@ -291,8 +292,8 @@ class PorePotentials:
         """Return the potentials whose total stress vanishes in closed pores.
 
         In each pore the potentials are polynomials of second degree about the pore's centre: a
-        particular one for each component of the mean stress, plus any combination of J without
-        stress.
+        particular one for each component of the mean stress, plus any combination of J polynomials
+        without stress.
 
         Args:
             element: Element of stresses, of the grid's dimension.
@@ -300,9 +301,10 @@ class PorePotentials:
 
         Returns:
             The affine space of the unknowns at these K nodes of P pores: the `index` of the nodes
-            in an array of fields; `particular`, the matrix from mean stresses, shape (unknowns × K,
-            components); `gauge`, that from the J parameters of each pore, shape (unknowns × K, P ×
-            J); and `inverse`, the pseudo-inverses of the pores' Gram matrices, shape (P, J, J).
+            in an array of fields; `particular`, the matrix from mean stresses to unknowns, shape
+            (unknowns × K, components); `gauge`, the matrix from the J parameters of each pore to
+            unknowns, shape (unknowns × K, P × J); and `inverse`, the pseudo-inverses of the pores'
+            Gram matrices, shape (P, J, J).
         """
         polynomials = _polynomials(element)
         n_gauge = len(polynomials.gauge)
@@ -363,10 +365,11 @@ class PorePotentials:
                 cell, *grid); changed at the pores' nodes.
 
         Returns:
-            Bounds of the distances of the numbers there from the exact polynomials, in the shape of
-            `fields`; 0 elsewhere.
+            Bounds of the distances of the new values from the exact polynomials, in the shape of
+            `fields`; 0 outside the pores' nodes.
         """
         particular = self.particular.toarray()
+        # `_parameters` gives those of the nearest combination of polynomials without stress.
         parameters = self._parameters(self._at_nodes(fields) - particular)
         self._put(fields, particular + self.gauge @ parameters)
         # A value is a sum of n products with parameters, which are taken as exact, and entries,

@@ -218,7 +218,7 @@ def _block_of_uniform_fields(
 ) -> Array:
     """Return the pseudo-inverse of the Fourier block of fields that do not vary from cell to cell.
 
-    Of splines alone such a field has no energy but rounding; the block is then zero.
+    In space such fields have no energy but rounding; the result is then zero.
 
     Args:
         element: Element of displacements or of stresses.
@@ -235,16 +235,16 @@ def _block_of_uniform_fields(
     max_energy = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
     if np.linalg.norm(block, 2) <= GAUGE * max_energy:
         return np.zeros((n, n))
-    # Of the largest eigenvalue of a plane's block rounding leaves 1e-16 where there is no energy;
-    # eigenvalues with energy were 1e-8 or more at sides of ratio 100. No bound rests on the limit.
+    # In a plane's block, fields without energy have eigenvalues of 1e-16 of the largest one, by
+    # rounding; the others had 1e-8 or more at sides of ratio 100. No bound rests on the limit.
     return np.asarray(np.linalg.pinv(block, rcond=1e-10, hermitian=True))
 
 
 def _pseudo_inverse(xp: ModuleType, blocks: Fields) -> Fields:
-    """Return the inverse of symmetric positive semidefinite blocks, without what has no energy.
+    """Return nearly the pseudo-inverse of symmetric positive semidefinite blocks B.
 
-    Potentials without stress have no energy. With X = (B + ε)⁻¹ they are large in X and vanish in X
-    B X, which for the others is near B⁻¹. Here ε is 1e-6 of the trace of each block.
+    It is X B X with X = (B + ε)⁻¹, where ε is 1e-6 of the trace of each block. For potentials with
+    energy this is near B⁻¹; for those without stress, which have no energy, it vanishes.
 
     Args:
         xp: Module of the array library of `blocks`.
