@@ -468,7 +468,7 @@ def _repacked(
         if best_error < 5e-3 or is_last:
             break
         packing = replace(packing, fraction=fraction)
-        # The same seeds: what changes is the fraction alone, and not the choice of radii as well.
+        # With the same seed only the fraction changes, and not the choice of radii as well.
         denser = Packings.make(packing, len(packings), seed=packings.seed, executor=executor)
         cells = list(map_function(with_cells, denser))
     return best
@@ -542,8 +542,8 @@ def fit_map(rule: RadiusLimits, sample: AreaWeighted, *, seed: int) -> FuzzyFit:
 def _neighbour_numbers(sections: Sequence[ParticleCells]) -> dict[str, object]:
     """Return number and distances of direct neighbours, and the correlation of their reduced radii.
 
-    Neighbours are those of a Delaunay triangulation of the centres. A reduced radius is that of a
-    disc over half the side of a square as large as its cell.
+    Neighbours are joined by an edge of a Delaunay triangulation of the centres. A reduced radius is
+    the radius of a disc over half the side of a square as large as its cell.
 
     Args:
         sections: Particles and cells; those without a diagram (spheres) are left out.

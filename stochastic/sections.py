@@ -75,7 +75,7 @@ def with_cells(particles: Particles) -> ParticleCells:
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     """Return the reduced radii of all counted cells, weighted by area or volume.
 
-    The reduced radius is that of the particle over half the side of a square or cube as large as
+    A reduced radius is the radius of a particle over half the side of a square or cube as large as
     its cell. For the bootstrap the radii are grouped by section, or by 5 × 5 patches (5 × 5 × 5 of
     a cube) if there is a single section.
 

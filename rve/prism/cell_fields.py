@@ -106,7 +106,7 @@ class CellFields:
         """
         data = {}
         for load in range(self.displacement.shape[-1]):
-            # Viewers want vectors of three components; nothing is displaced along θ.
+            # Viewers want vectors of three components; the one along θ is 0.
             in_space = np.pad(self.displacement[..., load], ((0, 0), (0, 1)))
             data[f"displacement_{load + 1}_in_half_sides"] = in_space
             for row, name in enumerate(("11", "22", "12")):

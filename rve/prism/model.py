@@ -529,8 +529,8 @@ def _mean_moduli(curve: StressCurve) -> Array:
 
     Returns:
         For three loads shape (3, 3): the first row takes the mean of C11 and C22, the second C11,
-        and the third C22 in the place of C11. For two loads shape (1, 3) with C11. C11 − C12 is
-        then NaN, since a stretch of both axes and a shear do not give it.
+        and the third C22 in the place of C11 (by `axial_moduli`). For two loads shape (1, 3) with
+        C11. C11 − C12 is then NaN, since a stretch of both axes and a shear do not give it.
     """
     if curve.stiffness is None:
         s11, s12 = curve.mean

@@ -359,10 +359,11 @@ def _repulsion(
 
 
 def _shake(particles: Particles, generator: np.random.Generator) -> Array:
-    """Move each particle 60 times at random, where it overlaps none.
+    """Move each particle at random, 12 × 5 times, and return the new centres.
 
-    All particles move at once. A move is made if it keeps clear of both old and new positions of
-    the neighbours, since these may move or not. Neighbours are searched after each five moves.
+    All particles move at once. A move is made only if it overlaps neither the old nor the new
+    position of a neighbour, since that may move or not. Neighbours are searched before each five
+    moves.
 
     Args:
         particles: Particles without overlap in a periodic box.

@@ -321,9 +321,10 @@ def counted_cells(diagram: Apollonius) -> tuple[Ints, Array]:
 def _reach(diagram: Apollonius) -> Array:
     """Return how far empty circles on each cell's boundary extend towards each edge.
 
-    The circle about a boundary point at the distance ρ touches the disc of radius r and a
-    neighbour: its radius is ρ − r, and it extends by ρ cos ψ + ρ − r, ψ the angle from the edge's
-    direction. The maximum over 33 points of each arc has an error of second order.
+    A boundary point at the distance ρ from the disc's centre is the centre of a circle that touches
+    the disc, of radius r, and a neighbour. The circle's radius is ρ − r. With ψ the angle from the
+    edge's direction it extends by ρ cos ψ + ρ − r. The maximum over 33 points of each arc is taken,
+    whose error is of second order.
 
     Args:
         diagram: Cells of n discs.
