@@ -83,8 +83,8 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
         text: The text.
 
     Raises:
-        BadInput: The text is not TOML. It names the file and the line, if the error has one, and
-            what to do where the mistake is a usual one.
+        BadInput: The text is not TOML. The message names the file, the line if it is known, and the
+            cure of two usual mistakes.
     """
     # tomllib calls itself for nested brackets, of which a text may have more than the stack holds:
     # that is RecursionError, and means bad input here.
@@ -268,8 +268,8 @@ def apply_changes(
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
-        # A key without its section is met by the first section that has it; another unknown one by
-        # the key that is spelt most alike.
+        # For a key without its section the first section that has it is suggested; for any other
+        # unknown key the known one that is spelt most alike.
         if key not in full_keys:
             close = [full for full in full_keys if full.endswith(f".{key}")]
             cure = suggestion(key, full_keys) or "docs/case-format.md has all keys"

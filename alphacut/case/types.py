@@ -78,8 +78,8 @@ def _lines_below_keys(section: type) -> dict[str, str]:
     """Return the text that stands below each key in the source of a section's class, by key.
 
     The text is a string that follows the annotated assignment of the key, without its indentation.
-    Keys without such a text are left out. There is none if the class is no section or has no source
-    file.
+    Keys without such a text are left out. The result is empty if the class is no section or has no
+    source file.
     """
     if not issubclass(section, Section):
         return {}

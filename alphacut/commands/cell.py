@@ -241,15 +241,13 @@ def summary(document: Document, convention: str) -> str:
     """Return the result of a cell as a text table, each number with its declared error.
 
     Args:
-        document: Result of the cell: the numbers of the table's rows and their errors, moduli in
-            GPa; the "method", the number of "unknowns" and the "iterations"; "declared_error", None
-            without any; and in "references" the bounds "hashin_shtrikman_E_GPa", which are shown if
-            they are there.
+        document: Result of the cell, moduli in GPa, as `document_of` makes it, and "references".
+            Their bounds "hashin_shtrikman_E_GPa" are shown if they are there, and a
+            "declared_error" of None gives a warning.
         convention: Average of the stiffness that E and ν belong to, in words.
 
     Returns:
-        Lines that end with a newline: the table, the method with its cost, and a warning where the
-        error is not declared.
+        Lines that end with a newline: the table, the method with its cost, and the warning.
     """
     rows: list[tuple[str, str, str]] = []
     for label, value, error in table_rows(document):
@@ -281,11 +279,10 @@ def table_rows(document: Document) -> Iterator[Row]:
     """Yield the rows of a cell's table.
 
     Args:
-        document: Result of the cell, moduli and stresses in GPa: "E_GPa" and "nu" or None;
-            "stress_GPa" with the mean stresses s11 and s12; "declared_error" with errors by the
-            same keys, or None; "fibres" and "plane" with "value" and "error" of constants, which
-            may be empty; and the matrices "stiffness_GPa" and "stiffness_error_GPa", shape (3, 3),
-            or None.
+        document: Result of the cell, moduli and stresses in GPa. "E_GPa", "nu", "declared_error"
+            and "stiffness_error_GPa" may be None. "stress_GPa" has the mean stresses s11 and s12,
+            and "declared_error" errors by these keys. "fibres" and "plane" have "value" and "error"
+            of constants, and may be empty. The matrices of the stiffness have the shape (3, 3).
 
     Yields:
         Label, text and declared error in the unit of the label. The rows are E, ν and the mean

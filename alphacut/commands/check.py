@@ -133,8 +133,8 @@ def doubts(content: Content, rows: Sequence[Row], structure: Structure | None) -
     Args:
         content: The case.
         rows: Key, value and kind of each quantity in it, as `rows_of` gives them.
-        structure: The structure of the case; None if there is none, or it cannot be built, when
-            limits are not judged.
+        structure: The structure of the case; None if there is none or it cannot be built. Limits
+            are not judged then.
 
     Raises:
         RefusedError: A limit does not fit the structure.
@@ -444,9 +444,8 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
 
     Yields:
         The full key, with "[2]" for the second entry of an array; the value in SI units with
-        prefixes; and the kind of number: "crisp", "interval", "triangle", "trapezoid", "fuzzy",
-        "number", or "default" where the case leaves it out; ", unusual" is added to quantities of
-        unusual size.
+        prefixes; and the kind of number, such as "crisp" or "interval", or "default" where the case
+        leaves it out. ", unusual" is added to the kind of fuzzy quantities of unusual size.
     """
     for key, info in type(section).model_fields.items():
         is_stated = section.has_key(key)

@@ -172,8 +172,8 @@ class Pipeline:
     def _kinds_of_stages(self) -> list[str]:
         """Return the kind of each stage of the run: the first word of its name, for the progress.
 
-        A kind stands once for each of its stages: "envelope" for each study, "record" and, where
-        columns yield and fragility is asked for, "incremental" for each record.
+        A kind with several stages stands as many times in the list: "envelope" for each study;
+        "record" for each record, with "incremental" if columns yield and fragility is asked for.
         """
         content = self.content
         kinds: list[str] = [stage for stage in content.stages if stage != "envelope"]
@@ -230,7 +230,7 @@ class Pipeline:
         results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
         cell.require_tolerance(numbers.error, section.tolerance)
-        # The classical bounds are those at the nominal inputs, as E of the highest level is.
+        # The classical bounds belong to the nominal inputs, and so does E on the highest level.
         highest = (float(numbers.E_GPa.lower[-1]), float(numbers.E_GPa.upper[-1]))
         cell.require_bounds(highest, numbers.references, numbers.particles)
 
@@ -308,7 +308,7 @@ class Pipeline:
     def _suite_response(
         self, section: RecordsSection, structure: Structure, task: EnvelopeTask
     ) -> Response:
-        """Compute peaks under each record of a suite, and return what questions are asked about.
+        """Compute peaks under each record of a suite, and return the response for the questions.
 
         Args:
             section: The records of the case.

@@ -163,7 +163,7 @@ def draw_bands(axes: Axes, x: Array, bands: Ends, alpha: Array, *, in_steps: boo
         x: Rising values, shape (X,).
         bands: Bounds, shape (A, X) each. Those of the highest level are drawn as lines.
         alpha: Rising levels, shape (A,).
-        in_steps: The probability changes at the values x alone, from each one on.
+        in_steps: Whether the probability jumps at each value x and is constant up to the next.
     """
     band: Look = {"lw": 0}
     line: Look = {"color": INK, "lw": 1}

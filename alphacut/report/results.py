@@ -151,8 +151,8 @@ def material(parts: Parts, *, every_constant: bool = False) -> Table:
 
     Returns:
         Row of each constant with its value on the highest level, its range on the lowest one, the
-        guarantee and the error. Empty columns are left out; without a cell, an image and damping
-        by the material the table is empty.
+        guarantee and the error. Empty columns are left out. The table is empty if there is neither
+        a cell nor an image nor damping by the material.
     """
     rows: list[MaterialRow] = []
     lowest_level = 0.0
@@ -505,7 +505,7 @@ def natures(parts: Parts) -> Iterator[str]:
     for peaks in peaks_of_studies:
         for output, peak in peaks.items():
             outputs.setdefault(peak.nature, {})[output] = None
-    # With a single guarantee the names of the outputs tell nothing.
+    # With a single guarantee the names of the outputs are left out.
     groups = [f"{nature} ({', '.join(names)})" for nature, names in outputs.items()]
     if len(groups) == 1:
         groups = [f"all {nature}" for nature in outputs]

@@ -175,7 +175,7 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
         raise RefusedError("fragility", "without records", "a section [records]")
     return fragility_of(
         linear,
-        limits_by_name(section.limits_of(response.structure), ()),  # of any outputs
+        limits_by_name(section.limits_of(response.structure), ()),  # () allows any outputs
         intensity=section.measure,
         independent=section.independent,
         alpha=response.task.section.alpha,

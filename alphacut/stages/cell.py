@@ -322,9 +322,10 @@ def isotropic_label(average: str) -> str:
 def require_bounds(young: tuple[float, float], references: References, particles: str) -> None:
     """Refuse E of spheres outside the Hashin–Shtrikman bounds at the fraction that a case states.
 
-    E can lie outside because the radius map holds another fraction than the case states, since
-    cells denser than any cube are cut off; or because the mean over cells with different spheres
-    need not obey the bounds. Half a per cent is forgiven: packings meet a fraction no better.
+    E can lie outside for two reasons. The radius map may hold another fraction than the case
+    states, since it leaves out cells that are denser than any cube. And the mean over cells with
+    different spheres need not obey the bounds. Half a per cent is forgiven: packings meet a
+    fraction no better.
 
     Args:
         young: Lower and upper bound of E at the nominal inputs, in GPa.

@@ -93,9 +93,9 @@ def possible_materials(content: Content) -> tuple[Material, ...]:
 
     Returns:
         The material at the nominal values of the cell, if a fast model finds it. Otherwise two
-        extremes: a stiff one with a small loss factor and a soft one with a large one, without the
-        modulus where the case states it. What neither of them admits is wrong whatever a stage will
-        compute.
+        extremes: a stiff one with a small loss factor, and a soft one with a large loss factor,
+        both without the modulus if the case states it. A case that is refused with both is wrong
+        whatever a stage will compute.
 
     Raises:
         RefusedError: The cell does not fit the series.

@@ -40,7 +40,7 @@ def stage(
         the lowest level falls if the input is fixed at its nominal value.
     """
     compute = partial(_fractions_of_widths, campaign, structure, task, peaks)
-    # Peaks are inputs of this stage too: searches begin there, so that they decide on digits.
+    # Peaks are inputs of this stage too: searches begin there, which can change digits of results.
     of_cell = campaign and [identity(campaign), campaign.inputs, campaign.modulus.alpha]
     of_structure = structure and [structure.model, structure.numbers, task, peaks]
     inputs = [of_cell, of_structure]

@@ -167,7 +167,7 @@ def analyses_of(
         frame,
         structure.inputs(task.fuzzy),
         records,
-        limits_by_name(section.limits_of(structure), ()),  # of any outputs
+        limits_by_name(section.limits_of(structure), ()),  # () allows any outputs
         intensity=section.measure,
         most=section.most,
         step=task.section.step,
@@ -193,7 +193,7 @@ def incremental_stage(
     Raises:
         RefusedError: A limit does not fit the structure.
     """
-    limits = limits_by_name(section.limits_of(structure), ())  # of any outputs
+    limits = limits_by_name(section.limits_of(structure), ())  # () allows any outputs
 
     def compute(context: StageContext) -> StageResult[Increments]:
         """Return the bounds over the intensity for each limit, reporting progress."""
