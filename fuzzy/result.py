@@ -164,10 +164,10 @@ class Bounds:
     def _check_proof(self) -> None:
         """Raise `FailedError` if the bounds contradict one another: a method is wrong then.
 
-        A lower bound must not lie above the upper one, the cut of a level must lie in that of the
-        level before, and ends that inputs reach (`attained`) must lie inside ends that are proved
-        (`proved`); unknown ones are NaN or infinite. Differences up to the stated errors, and up to
-        1e-9 of the output's largest magnitude, which is rounding, are allowed.
+        A lower bound must not lie above the upper one. The cut of a level must lie in the cut of
+        the level before. Ends that inputs reach (`attained`, NaN if unknown) must lie inside ends
+        that are proved (`proved`, infinite if unknown). Differences up to the stated errors, and
+        rounding of 1e-9 of the output's largest magnitude, are allowed.
         """
         magnitudes = np.maximum(np.abs(self.lower), np.abs(self.upper))
         over_levels_and_time = tuple(range(magnitudes.ndim - 1))
@@ -199,7 +199,7 @@ class Bounds:
 
     @cached_property
     def attained(self) -> Ends:
-        """Ends that some inputs are known to reach; NaN where unknown. Shapes are that of `lower`.
+        """Ends that some inputs are known to reach, in the shape of `lower`; NaN where unknown.
 
         The bounds of an output are attained, estimated or guaranteed. Attained and estimated ends
         are reached to within their `error`, so that they are moved inwards by it here. For
@@ -376,8 +376,8 @@ class Bounds:
     def extremes_over_time(self, column: int) -> Extremes:
         """Return the smallest lower end, the largest upper end and the largest error over time.
 
-        They have the shape (levels,) each. Without times they are the ends and errors themselves. A
-        maximum over errors of which one is NaN, which means unknown, is NaN.
+        They have the shape (levels,) each. Without times they are the ends and errors themselves.
+        The largest error is NaN, which means unknown, if one of the errors is.
 
         Args:
             column: Index of the output on the last axis of `lower`.

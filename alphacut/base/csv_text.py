@@ -27,7 +27,7 @@ def csv_cell(text: str) -> str:
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as the text of a CSV file: cells apart by commas, quoted where they must be.
+    """Return a table as the text of a CSV file, with commas between cells and quotes where needed.
 
     A cell that a spreadsheet would take for a formula gets an apostrophe in front. Each line ends
     with a line feed.

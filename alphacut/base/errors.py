@@ -167,7 +167,7 @@ def checked_number(
         most: Largest allowed number.
 
     Raises:
-        RefusedError: The value is not such a number. An integer too large for a float is none.
+        RefusedError: The value is not such a number, or is an integer too large for a float.
     """
     kind = "finite numbers"
     if whole:
@@ -273,7 +273,7 @@ def require_numbers(name: str, values: object) -> None:
 def require_sequence(key: str, values: object, allowed: str) -> None:
     """Raise RefusedError unless `values` is a list, a tuple or an array with an axis.
 
-    A column of pandas is an array here: like those of NumPy it says how many axes it has.
+    Whatever says by `ndim` that it has an axis is an array here, such as a column of pandas.
     """
     is_list = isinstance(values, Sequence) and not isinstance(values, str)
     axes = getattr(values, "ndim", 0)

@@ -14,8 +14,8 @@ from alphacut.base.errors import RefusedError
 def free_memory() -> float:
     """Return the number of bytes that this process may still take; infinity if unknown.
 
-    It is the smallest of the machine's memory, the part of it that is free, what is left of the
-    limit of the control group, and what is left of the process's own limit of address space
+    It is the smallest of these that are known: the machine's memory; the memory that is free; the
+    rest of the control group's limit; and the rest of this process's limit of address space
     (RLIMIT_AS).
     """
     free = [inf]

@@ -94,9 +94,8 @@ def _prefix_exponent(magnitude: float) -> int:
 def rounded_ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[float, float]:
     """Return both ends of a range, rounded in the direction that keeps its guarantee true.
 
-    Ends that agree to nine digits are those of a crisp value, which differ by round-off alone: they
-    are rounded to the nearest number, and so are ends that would pass each other when rounded
-    inwards. Infinite ends stay.
+    Ends that agree to nine digits count as one crisp value, and are rounded to the nearest number.
+    So are ends that would pass each other when rounded inwards. Infinite ends stay.
 
     Args:
         low: Lower end.

@@ -76,8 +76,8 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
         yield sys.stdout
         sys.stdout.flush()
         return
-    # C libraries write to the file descriptor 1, of which Python knows nothing. It is led to
-    # standard error, 2, and the answer goes to a copy of what it was before.
+    # C libraries write to the file descriptor 1 without asking Python. It is led to standard error,
+    # 2, and the answer goes to a copy of what it was before.
     sys.stdout.flush()
     original = os.dup(1)
     os.dup2(2, 1)
@@ -177,8 +177,8 @@ def missing(error: ImportError) -> str:
     extra, as pip install 'alphacut[cell]'. Others are named alone.
 
     Args:
-        error: The exception of the import. Its name may be that of a module of the library, or
-            None where a library has raised the error itself.
+        error: The exception of the import. Its `name` may be a module of the library, such as
+            "dolfinx.fem", or None where a library has raised the error itself.
     """
     message = str(error)
     if not isinstance(error, MissingLibraryError):  # which says how to install it

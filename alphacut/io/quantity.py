@@ -149,8 +149,8 @@ def _factor_by_pint(unit: str, si: str) -> Decimal:
         si: SI unit of the dimension; for a pure number, which is empty, there is no unit.
 
     Raises:
-        Exception: The unit is unknown, of another dimension, or one of which Pint has another
-            meaning than people. Pint's parser raises whatever Python's parser raises.
+        Exception: The unit is unknown, of another dimension, or means something else to Pint than
+            to people. Pint's parser raises whatever Python's parser raises.
     """
     # Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds
     refused = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
@@ -234,7 +234,7 @@ def _pint_target(one_unit: pint.Quantity, si: str) -> str:
 def _parse_decimal(text: str, si: str) -> Decimal:
     """Return the value of one number with its unit, such as "80 GPa", in the SI unit `si`.
 
-    It is exact but for units with irrational factors, such as degrees.
+    It is exact unless the factor of the unit is irrational, as for degrees.
 
     Args:
         text: A decimal number and a unit; a pure number needs none. Blanks around them do not
@@ -423,8 +423,8 @@ def parse_fuzzy_in_any_unit(
         the SI unit, and this unit.
 
     Raises:
-        ValueError: It is a quantity of none of the dimensions. The message is the one that helps
-            most: that of a wrong number, or what was probably meant, or some examples.
+        ValueError: It is a quantity of none of the dimensions. The message says what is wrong with
+            the number, or else which unit was probably meant, or else gives examples.
     """
     reasons = []
     for si in units:

@@ -81,7 +81,7 @@ def confused_prefix(word: str) -> str:
 
 
 def unit_cure(unit: str, si: str, *, fits: Callable[[str], bool], known: Iterable[str]) -> str:
-    """Return what to write in place of a unit that is none of a dimension.
+    """Return what to write in place of a unit that does not fit a dimension.
 
     It is a clause such as "did you mean kN?" or "write ft for feet", and empty if no unit is alike.
 

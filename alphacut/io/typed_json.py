@@ -37,7 +37,7 @@ def to_document(value: object) -> Any:
 
     Dataclasses and named tuples become dictionaries of their fields, enumerations their values,
     arrays and tuples lists, and keys of mappings texts. Numbers that are not finite stay, and the
-    caller decides how they are written. What is none of these is returned as it is.
+    caller decides how they are written. Any other value is returned unchanged.
 
     Args:
         value: A dataclass, named tuple, mapping, list, tuple, array, enumeration, number, text or
@@ -170,7 +170,7 @@ def _read_union(kinds: tuple[Any, ...], document: Any, path: str) -> Any:
         path: Keys that lead to the document, for messages.
 
     Raises:
-        ValueError: No kind fits; the message is that of the first kind but None.
+        ValueError: No kind fits; the message is the one for the first kind that is not None.
     """
     if document is None and type(None) in kinds:
         return None

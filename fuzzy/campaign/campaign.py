@@ -218,8 +218,8 @@ def _evaluate(campaign: Campaign, points: Array) -> dict[int, Outcome]:
 
     Returns:
         For each row of the points a `Sample` (names, shapes and values of the outputs), or a
-        `Failure` with the text of the error, also where outputs are named or shaped unlike those of
-        the first sample.
+        `Failure` with the text of the error. A sample whose outputs have other names or shapes than
+        the first sample becomes a failure.
 
     Raises:
         RefusedError: The campaign's knowledge names an output that the first sample does not have.

@@ -129,7 +129,7 @@ class Store:
     def _read(self) -> bool:
         """Read the intact rows into memory, and return whether the file and all rows are intact.
 
-        A row is intact if its checksum is that of its columns. Such rows are added to `self._rows`
+        A row is intact if its checksum fits its columns. Such rows are added to `self._rows`
         by the keys of their model and point, also where the file is damaged elsewhere. A new, empty
         file gets its table here and is intact. False means damage: SQLite's check of the file
         finds some, the only table is not the one of `create_table`, or a row is not intact.

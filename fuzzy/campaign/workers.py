@@ -154,8 +154,8 @@ def completed(
         executor: Any executor; with None this process evaluates one task after another.
 
     Yields:
-        The rows of a task as they were given, and the outcome of each row. The order is that of the
-        tasks without an executor, else about that in which they end.
+        The rows of a task as they were given, and the outcome of each row. Without an executor the
+        tasks come in their order, else about in the order in which they end.
 
     Raises:
         FailedError: A worker process died, or the function or its outputs cannot be sent between

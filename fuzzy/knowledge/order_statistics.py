@@ -51,9 +51,9 @@ class Observations:
                 bound. Values on a bound are allowed.
 
         Raises:
-            RefusedError: The values are no list, tuple or array, there is none, one is not a finite
-                number or lies outside the bounds; or the bounds are not two, or the lower one is
-                not below the upper one.
+            RefusedError: `values` is no list, tuple or array, or is empty; a value is not a finite
+                number or lies outside the bounds; `bounds` is no pair, or its lower end is not
+                below its upper end.
         """
         allowed = "(lower, upper) with lower < upper, None for none"
         # Without a bound the end is infinite, so that no comparison below needs a special case.

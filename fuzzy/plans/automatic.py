@@ -181,10 +181,10 @@ class _AutomaticSearch:
     def all_notes(self) -> list[str]:
         """Return a sentence for each finding of the walk and of the search, for the user.
 
-        They are the notes of the walk; then, if outputs were searched by descents, a summary of the
-        search and the outputs with jumps or waves beside a trend; then that the budget ended the
-        search, or the outputs of which a bound lies at a kink or a jump. The list is new and may be
-        empty.
+        The notes of the walk come first. If outputs were searched by descents, a summary of the
+        search follows, and the outputs with jumps or waves beside a trend. The last note says that
+        the budget ended the search, or else which outputs have a bound at a kink or a jump. The
+        list is new and may be empty.
         """
         notes = list(self.notes)
         if self.linkage is not None and self.linkage.outputs:
@@ -335,7 +335,7 @@ def walk_signs(campaign: Campaign, widest: CutSearch) -> SignWalk:
 
 
 def _changed_in_turn(turns: Array) -> Array:
-    """Return a path from point to point in which each step changes one input, the first one first.
+    """Return a path from point to point that changes one input at a time, the first one first.
 
     Args:
         turns: The points in their order, shape (n, inputs), n ≥ 1.
@@ -422,8 +422,7 @@ def _climb_staircases(
         keeps_signs &= ~contradicts.any(axis=0)
         by_input = contradicts.reshape(count, inputs, -1)
         n_turns = (by_input[1:] != by_input[:-1]).sum(axis=0)
-        # An effect that turns once is that of a hump, which descents find. Waves and jumps turn
-        # back.
+        # A hump turns once, and descents find it. Waves and jumps turn back.
         turns_once &= (n_turns <= 1).all(axis=0)  # for all inputs
     for cut in cuts_with_width(campaign, widest.domain):
         # In a narrower cut fewer inputs may have a width, so that its corners have fewer columns.

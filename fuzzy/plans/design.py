@@ -51,7 +51,7 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
     """
     values = samples.values.array
     rows_by_level = [np.flatnonzero(is_inside) for is_inside in domain.inside(samples.points)]
-    # A sample counts on every level whose cut holds it, not only on that for which it was taken.
+    # A sample counts on every level whose cut holds it, not only on the one it was taken for.
     min_rows = np.array([rows[values[rows].argmin(axis=0)] for rows in rows_by_level])
     max_rows = np.array([rows[values[rows].argmax(axis=0)] for rows in rows_by_level])
     columns = np.arange(values.shape[1])

@@ -59,7 +59,7 @@ def critical_distance(samples: int, inputs: int, sigma: float) -> float:
         inputs: Dimension d of the cube, 1 or more.
         sigma: The factor σ.
     """
-    # The volume of the ball, π^(d/2) r^d / Γ(1 + d/2), is to be σ ln N / N of that of the cube, 1.
+    # The ball's volume is π^(d/2) r^d / Γ(1 + d/2). It shall be σ ln N / N; the cube's volume is 1.
     ball = sigma * gamma(1 + inputs / 2) * log(samples) / samples
     return float(ball ** (1 / inputs) / sqrt(pi))
 

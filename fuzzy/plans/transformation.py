@@ -42,8 +42,8 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = T
 
     The points of a level are the two ends of its α-cut, or its value if it has no width, and the
     midpoints of neighbouring points of the next level up. So n points at the top become n + 1 at
-    the next level down, and so on. Points of different levels that are equal but for rounding are
-    made equal, so that a model is evaluated there once.
+    the next level down, and so on. Points of different levels that differ only by rounding are made
+    equal, so that a model is evaluated there once.
 
     Args:
         number: A fuzzy number or interval.
@@ -68,7 +68,7 @@ def hanss_points(number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = T
 
 
 def _listed_point(x: float, points: list[float], width: float) -> float:
-    """Return the point of a list that equals x but for rounding, or x, which is then inserted.
+    """Return the point of a list that equals x up to rounding; else insert x, and return it.
 
     Args:
         x: The point.
