@@ -182,7 +182,7 @@ def width_fractions(
 
     The width is computed with all inputs fuzzy, and then once for each group with the inputs of the
     group fixed at their nominal values, of membership 1. The fraction of a group is the reduction
-    of the width over the width with all inputs fuzzy.
+    of the width, divided by the width with all inputs fuzzy.
 
     Args:
         propagation: From fuzzy inputs to bounds, as `lambda inputs: propagate(function, inputs)`,

@@ -126,7 +126,7 @@ def _shared_index(folder: str, name: str, stamp: str) -> Any:
     Args:
         folder: Folder of the files.
         name: Beginning of their names, one for each kernel.
-        stamp: Digest of what code must have been compiled from; other code is ignored.
+        stamp: Digest of what the code is compiled from. Code with another stamp is ignored.
     """
     from numba.core.caching import IndexDataCacheFile
 
@@ -219,10 +219,10 @@ def digest(module: str) -> str:
 
     It covers the text of the module and the versions of Numba, NumPy and Python. Compiled code
     contains the kernels that it calls and the constants that it reads, which may stand in other
-    modules. So the digest of a module that has kernels covers those of all modules of this project
-    that it imports, too. A module has kernels if it has been imported and has decorated a function
-    (`with_kernels`). Modules with kernels must not import each other in a circle. The result is
-    kept for the process.
+    modules. So the digest of a module with kernels also covers the digests of all modules of this
+    project that it imports. A module has kernels if it has been imported and has decorated a
+    function (`with_kernels`). Modules with kernels must not import each other in a circle. The
+    result is kept for the process.
 
     Args:
         module: Full name of a module of this project, such as alphacut.frame.response.duhamel.

@@ -109,11 +109,14 @@ def fingerprint(inputs: object, packages: Sequence[str]) -> str:
 def _canonical(value: object) -> object:
     """Return what stands for an object in the JSON text of a fingerprint.
 
-    It must be the same in all processes and different for objects that give different results. Of a
-    Pydantic model or a dataclass it is the name of the class and the fields by name; of an array
-    its shape, type and a digest of its bytes; of a function its full name; of a path the name of
-    the file, without the folder; of any other object its text. Fields are not converted here: the
-    caller, `json.dumps`, asks again for each.
+    It must be the same in all processes and different for objects that give different results:
+
+    - a Pydantic model or a dataclass: the name of the class, and the fields by name. Fields are not
+      converted here: the caller, `json.dumps`, asks again for each;
+    - an array: its shape, type and a digest of its bytes;
+    - a function: its full name;
+    - a path: the name of the file, without the folder;
+    - any other object: its text.
     """
     from pydantic import BaseModel  # not above: entry.py must run to say that it is missing
 
