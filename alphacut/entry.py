@@ -99,10 +99,10 @@ def main(
 ) -> int:
     """Run one command of the command line, and return its exit status.
 
-    Every error becomes one line on standard error: status 2 for bad input, 3 for failed samples of
-    a campaign, 128 and the signal's number for an interruption, 1 for any other failure, and 0 for
-    success or a reader of the output that has gone. An error of the program itself shows its
-    traceback. The options --help and --version end the process by SystemExit.
+    Every error becomes one line on standard error. The status is 2 for bad input, 3 for failed
+    samples of a campaign, 128 plus the signal's number for an interruption, and 1 for any other
+    failure; 0 for success, and also if the reader of the output has gone. An error of the program
+    itself shows its traceback. The options --help and --version end the process by SystemExit.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.

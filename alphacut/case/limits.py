@@ -250,8 +250,8 @@ class QuestionSection(Section):
 
         Raises:
             RefusedError: The structure cannot have an output; a unit, height or weight does not
-                fit; a limit is given twice, or one of a magnitude is not positive; or the question
-                needs one limit of the magnitude of each output and gets others.
+                fit; a limit is given twice; a limit of a magnitude is not positive; or there are
+                others than one limit of the magnitude of each output, if the question needs this.
         """
         key = f"{self.key}.limits"
         limits = tuple(limit.limit(structure, key) for limit in self.limits)

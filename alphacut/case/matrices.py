@@ -244,9 +244,9 @@ class MatricesSection(StructureSection):
             loss: Loss factor of the material.
 
         Returns:
-            "zeta" of all modes if E is in every term of the stiffness matrix K; else "zeta1",
-            "zeta2" … of each mode in the order of rising frequency, by the fraction of its strain
-            energy in the terms with E. The fractions are those of the nominal model.
+            "zeta" of all modes if E is in every term of the stiffness matrix K. Otherwise "zeta1",
+            "zeta2" … of each mode, in the order of rising frequency. They follow from the fraction
+            of the mode's strain energy in the terms with E, in the nominal model.
 
         Raises:
             RefusedError: E is in no term of K.

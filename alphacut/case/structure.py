@@ -66,10 +66,10 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
     """Return the damping ratios, as fractions of critical damping, that a value of a case states.
 
     Args:
-        value: A number or a text such as "2 %", or a list of numbers alone, which is one fuzzy
-            ratio of all modes; a list with a text for each mode from the slowest on; "material", to
-            take the ratios from the loss factor of the material; or "material + 1 %", with the
-            ratio of the joints added.
+        value: One ratio of all modes is a number, a text such as "2 %", or a list of numbers alone,
+            which makes it fuzzy. A list with texts has a ratio for each mode, from the slowest on.
+            "material" takes the ratios from the loss factor of the material, and "material + 1 %"
+            adds the ratio of the joints.
 
     Returns:
         MaterialDamping for "material"; else one fuzzy ratio, or one for each mode.

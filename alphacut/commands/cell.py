@@ -140,11 +140,11 @@ def document_of(result: HomogenisedStiffness) -> Document:
 
     Returns:
         E and ν are None if no isotropic solid has the moduli of the cell. "stress_GPa" has the mean
-        σ11 and σ12; "fibres" the constants of a transversely isotropic cell, else nothing;
-        "stiffness_GPa" the plane stiffness, shape (3, 3); "plane" E_x, E_y, ν_xy and G_xy for each
-        of their definitions, such as plane strain; and "curve" the stresses over θ with the weights
-        of the mean. Errors are absolute, and None where the model declares none. The other entries
-        are facts of the computation.
+        σ11 and σ12. "fibres" has the constants of a transversely isotropic cell, and is else empty.
+        "stiffness_GPa" is the plane stiffness, shape (3, 3). "plane" has E_x, E_y, ν_xy and G_xy
+        for each of their definitions, such as plane strain. "curve" has the stresses over θ with
+        the weights of the mean. Errors are absolute, and None where the model declares none. The
+        other entries are facts of the computation.
     """
     curve = result.curve
     document: Document = {"E_GPa": None, "nu": None}
@@ -285,9 +285,9 @@ def table_rows(document: Document) -> Iterator[Row]:
             of constants, and may be empty. The matrices of the stiffness have the shape (3, 3).
 
     Yields:
-        Label, text and declared error in the unit of the label. The rows are E, ν and the mean
-        stresses; the constants of fibres; and, if "plane" is not empty, the entries C11, C12, C16,
-        C22, C26 and C66 of the stiffness and the constants along x and y.
+        Label, text and declared error in the unit of the label. The rows are E, ν, the mean
+        stresses and the constants of fibres. If "plane" is not empty, the entries C11, C12, C16,
+        C22, C26 and C66 of the stiffness and the constants along x and y follow.
     """
     errors = document["declared_error"] or {"stress_GPa": {}}
     for key, digits in (("E_GPa", "#.8g"), ("nu", ".6f")):

@@ -20,9 +20,9 @@ from alphacut.stages.summary import Results
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
-    The names are those of the files: "modulus", "image", "update-inputs", the key of each answered
-    question, "fragility-curves", and "envelope-STUDY-OUTPUT" for each drawn output of a study, with
-    "figNUMBER-" before it if it is a figure of the paper.
+    Names are "modulus", "image", "update-inputs", the key of each answered question,
+    "fragility-curves", and "envelope-STUDY-OUTPUT" for each drawn output of a study. Figures of the
+    paper have "figNUMBER-" before the name.
 
     Args:
         results: Results of a run; stages that are missing have no figures.

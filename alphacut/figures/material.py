@@ -57,9 +57,10 @@ def image(dataset: xarray.Dataset) -> Figure:
     Pixels and voxels whose phase the fuzzy threshold leaves open on the lowest level are orange.
 
     Args:
-        dataset: "phase", the index of the phase of each pixel over the axes (y, x), or of each
-            voxel over (z, y, x); "is_open" on the same axes; "E" in Pa over alpha and bound (lower,
-            upper); the names "phases" and the sides "lengths" of a pixel in m as attributes.
+        dataset: "phase" is the index of the phase of each pixel over the axes (y, x), or of each
+            voxel over (z, y, x); "is_open" has the same axes; "E" in Pa has the axes alpha and
+            bound (lower, upper). Attributes are "phases", the names, and "lengths", the sides of a
+            pixel in m.
     """
     phase = dataset["phase"]
     is_volume = phase.ndim == 3
@@ -105,8 +106,8 @@ def draw_plane(axes: Axes, dataset: xarray.Dataset, across: str) -> None:
 
     Args:
         axes: Axes that are drawn on.
-        dataset: "phase", the index of the phase, and "is_open" over (y, x), or (z, y, x) of a
-            volume; and the attributes "phases", their names, and "lengths", the sides of a pixel or
+        dataset: "phase", the index of the phase, and "is_open" have the axes (y, x), or (z, y, x)
+            for a volume. Attributes are "phases", the names, and "lengths", the sides of a pixel or
             voxel in m in the order of the axes.
         across: Axis that the plane of a volume is perpendicular to, "x", "y" or "z"; empty for an
             image.

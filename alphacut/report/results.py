@@ -69,9 +69,9 @@ def run_text(parts: Parts) -> str:
         parts: Numbers of the results; stages that the run lacks are left out.
 
     Returns:
-        Lines that end with a newline: what α-cuts mean, the tables of the material, of the peaks
-        and of identified inputs, and then sentences of up to 80 letters a line on guarantees,
-        smaller time steps, the answers to questions, and the inputs that matter most.
+        Lines that end with a newline: what α-cuts mean; the tables of the material, of the peaks
+        and of identified inputs; and sentences on guarantees, smaller time steps, the answers to
+        questions, and the inputs that matter most, wrapped at 80 letters.
     """
     shown = [table for table in (material(parts), peak_table(parts)) if table.rows]
     sentences: list[str] = []
@@ -407,10 +407,10 @@ def peak_cells(peak: Peak, factor: float, levels: Sequence[int]) -> list[str]:
 
     Returns:
         A text for each level; the error; the farthest attained peak on the lowest level; and the
-        gap, which is the distance from this peak to the bound of the farthest peak as a fraction of
-        the bound. The last two are empty for peaks that are not guaranteed, and if the box of the
-        inputs encloses a set learned from a measurement: no response of the box is known to belong
-        to the set.
+        gap. The gap is the distance from this peak to the farthest bound, as a fraction of the
+        bound. Attained peak and gap are empty for peaks that are not guaranteed. They are also
+        empty if the box of the inputs encloses a set learned from a measurement, since no response
+        of the box is known to belong to the set.
     """
     lower = factor * peak.lower
     upper = factor * peak.upper
@@ -485,10 +485,9 @@ def display_units(
 def natures(parts: Parts) -> Iterator[str]:
     """Yield sentences, without full stops, on what is guaranteed and how it was tested.
 
-    Each stands only if it applies: that the stiffness on an own mesh is an upper bound; which peaks
-    are guaranteed, estimated or attained; what bounds mean if the box of the inputs encloses a set
-    that was learned from a measurement; what a mean over records is; and how many exact responses
-    agree with guaranteed bounds.
+    They say which peaks are guaranteed, estimated or attained, and how many exact responses agree
+    with guaranteed bounds. Others explain the stiffness on an own mesh, inputs that were learned
+    from a measurement, and means over records. Sentences that do not apply are left out.
 
     Args:
         parts: Numbers of the results.

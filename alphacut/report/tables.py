@@ -129,11 +129,11 @@ def peaks(studies: Mapping[str, EnvelopeResult]) -> pd.DataFrame:
 
     Returns:
         Least and greatest peak, error and attained value in SI units; NaN where no value is known
-        to be attained. "gap, share" is the distance from the attained value to the bound of the
-        farthest peak, as a fraction of this bound: "least peak" for the smallest value of an
-        output, "greatest peak" for all others. If bounds hold for a box that encloses a set of
-        inputs learned from a measurement, a column "inputs" says so. The index of the rows begins
-        at 0 again for each peak.
+        to be attained. "gap, share" is the distance from the attained value to the farthest bound,
+        as a fraction of this bound. The farthest bound is the least peak for the smallest value of
+        an output, and the greatest peak for all others. If bounds hold for a box that encloses a
+        set of inputs learned from a measurement, a column "inputs" says so. The index of the rows
+        begins at 0 again for each peak.
     """
     found = []
     for name, study in studies.items():

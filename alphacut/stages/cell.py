@@ -225,11 +225,11 @@ class CellProblem:
         """Return the particle fraction and the Hashin–Shtrikman bounds of E at the nominal inputs.
 
         Returns:
-            `fraction`, the mean over θ of the fraction of the radius map: of the volume for
-            spheres, else of the area. `fraction_of_case`, if the case states one.
-            `hashin_shtrikman_E_GPa`, the lower and upper bound of E in GPa at the stated fraction,
-            else at the mean one; missing if a phase is anisotropic. Nothing at all for a mesh from
-            a file.
+            `fraction` is the mean over θ of the particle fraction of the radius map, by volume for
+            spheres, else by area. `fraction_of_case` is the fraction that the case states, if any.
+            `hashin_shtrikman_E_GPa` has the lower and upper bound of E in GPa at this fraction, or
+            else at the mean one. The last two are missing if a phase is anisotropic, all for a mesh
+            from a file.
         """
         if isinstance(self.cell, MeshedCell):
             return {}
