@@ -10,9 +10,9 @@ from alphacut.rve.series.fibre_constants import fibre_constants
 def constants(result: HomogenisedStiffness) -> DeclaredConstants:
     """Return the engineering constants of a cell by name, moduli in Pa, with their declared errors.
 
-    These are E and nu of the result's average; of round fibres in a matrix E_T, E_L, nu_LT, G_T,
-    G_L and K_T, across (T) and along (L) them; of a plane stiffness E_x, E_y, nu_xy and G_xy in
-    plane strain, and, of two isotropic phases, with the ending _free without stress along the
+    All results have E and nu of their average. Round fibres in a matrix have E_T, E_L, nu_LT, G_T,
+    G_L and K_T, across (T) and along (L) the fibres. A plane stiffness has E_x, E_y, nu_xy and G_xy
+    in plane strain; two isotropic phases have E_x_free and so on as well, without stress along the
     fibres.
 
     Args:

@@ -32,8 +32,8 @@ if find_spec("dolfinx_solver"):  # where Numba is, this wheel hides the HDF5 of 
 def _without_numba() -> Iterator[None]:
     """Hide Numba within a block in which DOLFINx is imported.
 
-    DOLFINx imports it for helpers of no use here. Hiding it saves .3 s of each command, and of each
-    worker, by ``python -m benchmarks.start_up``. An import of Numba in the block raises
+    DOLFINx imports Numba for helpers that are not used here. Hiding it saves .3 s of each command
+    and of each worker (``python -m benchmarks.start_up``). An import of Numba in the block raises
     ImportError, with which DOLFINx copes; its ImportWarning is silenced. If Numba has been imported
     before, it stays visible. Whoever wants `dolfinx.utils.numba_utils` imports Numba or DOLFINx
     first.

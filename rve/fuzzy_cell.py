@@ -187,10 +187,10 @@ class FuzzyStiffness:
             guarantee: Written in brackets at the end.
         """
         first, last = self.bounds.alpha[[0, -1]]
-        lowest, highest = cuts[0], cuts[-1]
+        widest, narrowest = cuts[0], cuts[-1]
         return (
-            f"{name}: α = {first:g}: {lowest[0]:.6g} … {lowest[1]:.6g};"
-            f" α = {last:g}: {highest[0]:.6g} … {highest[1]:.6g} ({guarantee})"
+            f"{name}: α = {first:g}: {widest[0]:.6g} … {widest[1]:.6g};"
+            f" α = {last:g}: {narrowest[0]:.6g} … {narrowest[1]:.6g} ({guarantee})"
         )
 
     @property
@@ -266,13 +266,13 @@ def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
 
     Args:
         alpha: Rising levels, shape (levels,).
-        cuts: Lower and upper ends, nested, shape (levels, 2). The first cut holds from α = 0 on. Of
-            the level 1 alone the result is the crisp mean of both ends.
+        cuts: Lower and upper ends, nested, shape (levels, 2). The first cut holds from α = 0 on. If
+            1 is the only level, the result is the mean of both ends, a crisp number.
 
     Raises:
         RefusedError: An end is not finite, or the cuts are not nested.
     """
-    # On level 1 alone there is no support to give the fuzzy number a width.
+    # The level 1 alone does not say what the support is.
     if tuple(alpha) == (1.0,):
         return Crisp(float(cuts.mean()))
     return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
@@ -407,7 +407,7 @@ class FuzzyCell:
 
         Raises:
             RefusedError: An input is no parameter of the radius or of a phase, or no finite number,
-                a loss factor may be negative, or there are not two phases without names.
+                a loss factor may be negative, or phases without names are not two.
         """
         named = _named(phases)
         parameters = _parameters(radius, named)
@@ -473,7 +473,8 @@ class FuzzyCell:
     def support(self, name: str) -> Cut:
         """Return the smallest and the largest value of a phase's parameter, fuzzy or not.
 
-        Of a measured number they are the ends of the widest cut that its values decide.
+        For a fuzzy number from measured values they are the ends of the widest cut that the values
+        determine.
         """
         if name in self.inputs:
             return widest_cut(self.inputs[name])
@@ -643,10 +644,10 @@ def proved_signs(model: AnyModel, cell: FuzzyCell) -> Knowledge:
     """Return the signs of the inputs' effects on E where mechanics proves them, else no knowledge.
 
     If both phases have one crisp Poisson's ratio ν ≥ 0 and one phase is the stiffer for all values,
-    more of it can only stiffen the cell: A = 2 C33 and B = C11 + C12 of fibres rise (the paper's
-    eq. 16), and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both averages of the
-    shear modulus. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, since h_i ≥ 0, and falls with
-    a4, since h4 ≤ 0 (the paper's eq. 12).
+    more of it can only stiffen the cell. For fibres A = 2 C33 and B = C11 + C12 rise (the paper's
+    eq. 16), and with them E = 3A/2 − A²/(2B); for spheres the bulk modulus and both averages of the
+    shear modulus rise, and with them E. The radius Σ a_i h_i(θ) rises with a1, a2 and a3, since
+    h_i ≥ 0, and falls with a4, since h4 ≤ 0 (the paper's eq. 12).
 
     Args:
         model: Model of the cell; only one whose errors are of rounding keeps these signs.
@@ -748,10 +749,10 @@ def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Ar
 
 
 def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:
-    """Return bounds of the loss factors of E, G and K over the α-cuts of those of the phases.
+    """Return bounds of the loss factors of E, G and K over α-cuts of the phases' loss factors.
 
-    To first order they are linear in the loss factors of the phases, so that each is extreme at
-    ends of the cuts.
+    To first order they are linear in the phases' loss factors, so that each is extreme at ends of
+    the cuts.
 
     Args:
         result: Result of a cell, with the strain energies of its phases.
@@ -759,8 +760,8 @@ def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array
             G, shape (levels, 2, phases).
 
     Returns:
-        Lower and upper bounds, shape (levels, 2, 3), and the declared absolute errors where each is
-        largest in the first cut, shape (3,), NaN where the model declares none; the last axis is E,
+        Lower and upper bounds, shape (levels, 2, 3), and the declared absolute errors of the upper
+        bounds in the first cut, shape (3,), NaN where the model declares none; the last axis is E,
         G, K.
     """
     assert result.energies is not None
@@ -805,8 +806,8 @@ def _cuts_of_losses(
     Args:
         bounds: Bounds of the samples' outputs "loss_lower[level][constant]" and "loss_upper…",
             where the constants 0, 1 and 2 are E, G and K, with the samples.
-        reference: Result at the nominal inputs whose errors are declared; None for those of the
-            samples.
+        reference: Result at the nominal inputs, whose errors are declared; None to declare the
+            largest errors of the samples.
         phase_cuts: α-cuts of each phase's loss factor, shape (levels, 2, phases).
         has_particle: Whether the phases are matrix and particle. On a mesh of the user's own no
             error is declared without a reference.

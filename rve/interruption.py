@@ -15,9 +15,8 @@ STOP_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasat
 def end_on_second(number: int) -> None:
     """Let a second signal end the process while the first waits for the end of compiled code.
 
-    The C library's one-shot handler, where it has one, is that of Python for the first signal and
-    the system's default after it. Python's own handler, as `signal.getsignal` shows it, stays.
-    Without `sysv_signal` in the C library nothing is changed.
+    The C library calls Python's handler for the first signal, and the system's default after it.
+    What `signal.getsignal` returns stays. Nothing is changed if the C library has no `sysv_signal`.
 
     Args:
         number: Number of a signal, for which Python has a handler.
@@ -26,8 +25,8 @@ def end_on_second(number: int) -> None:
     if hasattr(library, "sysv_signal"):
         library.sysv_signal.restype = ctypes.c_void_p
         library.sysv_signal.argtypes = (ctypes.c_int, ctypes.c_void_p)
-        # The only way to learn the address of Python's handler is to replace it. What arrives
-        # between these two calls is lost.
+        # The only way to learn the address of Python's handler is to replace it. A signal between
+        # these two calls is lost.
         handler = library.sysv_signal(number, int(signal.SIG_IGN))  # returns the one before
         library.sysv_signal(number, handler)
 

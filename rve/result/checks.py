@@ -30,8 +30,8 @@ def checks_within_limits(
         checks: Relative violations, 0 for none, by the names "residual" and "hill_mandel" (of
             finite elements), "symmetry", "reuss", "voigt" and "hashin_shtrikman"; another name that
             is too large is a KeyError.
-        discretisation: Largest violation of the last three, which are bounds, by the error of a
-            mesh. That of all others is 1e-7.
+        discretisation: Largest violation that is allowed of the last three, which are bounds, by
+            the error of a mesh. The others are allowed 1e-7.
 
     Raises:
         CertificateError: A violation is NaN or too large; the message names it, its value and its
@@ -71,8 +71,8 @@ def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
         phases, "hashin_shtrikman".
 
     Raises:
-        CertificateError: A violation of a bound exceeds the declared error of the result, one of
-            symmetry 1e-7, or no error is declared.
+        CertificateError: A bound is violated by more than the declared error of the result,
+            symmetry by more than 1e-7; or no error is declared.
     """
     curve = result.curve
     cell = result.cell
@@ -95,14 +95,15 @@ def stress_checks(
 
     Args:
         stress: Homogenised (σ11, σ22, σ12) at the n nodes of θ, shape (n, 3, loads), in Pa.
-        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3), ε11 = ε22 in their span.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3). Some combination of them is
+            ε11 = ε22 without shear.
         fractions: Area fractions of the phases at the nodes, shape (phases, n).
         weights: Weights of the nodes with the density of θ inside, shape (n,), sum 1.
         phases: Materials, in the order of their fractions.
 
     Returns:
-        Violations by name: "symmetry", "reuss" and "voigt" over the largest energy and, of
-        isotropic phases, "hashin_shtrikman" over the bulk modulus.
+        Violations by name: "symmetry", "reuss" and "voigt", divided by the largest energy, and, of
+        isotropic phases, "hashin_shtrikman", divided by the bulk modulus.
     """
     # By the lemma of Hill and Mandel the mean stress under a load, times a load, is the mean energy
     # of the pair of their fields.
@@ -135,7 +136,7 @@ def order_checks(
     Returns:
         Violations by the names "symmetry", "reuss" and "voigt", 0 for none.
     """
-    # Only energies of the loads are compared: of the bounds, too, only what these loads see.
+    # The energies of the loads by the bounds are compared with those by the stiffness.
     scale = float(abs(energy).max())
     reuss_energy = loads @ mean(weights, reuss(fractions, stiffness)) @ loads.T
     voigt_energy = loads @ mean(weights, voigt(fractions, stiffness)) @ loads.T

@@ -61,8 +61,8 @@ class EngineeringConstants:
         Raises:
             numpy.linalg.LinAlgError: C is singular.
         """
-        # To first order the compliance S = C⁻¹ changes by δS = −S δC S. The margin stands for what
-        # is of second order.
+        # To first order the compliance S = C⁻¹ changes by δS = −S δC S. The factor 1.1 leaves a
+        # margin for terms of second order.
         compliance = np.linalg.inv(stiffness)
         compliance_errors = 1.1 * abs(compliance) @ errors @ abs(compliance)
         moduli = 1 / np.diag(compliance)
@@ -174,12 +174,12 @@ class Mixture:
 
         With k the plane-strain bulk moduli of the phases and ⟨k⟩ their mean by area, the bulk
         modulus of the cell is ⟨k⟩ − z̄ (k₂ − k₁)². The result is clipped to Hashin and Shtrikman's
-        bounds of z̄. Where the error of the bulk modulus hides z̄, or k₁ = k₂, it is their midpoint
-        with these bounds.
+        bounds of z̄. If the error of the bulk modulus leaves z̄ open, or k₁ = k₂, the result is the
+        midpoint of these bounds, with them as its own bounds.
 
         Args:
             bulk: Plane-strain bulk modulus of the cell in Pa.
-            relative_error: Declared relative error of it; NaN makes the bounds NaN unless k₁ = k₂.
+            relative_error: Its declared relative error; NaN makes the bounds NaN unless k₁ = k₂.
 
         Returns:
             z̄ with its lower and upper bound, in 1/Pa.
@@ -187,8 +187,8 @@ class Mixture:
         low, high = self.bounds
         contrast_squared = float(self.differences[0] ** 2)
         tolerance = relative_error * bulk
-        # The error of the bulk modulus then covers as much of z̄ as the bounds do; equal bulk
-        # moduli of the phases say nothing of z̄ at all.
+        # The error of the bulk modulus then leaves z̄ open by as much as the bounds do; with k₁ = k₂
+        # the bulk modulus does not depend on z̄ at all.
         if 2 * tolerance >= contrast_squared * (high - low) or contrast_squared == 0:
             return Interval((low + high) / 2, low, high)
         drop = self.fractions @ self.moduli[0] - bulk
@@ -233,7 +233,7 @@ class AxialStiffness:
         (Hill, J. Mech. Phys. Solids 12, 199, 1964) tie C13, C23, C63 and C33 to the plane stiffness
         C. With k, l = C13 and n = C33 of the phases, Δ their differences and ⟨⟩ means by area,
         (C13, C23, C63) = ⟨l⟩ (1, 1, 0) − z Δk Δl and C33 = ⟨n⟩ − z̄ Δl², where C (1, 1, 0)/2 = ⟨k⟩
-        (1, 1, 0) − z Δk² and z̄ = (z1 + z2)/2.
+        (1, 1, 0) − z Δk² gives the vector z, and z̄ = (z1 + z2)/2.
 
         Args:
             result: Result of any model.
@@ -295,7 +295,7 @@ class AxialStiffness:
         """
         c = self.lateral
         reduction = np.outer(c, c) / self.axial
-        # To first order the error of c cᵀ/C33 is that of each factor c, and that of C33, in turn.
+        # To first order the errors of c cᵀ/C33 by either factor c and by C33 add up.
         by_lateral = np.outer(abs(c), self.lateral_errors) / self.axial
         by_axial = abs(reduction) * self.axial_error / self.axial
         return EngineeringConstants.of_stiffness(

@@ -41,8 +41,8 @@ def loss_factors(result: HomogenisedStiffness, losses: Array | None = None) -> D
     Args:
         result: Result of any model, with the strain energies of its phases; K is that of plane
             strain, of spheres that of space.
-        losses: Loss factors of K and G of each phase, shape (phases, 2), matrix first; if not
-            given, those that the phases of the cell state for both, 0 where one states none.
+        losses: Loss factors of K and G of each phase, shape (phases, 2), matrix first. By default
+            both are the loss factor of the phase in the result's cell, or 0 if it has none.
 
     Returns:
         Values and absolute errors by "E", "G" and "K". The errors follow from those of the

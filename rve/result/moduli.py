@@ -46,13 +46,13 @@ def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
 
 
 def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: bool = False) -> Array:
-    """Return the bounds of K and of G of a composite of isotropic phases, of the plane or of space.
+    """Return bounds of K and of G of a composite of isotropic phases, in the plane or in space.
 
-    In the plane of fibres by Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119,
-    1965), of space by Hashin and Shtrikman (ibid. 11, 127, 1963); of any number of phases and with
-    the extreme moduli of either Walpole (ibid. 17, 235, 1969). The bounds of K hold for
-    any arrangement of fibres under equal strains along x and y, and for any cubic composite of
-    space under hydrostatic strain; the bounds of G hold for isotropic composites.
+    The bounds of K hold for any arrangement of fibres under equal strains along x and y, and for
+    any cubic composite of space under hydrostatic strain; those of G hold for isotropic composites.
+    For fibres they are by Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119,
+    1965), in space by Hashin and Shtrikman (ibid. 11, 127, 1963), and for any number of phases by
+    Walpole (ibid. 17, 235, 1969).
 
     Args:
         fractions: Fractions of the phases, shape (phases, …), where … is any shape; their sum over
@@ -109,8 +109,8 @@ def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, flo
     A bound of K is X in 1/(X + term) = Σ fraction/(K of the phase + term), and that of G likewise.
 
     Args:
-        bulk: K of the reference, in Pa: of three dimensions, or of plane strain. Not 0 beside a
-            shear modulus of 0.
+        bulk: K of the reference, in Pa: of three dimensions, or of plane strain. K and G are not
+            both 0.
         shear: G of the reference, in Pa.
         space: Whether the composite is one of space; else of the plane across fibres.
 
@@ -128,13 +128,12 @@ def _reference_terms(bulk: float, shear: float, space: bool) -> tuple[float, flo
 def _mean_with(moduli: Array, fractions: Array, term: float) -> Array:
     """Return the modulus X with 1/(X + term) = Σ_k fraction_k/(modulus_k + term), in Pa, shape (…).
 
-    This is the common form of the bounds of Hashin and Shtrikman; `term` belongs to a reference
-    material. It may not be 0 where a modulus is.
+    This is the common form of the bounds of Hashin and Shtrikman.
 
     Args:
         moduli: Modulus of each phase, shape (phases,), in Pa.
         fractions: Fractions of the phases, shape (phases, …), where … is any shape.
-        term: Term of the reference material, in Pa.
+        term: Term of the reference material, in Pa; not 0 if a modulus is 0.
     """
     return np.asarray(1 / np.tensordot(1 / (moduli + term), fractions, axes=1) - term)
 
@@ -210,16 +209,16 @@ def square_moduli(stiffness: Array) -> Array:
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, with C11 also by each axis.
+    """Return C11 + C12, C11 − C12 and C33 of plane stiffnesses, with C11 taken in 1 or 3 ways.
 
     Args:
         stiffness: Plane stiffnesses in Voigt's order 11, 22, 12, shape (…, 3, 3).
         square: Whether C11 and C22 are equal but for the mesh, so that their mean is enough.
 
     Returns:
-        The three moduli, on the last axis. The last but one axis is how C11 is taken: the mean of
-        C11 and C22 alone, shape (…, 1, 3), or, if not `square`, the mean, C11 and C22, shape (…, 3,
-        3).
+        The three moduli are on the last axis, the ways on the last but one. If `square`, C11 is
+        taken as the mean of C11 and C22, shape (…, 1, 3); else as this mean, as C11, and as C22, in
+        this order, shape (…, 3, 3).
     """
     moduli = [square_moduli(stiffness)]
     if not square:

@@ -82,8 +82,8 @@ def _constants(mixture: Mixture, z: float, *, K_T: float, G_T: float, G_L: float
 def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
     """Return the mean over θ of the shear modulus G_L along the fibres, and its relative error.
 
-    The mean, in Pa, is by Gauss quadrature with 32 nodes. Its declared error is the mean of those
-    of G_L at the nodes plus 1.6 times the larger distance to two finer rules.
+    The mean, in Pa, is by Gauss quadrature with 32 nodes. Its declared error is the mean error of
+    G_L at the nodes plus 1.6 times the larger distance from the means by two finer rules.
 
     Args:
         cell: Cell of a round fibre in a matrix, both isotropic.
@@ -120,8 +120,8 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
         inclusion: Isotropic material of the fibres.
 
     Returns:
-        G_L in Pa and its relative errors, shape (n,) each. Where 128 harmonics do not suffice, for
-        fibres that nearly touch, the error says so.
+        G_L in Pa and its relative errors, shape (n,) each. The error is larger where 128 harmonics
+        do not suffice, as for fibres that nearly touch.
     """
     tolerance = 1e-12
     max_harmonics = 128  # more would cost their third power

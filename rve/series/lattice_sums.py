@@ -55,18 +55,18 @@ class LatticeSums:
 def lattice_sums(highest: int) -> LatticeSums:
     """Return Σ p^-n and Σ conj(p) p^-n over all p = m + i j ≠ 0 with integers m and j.
 
-    Sums of n < 40 follow from Riemann's ζ and Lipschitz' formula, in rows of the lattice: with
-    conj(p) = p − 2 i j, the sum Σ p^(1−n) vanishes in the second family. For larger n the points
-    near 0 are enough.
+    For n < 40 the row j = 0 is summed by Riemann's ζ, and the other rows by Lipschitz' formula. In
+    the second sum conj(p) is p − 2 i j, of which Σ p^(1−n) vanishes. For larger n the points near 0
+    are enough.
 
     Args:
         highest: Largest exponent n.
 
     Returns:
         `plain`, Σ p^-n, and `conjugate`, Σ conj(p) p^-n, at the index n, shape (highest + 1,) each.
-        Both are real. By symmetry they vanish but for n = 4, 8, … and n = 7, 11, …; n = 3 of the
-        second one, which converges conditionally, is set to 0. Equal arguments give the same
-        arrays, which must not be changed.
+        Both are real. By symmetry the first is zero but for n = 4, 8, …, the second but for n = 7,
+        11, …; its entry n = 3, which converges conditionally, is set to 0. Equal arguments give the
+        same arrays, which must not be changed.
     """
     plain = np.zeros(highest + 1)
     conjugate = np.zeros(highest + 1)
@@ -91,8 +91,7 @@ def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
 
     Args:
         sums: Σ p^-N by its exponent N, shape (max(k) + max(n) + 1 or more,). With Σ conj(p) p^-N in
-            its place and even n the result is that of Σ conj(P)/2 (z − P)^-n, with the opposite
-            sign.
+            its place and even n, the result is minus the coefficients of Σ conj(P)/2 (z − P)^-n.
         k: Orders of the coefficients, at least 0, shape (K,).
         n: Orders n, at least 1, shape (N,).
 
@@ -111,8 +110,9 @@ def lattice_images(sums: Array, k: Ints, n: Ints) -> Array:
 def _zeta(n: int) -> float:
     """Return Riemann's ζ(n) for a whole number n ≥ 4, by the formula of Euler and Maclaurin.
 
-    After the terms below 100 follow ∫ x^-n dx from 100 on, half the next term, and two corrections.
-    What remains is at most the third one, n (n + 1) … (n + 4) 100^(−n−5) / 30240 < 3e-19.
+    To the sum of x^-n over x < 100 are added ∫ x^-n dx from 100 on, half the term x = 100, and two
+    corrections. The error is at most the third correction, n (n + 1) … (n + 4) 100^(−n−5) / 30240 <
+    3e-19.
     """
     last = 100.0
     head = float(np.sum(np.arange(last - 1, 0, -1) ** -float(n)))

@@ -330,7 +330,7 @@ def mean_energies(series: Series, cell: Cell, mean: Mean) -> PhaseEnergies:
     for k in range(2):
         finer = gauss_rule(cell.radius_map.distribution, points=finer_count(finer.nodes.size))
         needed_terms = np.interp(cell.radius_map(finer.nodes), node_radii[order], rising_terms)
-        # Of the two larger numbers of terms that estimate errors, each finer rule has one.
+        # `_error_terms` gives two larger numbers of terms; the first rule takes the smaller.
         finer_terms = np.array([_error_terms(int(np.ceil(n)))[k] for n in needed_terms])
         distances.append(abs(values - _rule_energies(series, cell, finer, finer_terms)))
     rounding = 1e-12 * values.sum(axis=(0, 1))  # a fraction of the modulus

@@ -134,8 +134,9 @@ def family(harmonics: int, *, hydrostatic: bool) -> Family:
 
     Returns:
         Orders `a` and `b`, shape (N,), and, at radius 1, what unit coefficients of all images add
-        to the Taylor coefficients p of φ and q of ψ at 0, shape (N, N): `to_p`, `to_next` (of
-        p_{k+2} times k + 2), `a_to_q` and `b_to_q`. Equal arguments give the same object.
+        to the Taylor coefficients p_k of φ and q_k of ψ at 0, shape (N, N): `to_p`, of a_n to p_k
+        for k in `b`; `to_next`, of a_n to (k + 2) p_{k+2}, `a_to_q`, of a_n to q_k, and `b_to_q`,
+        of b_n to q_k, for k in `a`. Equal arguments give the same object.
     """
     sums = _sums()
     ones = 4 * np.arange(harmonics) + 1

@@ -138,13 +138,13 @@ class _Pair(NamedTuple):
 
 
 def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: LatticeSums) -> Array:
-    """Return the amplitudes of regular solutions of one kind by the images of multipoles.
+    """Return the amplitudes of regular solutions of one kind by the images of unit multipoles.
 
     Solutions of Navier's equation are of kind 1 (gradient of a solid harmonic), 2 (torsional) or 3
-    (with dilatation), as by Kushch (Micromechanics of Composites, 2013). The irregular solid
-    harmonics of all images, expanded about the sphere, are sums over the lattice; the factors
-    before them follow from the invariants div u, x·curl u and x·u of the displacement, by which the
-    three kinds are told apart.
+    (with dilatation), as by Kushch (Micromechanics of Composites, 2013). An amplitude is a sum over
+    the lattice, by the expansion of the images' irregular solid harmonics about the sphere, times a
+    factor. The factors follow from the invariants div u, x·curl u and x·u of the displacement u,
+    which tell the three kinds apart.
 
     Args:
         target: Kind of the regular solutions.
@@ -155,11 +155,11 @@ def _coupling(target: int, source: int, pair: _Pair, poisson: complex, sums: Lat
         sums: Sums over the lattice of harmonic and of biharmonic multipoles, at [degree, order].
 
     Returns:
-        Amplitudes, shape (regular solutions, multipoles); 0 for kind 1 or 3 and degree k = 0 where
-        there is no such regular solution.
+        Amplitudes, shape (regular solutions, multipoles). There is no regular solution of kind 1
+        and degree k = 0: its amplitudes, 0 for the sources 1 and 3, do not matter.
     """
     n = pair.n
-    k = np.maximum(pair.k, 1) if target == 1 else pair.k  # a regular solution 1 of degree 0 is none
+    k = np.maximum(pair.k, 1) if target == 1 else pair.k  # no division by the degree 0 of kind 1
     if target == source:
         factors = {1: pair.k > 0, 2: -n / (k + 1), 3: n * (2 * n - 1) / ((k + 1) * (2 * k + 3))}
         return np.asarray(factors[target] * _weighted_sum(sums.harmonic, pair, 0))
@@ -268,11 +268,11 @@ class TMatrices(NamedTuple):
 def t_matrices(degrees: Array, matrix: Material, inclusion: Material) -> TMatrices:
     """Return what a sphere of radius 1 makes of incoming regular fields: its T-matrices.
 
-    On it the solutions of Navier's equation of kinds 1 and 3 have displacements and tractions along
-    x Y and ∇Y (Y the spherical harmonic), kind 2 along x × ∇Y alone; continuity of both leaves 2 ×
-    2 systems for each degree, whatever the order m. Kinds are numbered as by Kushch (2013): 1 is
-    the gradient of a harmonic, 2 torsional, 3 the one with dilatation. The inclusion may be as soft
-    as a pore or as stiff as rigid.
+    Kinds of solutions of Navier's equation are numbered as by Kushch (2013): 1 is the gradient of a
+    harmonic, 2 torsional, 3 the one with dilatation. On the sphere kinds 1 and 3 have displacements
+    and tractions along x Y and ∇Y, with the spherical harmonic Y, and kind 2 along x × ∇Y alone. So
+    continuity gives a system of 2 × 2 for each degree, whatever the order m. The inclusion may be
+    as soft as a pore or as stiff as a rigid sphere.
 
     Args:
         degrees: Degrees n of the spherical harmonics, whole numbers from 0, shape (k,).

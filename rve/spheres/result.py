@@ -126,8 +126,8 @@ def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
         and "hashin_shtrikman" of the bulk modulus.
 
     Raises:
-        CertificateError: A violation of a bound exceeds the declared error of the result, one of
-            symmetry 1e-7, or no error is declared.
+        CertificateError: A bound is violated by more than the declared error of the result,
+            symmetry by more than 1e-7; or no error is declared.
     """
     cell = result.cell
     assert cell is not None
