@@ -63,9 +63,9 @@ class Boxes:
         """Cut all boxes at one value of a parameter, and return both sides.
 
         The value is the midpoint of the parameter's range in the widest box, or the geometric mean
-        of the ends if both are positive and their ratio is above 1.5. On a level whose box only
-        touches it, a side has a box without width; on a level whose box lies beyond it, it has
-        none. Nominal values outside a side are moved to its nearest end.
+        of the ends if both are positive and their ratio is above 1.5. A box that only touches this
+        value also gives a box without width to the other side. A box that lies on one side alone
+        gives nothing to the other side. Nominal values outside a side are moved to its nearest end.
 
         Args:
             axis: Index of the parameter in `names`.
@@ -101,9 +101,8 @@ class Boxes:
     def intersect(self, low: Array, high: Array) -> Boxes:
         """Return the intersection of each box with another box.
 
-        Each box must meet the other one: ends are clipped, so that of boxes apart the nearest end
-        of the other box would be returned. The nominal values are clipped, too, and the fuzzy
-        numbers are left out.
+        Each box must meet the other one, which is not checked. The nominal values are moved into
+        the other box, too, and the fuzzy numbers are left out.
 
         Args:
             low: Lower ends of the other box, shape (parameters,), in SI units; -∞ for none.

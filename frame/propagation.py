@@ -282,8 +282,8 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
         proved = proof.run(exact, tick)
     except UnprovedError:
         return followed
-    # The true bounds lie between the guaranteed bounds and the attained values. The error is the
-    # larger one of the distances from both.
+    # The true bounds lie between the guaranteed bounds (`proved.proved`) and the attained values
+    # (`proved.attained`). The error is the larger one of the distances from both.
     ends = np.stack([followed.lower, followed.upper])  # (lower or upper, levels, times, outputs)
     distances = [np.abs(ends - np.stack(known)) for known in (proved.proved, proved.attained)]
     # The larger one over both known bounds and over both ends: (levels, times, outputs).

@@ -78,10 +78,10 @@ class LimitDecision(LimitResult):
     def verdict_and_motion(self) -> str:
         """The verdict in words; if only some responses exceed the limit, with one of them.
 
-        This one is said by the inputs that attain the peak, and by the record of a suite: "can be
+        Such a response is named by its inputs, and by its record if there is a suite: "can be
         exceeded, as at k1 = 38.00 MN/m, record RSN953". If all or no responses exceed the limit,
-        or no inputs are known, the verdict alone is given, with the lowest computed level if that
-        is not 0: "not exceeded from α = 0.5 up".
+        or no inputs are known, the verdict stands alone. A lowest computed level other than 0 is
+        then added: "not exceeded from α = 0.5 up".
         """
         # If all responses exceed the limit, a single one is no news.
         is_by_some = self.verdict == "can be exceeded"
@@ -115,8 +115,8 @@ class LimitDecision(LimitResult):
             # whose first digit has the place 10^e has e + 4 digits up to there; 0 counts as 0.001.
             exponent = floor(log10(abs(value) or 1e-3))
             return percent_text(rounded(value, side, nature, max(4 + exponent, 1)))
-        # The number that is shown is rounded, which is in the unit of the limit.
-        # It must stay a bound there: rounding in SI could move it back across the exact value.
+        # The number is rounded in the unit in which it is shown, that of the limit. Rounded in SI,
+        # it could be no bound any more after the conversion.
         factor = 1.0
         if self.stated_unit is not None:
             factor = self.stated_unit.factor
@@ -145,9 +145,9 @@ class Decision(Answer):
     def _texts(self, part: LimitDecision) -> dict[str, str]:
         """Return the texts of one row of the table by the titles of the columns.
 
-        Margin, bound, attained peak and gap (distance of both over the bound) are those of the
-        lowest level. The last three are empty for the event that any of several limits is exceeded,
-        and the gap also where it is unknown or the bound is 0.
+        Margin, bound, attained peak and gap are those of the lowest level. The gap is the distance
+        of bound and attained peak over the bound; it is empty where it is unknown or the bound is
+        0. The event that any of several limits is exceeded has no bound, attained peak and gap.
 
         Args:
             part: Decision on the limit or event of the row.
@@ -305,24 +305,27 @@ def _decide_limit(
         input_units: SI units by the name of the input, as far as known.
     """
     alpha = peak.alpha  # rising
-    # A limit of the smallest value of q is an upper limit of -q, and the bounds are those of -q.
+    # All limits are treated as upper limits. "q ≥ L" is "-q ≤ -L": then `outwards` gives -L, and
+    # the bounds below are those of peaks of -q.
     largest_allowed = limit.outwards
     # Lower and upper bounds of the largest and of the smallest peak in each cut, (levels,) each.
     max_peak = peak.max_peak_bounds
     min_peak = peak.min_peak_bounds
 
     # Some response of a cut exceeds the limit if and only if the largest peak of the cut does. The
-    # possibility is the highest level of such a cut, which both bounds of this peak enclose.
+    # possibility is the highest level of such a cut. It is at least the highest level at which the
+    # lower bound of this peak exceeds the limit, and at most the level from which on the upper
+    # bound keeps it (1 if there is none).
     is_exceeded = max_peak.lower > largest_allowed
     possibility = (
         float(alpha[is_exceeded].max(initial=0.0)),
-        _lowest_excluding_level(alpha, max_peak.upper <= largest_allowed),
+        _level_from_which(alpha, max_peak.upper <= largest_allowed),
     )
     # Some response of a cut keeps the limit if and only if the smallest peak of the cut does.
     is_kept = min_peak.upper <= largest_allowed
     possibility_of_keeping = (
         float(alpha[is_kept].max(initial=0.0)),
-        _lowest_excluding_level(alpha, min_peak.lower > largest_allowed),
+        _level_from_which(alpha, min_peak.lower > largest_allowed),
     )
     necessity = (1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0])
     lowest_level = float(alpha[0])
@@ -415,14 +418,14 @@ def _verdict(
     return "undecided"
 
 
-def _lowest_excluding_level(alpha: Array, is_excluded: Mask) -> float:
-    """Return the lowest level from which on a mask holds on all levels, or 1 if there is none.
+def _level_from_which(alpha: Array, holds: Mask) -> float:
+    """Return the lowest level from which on a mask holds up to the top, or 1 if there is none.
 
     Args:
         alpha: Rising levels, shape (levels,).
-        is_excluded: The mask, shape (levels,).
+        holds: The mask, shape (levels,).
     """
-    # The level above the last one that is not excluded; beyond all levels it is 1, because nothing
-    # is more possible than that.
-    first = np.flatnonzero(~is_excluded).max(initial=-1) + 1
+    # The level above the last one at which the mask does not hold, or 1, the largest possibility,
+    # if that is the last level.
+    first = np.flatnonzero(~holds).max(initial=-1) + 1
     return float(np.append(alpha, 1.0)[first])

@@ -84,9 +84,9 @@ class Limit:
     def outwards(self) -> float:
         """The number that a peak must not exceed, in the SI unit of the output.
 
-        Of a limit of the largest value or magnitude it is the limit itself, and of a limit L of the
-        smallest value of an output q it is -L: the smallest value of q falls below L if the largest
-        value of -q exceeds -L. The limit must have one value, not a range.
+        For a limit of the largest value or of the magnitude it is the limit itself. For a limit L
+        of the smallest value of an output q it is -L, and the peak is the largest value of -q: it
+        exceeds -L if the smallest value of q falls below L. The limit has one value, no range.
         """
         # Smallest values are compared by their negatives, so that all limits are upper limits.
         sign = -1.0 if self.side == "min" else 1.0
@@ -220,8 +220,8 @@ class LimitResult:
     def stated_unit(self) -> ShownUnit | None:
         """The unit in which the limit was stated, such as "mm" with the factor 1000 from m.
 
-        None if the limit was stated as a percentage, as a ratio or as a plain number, was not
-        stated in words at all, or is zero, since the factor is the stated over the SI value.
+        The factor is the stated value over the SI value. The result is None if the limit is zero,
+        was not stated in words, or was stated as a percentage, as a ratio or as a plain number.
         """
         # A number followed by a unit; fractions ("1/200") and percentages have no unit.
         number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)"

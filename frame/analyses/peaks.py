@@ -82,11 +82,10 @@ class Peak:
     def __post_init__(self) -> None:
         """Replace NaN, which stands for an unknown value, and compute `proved`.
 
-        An unknown bound becomes infinite with the sign with which it says nothing: `lower` -∞ and
-        `upper` +∞. The attained peak and both bounds of the peaks that are least far out are
-        counted outwards, for a smallest value of an output downwards: an attained peak and a lower
-        bound that are not known become infinite inwards, an upper bound outwards. `proved` is the
-        guaranteed bound of the farthest peaks with the sign of the output.
+        An unknown value becomes infinite with the sign with which it says nothing. For `lower` this
+        is -∞, and for `upper` +∞. For a magnitude or a largest value, `reached` and `least_lower`
+        become -∞, and `least_upper` +∞; for a smallest value these three have the opposite signs.
+        `proved` is the guaranteed bound of the most extreme peak, with the sign of the output.
         """
         far_out = self.outward_sign * np.inf
         values_that_say_nothing = {
@@ -128,11 +127,10 @@ class Peak:
         return mirrored(self) if self.is_least else self
 
     @property
-    def _excluding_error(self) -> Array:
-        """Distance outside `lower` and `upper` beyond which no peak lies, shape (levels,).
+    def _error_or_infinite(self) -> Array:
+        """Error of guaranteed or estimated bounds, and +∞ for attained bounds, shape (levels,).
 
-        For guaranteed and estimated bounds it is their error. It is infinite for attained bounds,
-        which exclude nothing.
+        No peak lies farther outside `lower` and `upper` than this; attained bounds exclude nothing.
         """
         if self.nature is Nature.ATTAINED:
             return np.full_like(self.error, np.inf)
@@ -142,26 +140,30 @@ class Peak:
     def max_peak_bounds(self) -> Ends:
         """Lower and upper bound of the largest peak of each cut, shape (levels,) each.
 
-        For the smallest value of an output q they are bounds of the largest value of -q.
+        For the smallest value of an output q, all peaks are largest values of -q.
         """
+        # The peak of -q, a largest value, has the bounds that are wanted.
         if self.is_least:
             return self.outwards.max_peak_bounds
-        return Ends(self.reached, self.upper + self._excluding_error)
+        return Ends(self.reached, self.upper + self._error_or_infinite)
 
     @property
     def min_peak_bounds(self) -> Ends:
         """Lower and upper bound of the smallest peak in each cut, shape (levels,) each.
 
-        They are the bounds of the response that goes least far. For the smallest value of an output
-        q the peaks are the largest values of -q. Bounds that are not known are 0 for magnitudes and
-        infinite otherwise. The lower bound has the guarantee of the peak.
+        The smallest peak is that of the response with the least extreme peak. For the smallest
+        value of an output q, all peaks are largest values of -q. An unknown lower bound is 0 for
+        magnitudes and -∞ otherwise, an unknown upper bound is +∞.
         """
+        # The peak of -q, a largest value, has the bounds that are wanted.
         if self.is_least:
             return self.outwards.min_peak_bounds
-        # Three lower bounds hold: that of all peaks with its error, 0 for a magnitude, and a bound
-        # that was computed for the smallest peak alone.
-        below = self.lower - self._excluding_error
-        lower_bound = np.maximum(np.maximum(below, _smallest_peak(self.side)), self.least_lower)
+        # Three lower bounds hold: that of all peaks less its error, 0 for a magnitude (-∞ for a
+        # value), and a bound that was computed for the smallest peak alone.
+        below = self.lower - self._error_or_infinite
+        lower_bound = np.maximum(
+            np.maximum(below, _least_possible_peak(self.side)), self.least_lower
+        )
         # Each cut contains the narrowest one. The smallest peak of a cut is therefore at most the
         # largest peak of the narrowest cut.
         largest_of_narrowest = self.max_peak_bounds.upper[-1:]
@@ -172,8 +174,8 @@ class Peak:
         """Whether a smaller time step would narrow the bound on the lowest level considerably.
 
         This is so if what responses may add between the time nodes is more than 1 % of the bound,
-        and more than half of its uncertainty: of the distance from the attained peak if the bound
-        is guaranteed and such a peak is known, and else of the error.
+        and more than half of its uncertainty. The uncertainty is the distance from the attained
+        peak if the bound is guaranteed and such a peak is known, and else the error.
         """
         bound = float(self.far_end[0])
         attained = float(self.reached[0])
@@ -214,7 +216,7 @@ def mirrored(peak: Peak) -> Peak:
     )
 
 
-def _smallest_peak(side: str) -> float:
+def _least_possible_peak(side: str) -> float:
     """Return a lower bound of any peak: 0 for a magnitude, -∞ for a largest value."""
     return -np.inf if side else 0.0
 
@@ -250,7 +252,7 @@ def _peak_of(band: Envelope, name: str) -> Peak:
     nature = band.nature_of(output)
     is_guaranteed = nature is Nature.GUARANTEED
     side: Literal["", "max"] = "" if name == output else "max"
-    smallest = _smallest_peak(side)
+    smallest = _least_possible_peak(side)
 
     # Bounds of |q|, q or -q at the time nodes, shape (levels, times). Guaranteed bounds contain
     # the error.
@@ -319,16 +321,16 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
 
     Args:
         found: Bounds of the peaks at the time nodes, with arrays of shape (levels, outputs).
-            Responses that were computed attain both ends; that no peak lies outside is at most an
-            estimate.
+            Responses that were computed attain both ends. It is not proved that no peak lies
+            outside.
         column: Index of the output.
-        between: What responses may add to a peak within the time steps, shape (levels,). That of
-            the lowest level, the first one, becomes `between_nodes` of the peak.
+        between: What responses may add to a peak within the time steps, shape (levels,). Its first
+            entry, of the lowest level, becomes `between_nodes` of the peak.
 
     Returns:
-        The peak with the upper ends as attained values, and the lower ends plus `between` as peaks
-        that some response does not exceed. If the box of the inputs encloses a set, nothing counts
-        as attained: then these are -∞ and +∞.
+        The peak. Its attained values are the upper ends, and the lower ends plus `between` are
+        peaks that some response does not exceed. If the box of the inputs only encloses a set,
+        nothing counts as attained: then the former are -∞, and the latter +∞.
     """
     lower = found.lower[:, column]
     upper = found.upper[:, column]
@@ -419,6 +421,8 @@ def tightest(first: Peaks, second: Peaks) -> dict[str, Peak]:
     """
     found = {**first, **second}
     for name in first.keys() & second.keys():
+        # A smallest value of q is combined as the largest value of -q (`outwards`), and turned back
+        # (`mirrored`).
         both = _tighter(first[name].outwards, second[name].outwards)
         found[name] = mirrored(both) if first[name].is_least else both
     return found

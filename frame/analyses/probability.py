@@ -501,9 +501,9 @@ def _limit_probability(
 def clopper_pearson(least: Array, most: Array, total: int, tail: float) -> Ends:
     """Return exact confidence limits of a probability from counts in independent draws.
 
-    The lower limit is the probability with which at least `least` of the draws would have the event
-    with the probability `tail`, and the upper limit that with which at most `most` would (Clopper
-    and Pearson, Biometrika 26, 404, 1934).
+    If the probability of the event is the lower limit, the chance that `least` or more draws have
+    it is `tail`. If it is the upper limit, the chance that `most` or fewer draws have it is `tail`
+    (Clopper and Pearson, Biometrika 26, 404, 1934).
 
     Args:
         least: Number of draws in which the event occurs for sure, of any shape.

@@ -497,8 +497,9 @@ def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
         of_records = [found[name].outwards for found in peaks.values()]
         farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
         nature = Nature.weakest(peak.nature for peak in of_records)
-        # A bound of the largest peak is the largest of the bounds; the fields that are no arrays
-        # are those of the record under which it is attained.
+        # Each array is the largest one of all records; the other fields are those of the record
+        # under which the largest peak is attained. Smallest values of q have been turned into
+        # largest values of -q (`outwards`), and are turned back at the end (`mirrored`).
         found = with_combined(
             replace(farthest, nature=nature), of_records, np.max,
             "lower", "upper", "error", "reached", "least_lower", "least_upper",

@@ -203,10 +203,9 @@ class MatrixStructure(LinearSystem):
     def _require_definite(self) -> None:
         """Check that M and K are positive definite where they must be, at the nominal parameters.
 
-        The unknowns are divided into those that have mass, `self.massive`, and the others,
-        `self.massless`. M must be positive definite over the former. K must be so over the latter,
-        which follow the former without inertia; they must have no dampers. Over all unknowns K may
-        be indefinite, unless a term of negative trace makes it so.
+        M must be positive definite over the unknowns that have mass, `self.massive`. K must be
+        positive definite over the others, `self.massless`, which must have no dampers. Over all
+        unknowns K may be indefinite, unless a term of negative trace makes it so.
 
         Raises:
             RefusedError: One of these does not hold. The hint names a term with a negative trace,
@@ -247,9 +246,8 @@ class MatrixStructure(LinearSystem):
     def _require_stable(self, stiffness: Array) -> None:
         """Check that no term of negative sign makes the stiffness indefinite.
 
-        A term with a negative trace, as of weights (P-Delta), is allowed if the sum has no negative
-        eigenvalue, none below -1e-9 of the sum's largest entry. A sum without such a term is not
-        checked.
+        A term with a negative trace, as of weights (P-Delta), is allowed if no eigenvalue of the
+        sum is below -1e-9 of the sum's largest entry. A sum without such a term is not checked.
 
         Args:
             stiffness: Sum of all terms at the nominal parameters, shape (n, n).

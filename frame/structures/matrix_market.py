@@ -116,7 +116,7 @@ def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:
 def dense_of_entries(
     name: str, shape: tuple[int, int], *, rows: Array, columns: Array, values: Array
 ) -> Array:
-    """Return the dense matrix of a sparse one's entries; those of one place are added.
+    """Return the dense matrix of a sparse matrix's entries; entries of the same place are added.
 
     Args:
         name: Name of the file, for messages.

@@ -113,7 +113,8 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
 def _read_csv(name: str, text: str) -> Array:
     """Return the numbers of a text, shape (rows, columns).
 
-    Commas separate them, or semicolons, beside which commas are decimal ones, or blanks and tabs.
+    In a text with semicolons these separate the numbers, and commas are decimal commas. Otherwise
+    commas separate them, and in a text without either, blanks and tabs.
 
     Args:
         name: Name of the file, for messages.

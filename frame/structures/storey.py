@@ -533,9 +533,10 @@ class StoreyFrame(LinearSystem):
 
         Columns 0 … n - 1 are for the displacements of the n floors relative to the ground, from
         below, the next n for their velocities, and the last n for their absolute accelerations. The
-        row of a shear is that of the drift, without the stiffness. The rows of residual drift,
-        ductility and dissipated energy have a 1 at their floor's displacement, and stand for no
-        sum. The row of the overturning moment is 0, since its coefficients depend on parameters.
+        row of a shear has the coefficients of the drift, not multiplied by the stiffness. The rows
+        of residual drift, ductility and dissipated energy have a 1 at the displacement of their
+        floor, though these outputs are no sums. The row of the overturning moment is 0, since its
+        coefficients depend on parameters.
         """
         coefficients = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(coefficients, map(self.quantity, self.outputs), strict=True):
