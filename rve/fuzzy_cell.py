@@ -409,7 +409,7 @@ class FuzzyCell:
             RefusedError: An input is no parameter of the radius or of a phase, or no finite number,
                 a loss factor may be negative, or phases without names are not two.
         """
-        named = _named(phases)
+        named = _phases_by_name(phases)
         parameters = _parameters(radius, named)
         numbers: dict[str, FuzzyNumber] = {}
         for name, number in inputs.items():
@@ -483,7 +483,7 @@ class FuzzyCell:
         return Cut(value, value)
 
 
-def _named(phases: Phases) -> dict[str, AnyPhase]:
+def _phases_by_name(phases: Phases) -> dict[str, AnyPhase]:
     """Return phases by name, "matrix" and "inclusion" where they have none."""
     if isinstance(phases, Mapping):
         return dict(phases)

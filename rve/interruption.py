@@ -35,11 +35,11 @@ def end_on_second(number: int) -> None:
 def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
     """Delay Ctrl-C to the end of a block, and restore the signal handlers there.
 
-    PETSc loses exceptions that Python raises below it; basix and DOLFINx abort while they are
-    imported, and MPI replaces handlers. At the end of the block the last Ctrl-C that came meanwhile
-    is handed to the handler from before, by default one that raises KeyboardInterrupt; it is
-    dropped if Ctrl-C was ignored before. Outside the main thread, and where Ctrl-C has the system's
-    default handler or one that Python does not know, the block is not changed.
+    PETSc loses exceptions that Python raises below it, an interrupted import of basix or DOLFINx
+    aborts, and MPI replaces handlers. At the end of the block the last Ctrl-C that came meanwhile
+    is passed to the handler from before, which by default raises KeyboardInterrupt; it is dropped
+    if Ctrl-C was ignored before. Nothing is changed outside the main thread, or where Ctrl-C has
+    the system's default handler or one that Python does not know.
 
     Args:
         second_ends: Whether a second Ctrl-C, SIGTERM or SIGHUP in the block ends the process at
@@ -66,7 +66,7 @@ def uninterrupted(*, second_ends: bool = False) -> Iterator[None]:
         for number, handler in {signal.SIGINT: handler_before, **stop_handlers}.items():
             if handler is not None:
                 signal.signal(number, handler)
-        # What came meanwhile is handed to the handler that would have had it.
+        # The last signal is passed on, unless it was Ctrl-C and ignored before.
         is_ignored = not callable(handler_before) and received[-1:] == [signal.SIGINT]
         if received and not is_ignored:
             interrupt = handler_before if callable(handler_before) else signal.default_int_handler

@@ -77,18 +77,19 @@ class StiffnessBounds:
     def shear(self, average: str = AXES) -> Enclosure:
         """Return bounds in Pa of the shear modulus of an isotropic average of the stiffness.
 
-        In space it is Hill's average, whatever `average`. The lower bound is 0 where pores
-        percolate, and the upper one is infinite beside rigid phases.
+        The lower bound is 0 where pores percolate, and the upper one is infinite beside rigid
+        phases.
 
         Args:
             average: In the plane, "axes" for C33, the modulus along the axes, or "isotropic" for
-                Hill's mean over all directions of the plane.
+                Hill's mean over all directions of the plane. It is not used in space, where the
+                average is Hill's.
 
         Raises:
             FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         if self.dimension == 3:
-            return self._hill(1)
+            return self._hill(1)  # the bounds of Hill's G
         # Both averages rise in C11 − C12 and C33, each of which is the value of C at a strain.
         with np.errstate(divide="ignore"):  # a mean with a modulus of 0
             low = float(shear_modulus(square_moduli(self.lower), average))
@@ -106,8 +107,8 @@ class StiffnessBounds:
 
         Args:
             average: In the plane, "axes" for the average with G = C33, or "isotropic" for Hill's
-                mean over all directions of the plane. In space it is Hill's average, whatever this
-                says.
+                mean over all directions of the plane. It is not used in space, where the average is
+                Hill's.
 
         Returns:
             Lower and upper bound. Without a lower bound of the stiffness (percolating pores) the
@@ -130,6 +131,7 @@ class StiffnessBounds:
             top = float(np.clip(1.5 * max_bulk, min_shear, max_shear))
             softest = stiffest = [min_shear, top, max_shear]
             low = -np.inf
+        # `_young` gives E, moved down (side −1) or up (side 1) by its rounding.
         if self.has_lower:
             low = min(self._young(shear, min_bulk, side=-1) for shear in softest)
         if self.has_upper:
@@ -148,8 +150,8 @@ class StiffnessBounds:
 
         Args:
             average: In the plane, "axes" for the average with G = C33, or "isotropic" for Hill's
-                mean over all directions of the plane. In space it is Hill's average, whatever this
-                says.
+                mean over all directions of the plane. It is not used in space, where the average is
+                Hill's.
 
         Returns:
             Lower and upper bound. Where a bound of the stiffness is missing, they are the limits of
@@ -160,10 +162,10 @@ class StiffnessBounds:
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
+        # `_ratio` gives x, which rises with G and falls with K.
         max_ratio = self._ratio(max_shear, min_bulk)
         min_ratio = self._ratio(min_shear, max_bulk)
-        # ν falls with x, which rises with G and falls with K. Each ratio is off by 3 units, and the
-        # two operations here add one each.
+        # ν falls with x. Each ratio is off by 3 units, and the two operations here add one each.
         low = (1 - max_ratio) / 2 - 4 * UNIT * (1 + max_ratio)
         return Enclosure(low, (1 - min_ratio) / 2 + 4 * UNIT * (1 + min_ratio))
 
@@ -330,7 +332,7 @@ def inverse_below(matrix: Array) -> Array:
     argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
     `matrix` is singular to rounding.
     """
-    inverse, error = _inverse(matrix)
+    inverse, error = _inverse_with_error(matrix)
     return np.asarray(inverse - error)
 
 
@@ -341,11 +343,11 @@ def inverse_above(matrix: Array) -> Array:
     argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
     `matrix` is singular to rounding.
     """
-    inverse, error = _inverse(matrix)
+    inverse, error = _inverse_with_error(matrix)
     return np.asarray(inverse + error)
 
 
-def _inverse(matrix: Array) -> tuple[Array, Array]:
+def _inverse_with_error(matrix: Array) -> tuple[Array, Array]:
     """Return the computed inverse of a symmetric positive definite matrix and a bound of its error.
 
     Args:

@@ -42,9 +42,9 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
             a picture is read, with three a volume.
 
     Raises:
-        RefusedError: The file is missing, damaged, none of these, of another dimension, complex,
-            with less than 2 numbers along an axis or some that are not finite, too large for
-            memory, or says that its pixels or voxels have sides of other ratios.
+        RefusedError: The file cannot be read; its array is of another dimension, complex, shorter
+            than 2 along an axis, not finite everywhere, or too large for memory; or the file states
+            pixels or voxels whose sides have other ratios.
         MemoryError: The file did not fit into memory while it was read.
     """
     dimension = len(sides)

@@ -31,15 +31,15 @@ ROUNDING = 64 * UNIT  # quotients and differences take fewer than 64 rounded ope
 
 
 def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, Enclosure]:
-    """Return bounds in Pa of those effective moduli that are the least energy of some load.
+    """Return bounds in Pa of the effective Young's moduli along the axes, and of G and K.
 
-    Such a modulus is concave in the moduli of the phases, from which bounds of its derivatives
-    follow.
+    Each is the least energy under some load, or a mean of such energies, and so is concave in the
+    moduli of the phases. Bounds of its derivatives follow from that.
 
     Args:
         bounds: Bounds of the effective stiffness.
-        average: In the plane, "axes" or "isotropic": the average over directions that G is of. In
-            space G and K are of Hill's average.
+        average: Average over directions of the plane for G, "axes" or "isotropic". In space G and K
+            are those of Hill's average.
 
     Returns:
         Lower and upper bound by name: "E_x", "E_y" and, in space, "E_z"; then "G" and "K". Missing

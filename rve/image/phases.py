@@ -143,9 +143,9 @@ class ModuliImages:
         """Return the moduli that fields of one side of the bounds are computed with.
 
         Stiffer phases make a stiffer cell. So the lower bound holds with a rigid phase that is too
-        soft, and the upper one with a pore that is a little too stiff. Rigid phases take 1e4 times
-        the largest finite modulus: a larger factor takes a multiple of the iterations. Pores take
-        1e-6 of the smallest one: with a smaller factor iterations grow by its logarithm.
+        soft, and the upper one with a pore that is a little too stiff. For stresses rigid phases
+        take 1e4 times the largest finite modulus; more would multiply the iterations. For
+        displacements pores take 1e-6 of the smallest one; less would add some iterations.
 
         Args:
             stress: True for stresses, which take the lower moduli and prove the lower bound; pores

@@ -241,8 +241,8 @@ def _skipped(name: str, entries: _Entries, *, is_packed: bool) -> int:
         is_packed: Whether the numbers are compressed.
 
     Returns:
-        0 where the head says nothing; −1 if the numbers are the last bytes of the file, which a
-        head may say only of numbers that are not compressed.
+        Number of bytes, 0 if the head states none; −1 if the numbers are the last bytes of the
+        file, which is allowed only without compression.
 
     Raises:
         RefusedError: The head states lines to skip, or no whole number of bytes.

@@ -651,8 +651,8 @@ def _widths_by_cause(
 ) -> dict[str, float]:
     """Return the width of the bounds of E by its cause, in Pa, the largest first.
 
-    The width at nominal values comes from the discretisation. What a fuzzy threshold or fuzzy
-    phases add alone, at the lowest level, comes from these.
+    The width at nominal values is that of the discretisation. The threshold's width is what the
+    fuzzy thresholds alone add to it at the lowest level, and the phases' likewise.
 
     Args:
         study: The image with its phases and thresholds.
@@ -686,7 +686,7 @@ def _widths_by_cause(
 
 
 def _require_losses(phases: Sequence[ImagePhase], bounds: StiffnessBounds) -> None:
-    """Refuse loss factors of some phases alone, and of a stiffness without both of its bounds.
+    """Refuse loss factors of some phases only, or where a bound of the stiffness is missing.
 
     Args:
         phases: The phases of the image. Without loss factors all are allowed.

@@ -143,8 +143,8 @@ def order_checks(
     return {
         "symmetry": float(abs(energy - energy.T).max()) / scale,
         # The most negative eigenvalue of each difference; 0 where there is none.
-        "reuss": _below(energy - reuss_energy) / scale,
-        "voigt": _below(voigt_energy - energy) / scale,
+        "reuss": _depth_below_zero(energy - reuss_energy) / scale,
+        "voigt": _depth_below_zero(voigt_energy - energy) / scale,
     }
 
 
@@ -167,7 +167,7 @@ def mean(weights: Array, values: Array) -> Array:
     return np.asarray(np.tensordot(weights, values, axes=1))
 
 
-def _below(difference: Array) -> float:
+def _depth_below_zero(difference: Array) -> float:
     """Return by how much the smallest eigenvalue of a matrix's symmetric part lies below 0."""
     # Rounding makes the matrix slightly unsymmetric; symmetry has a check of its own.
     return max(0.0, -float(np.linalg.eigvalsh((difference + difference.T) / 2)[0]))

@@ -192,15 +192,15 @@ def _system(
         by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
     outer = mirror * contrast.outer[:, None, None]
     inner = mirror * contrast.inner[:, None, None]
-    # The b_n are put into the equations of the a_n: q* by their factor times p*, and by the term (n
-    # − 2) a_{n-2}.
+    # The b_n act on q, and consist of inner p* and of the term (n − 2) a_{n-2}; both are put into
+    # the equations of the a_n.
     coupling = (to_next + a_to_q + by_shift)[:, None] + inner * (b_to_q @ to_p)[:, None]
     shape = len(radius), contrast.outer.size, orders.a.size
     source = np.zeros(shape, np.result_type(outer))
     if is_deviatoric:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
     else:
-        # b_1 has the factor `swelling` in place of `inner`, and is what the load itself excites.
+        # b_1 has the factor `swelling` in place of `inner`; it alone is excited by the load itself.
         b1_to_q = b_to_q[:, None, :, 0]
         to_p1 = to_p[:, None, :1, :]
         excess = (contrast.swelling - contrast.inner)[:, None, None]

@@ -300,7 +300,7 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
 def _spline_products(
     tables: Array, derivatives: Derivatives, names: Sequence[tuple[int, int]]
 ) -> SplineProducts:
-    """Return the terms of strains or stresses, in the order that compiled kernels work in.
+    """Return the terms of strains or stresses as arrays, grouped as compiled kernels need them.
 
     Args:
         tables: Matrices from functions of one coordinate to Legendre modes of their derivatives of
@@ -321,13 +321,13 @@ def _spline_products(
         for component, terms in enumerate(derivatives)
         for term in terms
     ]
-    # By the function and the order along x: kernels take the derivatives along x of an unknown once
-    # for all terms of a group.
+    # Sorted by the function and the order along x, which make a group: kernels take the derivative
+    # along x once for all terms of a group.
     rows.sort(key=lambda row: (row[1], row[-2]))
     table: Ints = np.array(rows)
     terms = table[:, :-1].copy()
-    is_first = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
-    ends = np.concatenate([[0], 1 + np.flatnonzero(is_first), [len(rows)]])
+    starts_group = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
+    ends = np.concatenate([[0], 1 + np.flatnonzero(starts_group), [len(rows)]])
     groups = np.stack([ends[:-1], ends[1:]], axis=1)
     return SplineProducts(tables, terms, groups, table[:, -1].astype(float))
 

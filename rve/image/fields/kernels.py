@@ -235,11 +235,11 @@ def _fill_strips(
     tables: Array, terms: Ints, groups: Ints, factors: Array, field: Array, z: int, y: int,
     shifted: Array, lines: Array, strips: Array,
 ) -> None:  # fmt: skip
-    """Pass a row of unknowns along x on to modes along x and z, and keep them as a strip.
+    """Compute the modes along x and z of a row of unknowns, and write them into its strip.
 
-    The modes along x of row y are found in the n layers of unknowns from layer z on, around the
-    periodic grid; their combinations along z are the modes of the voxels in layer z. A row has nx
-    voxels.
+    First the modes along x of row y are computed in the n layers of unknowns from layer z on,
+    around the periodic grid. Their combinations along z are the modes of the voxels in layer z. A
+    row has nx voxels.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
@@ -290,7 +290,7 @@ def _fill_strips(
 
 @fast
 def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Array) -> None:
-    """Combine n strips of rows of unknowns to the modes of the Voigt components in a row of voxels.
+    """Write the modes of the Voigt components in a row of voxels, from n strips of modes.
 
     A row has nx voxels; mode k along x of voxel x stands at k · nx + x.
 
@@ -325,10 +325,10 @@ def _add_forces(
     tables: Array, terms: Ints, groups: Ints, factors: Array, sums: Array, z: int, y: int,
     lines: Array, shifted: Array, result: Array,
 ) -> None:  # fmt: skip
-    """Pass the sums of a row of unknowns back along z and x, and add them to the nodal forces.
+    """Turn the sums of a row into forces on its unknowns, and add them to the nodal forces.
 
-    This is the transpose of the pass from unknowns to strips, `_fill_strips`. A row has nx voxels;
-    mode k along x of voxel x stands at k · nx + x.
+    This is the transpose of `_fill_strips`, which turns unknowns into modes along x and z. A row
+    has nx voxels; mode k along x of voxel x stands at k · nx + x.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
@@ -339,8 +339,8 @@ def _add_forces(
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
-        sums: What the modes of voxels exert on each term of a row, shape (terms, n rows, n modes
-            along z, n · nx). Row y stands at y modulo n; its entries are set to zero.
+        sums: Forces on the modes along x and z of each term, shape (terms, n rows, n modes along z,
+            n · nx). Row y stands at y modulo n; its entries are set to zero after use.
         z: Index of the layer of voxels, whose unknowns lie in the n layers from z on.
         y: Index of the row of unknowns, taken modulo the size of the grid.
         lines: Work array for modes along x of each layer, shape (n layers, n · nx).

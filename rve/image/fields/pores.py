@@ -340,7 +340,7 @@ class PorePotentials:
 
         Returns the changed array, which has the shape (fields, unknowns, *grid).
         """
-        return self._put(fields, self.gauge @ self._parameters(self._at_nodes(fields)))
+        return self._set_at_nodes(fields, self.gauge @ self._parameters(self._at_nodes(fields)))
 
     def particular_fields(self, loads: Array, like: Fields) -> Fields:
         """Return potentials whose total stress under given mean stresses vanishes in pores.
@@ -352,7 +352,7 @@ class PorePotentials:
             like: Array of shape (loads, unknowns of a cell, *grid), whose shape and library the
                 result has; it is not changed.
         """
-        return self._put(namespace(like).zeros_like(like), self.particular @ loads.T)
+        return self._set_at_nodes(namespace(like).zeros_like(like), self.particular @ loads.T)
 
     def impose(self, fields: Fields) -> Fields:
         """Put fields for unit loads into the space of potentials without stress in pores, in place.
@@ -371,21 +371,21 @@ class PorePotentials:
         particular = self.particular.toarray()
         # `_parameters` gives those of the nearest combination of polynomials without stress.
         parameters = self._parameters(self._at_nodes(fields) - particular)
-        self._put(fields, particular + self.gauge @ parameters)
+        self._set_at_nodes(fields, particular + self.gauge @ parameters)
         # A value is a sum of n products with parameters, which are taken as exact, and entries,
         # which are rounded by 6 units at most. The error is at most n + 8 units of the sum of the
         # magnitudes (Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
         unit = 2.0**-53
         terms = self.inverse.shape[1] + particular.shape[1] + 8
         size = abs(particular) + abs(self.gauge) @ abs(parameters)
-        return self._put(namespace(fields).zeros_like(fields), terms * unit * size)
+        return self._set_at_nodes(namespace(fields).zeros_like(fields), terms * unit * size)
 
     def _at_nodes(self, fields: Fields) -> Array:
         """Return the unknowns at K nodes of pores in NumPy, shape (unknowns × K, fields)."""
         found = on_host(fields[self.index])
         return np.asarray(found.reshape(len(found), -1).T)
 
-    def _put(self, fields: Fields, at_nodes: Array) -> Fields:
+    def _set_at_nodes(self, fields: Fields, at_nodes: Array) -> Fields:
         """Set the unknowns at the pores' nodes in place, and return the changed array.
 
         Args:

@@ -44,10 +44,10 @@ class Reference:
     def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
         """Return the constant material of a preconditioner, between the extremes of a grid.
 
-        With the largest c of ∫ deviator² ≥ c ∫ trace² for a fluctuation, the two combinations that
-        bound the spectrum are the coefficient s of the squared deviator and b + c s with the
-        coefficient b of the squared trace. The geometric means of their extremes in the grid make
-        the spectrum narrow.
+        Let b and s be the coefficients of the squared trace and deviator, and c the largest number
+        with ∫ deviator² ≥ c ∫ trace² for all fluctuations. The ratios of s and of b + c s in the
+        grid to those in the material bound the spectrum. The material has the geometric means of
+        their extremes in the grid, which make the spectrum narrow.
 
         Args:
             element: Element of displacements or of stresses, which knows c.
