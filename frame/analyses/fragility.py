@@ -269,9 +269,9 @@ class CriticalMeasures:
 def counts_between(records: Sequence[Increments], name: str, measure: Array) -> Ends:
     """Return the number of records under which all, and under which some structures exceed.
 
-    Structures were moved at some measures of each record. Between two of them, all structures are
-    counted as exceeding the limit if they do so at both, and some structure if one does so at
-    either. Outside them the nearest measure counts.
+    Structures were moved at some measures of each record. At a measure between two of these, all
+    structures count as exceeding the limit if they do so at both neighbours, and some structure
+    counts if one does so at either. Outside their range the nearest measure counts.
 
     Args:
         records: Demands (peak over limit) at the rising measures of each record, at least one

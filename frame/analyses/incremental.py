@@ -172,8 +172,8 @@ class IncrementalAnalysis:
         """Return the largest and smallest demand of structures spread over the cuts.
 
         A demand is the peak of an output over its limit. The structures are the nominal one and
-        some inside, on faces and at corners of each cut; no others are searched for, so that the
-        demands of all structures may range farther.
+        some inside, on faces and at corners of each cut. Other structures of a cut may have larger
+        or smaller demands.
 
         Args:
             scales: Scales of the record, shape (scales,).
@@ -324,7 +324,8 @@ class IncrementalAnalysis:
         is_inside = (points >= lower) & (points <= upper)
         inside = np.all(is_inside, axis=-1, keepdims=True)  # (levels, structures, 1)
         largest = np.where(inside, demands, -1.0).argmax(axis=1)
-        # Collapses must come before structures outside the cut, which count as infinite.
+        # Structures outside the cut count as +∞. A collapse inside counts as the largest finite
+        # number, so that it is taken before them.
         finite = np.minimum(demands, np.finfo(float).max)
         smallest = np.where(inside, finite, np.inf).argmin(axis=1)
         rows = np.stack([largest, smallest])

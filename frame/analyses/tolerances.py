@@ -119,8 +119,8 @@ class Tolerances(Answer):
     def _exceeded_text(self) -> str:
         """Return in words at which scale a response is known to exceed a limit.
 
-        If there is a larger scale at which none of the responses that were computed does, it is
-        said, too. For inputs whose box encloses a set, no response is known.
+        The largest scale at which no computed response exceeds a limit is said, too, if there is
+        one. For inputs whose box encloses a set, no response is known.
         """
         if self.encloses:
             return "not known"

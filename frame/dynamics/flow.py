@@ -207,8 +207,8 @@ class Flow(ABC):
     def _failing_point(self, points: Array) -> str:
         """Return, in words, the first parameter set that fails alone, or the last one if none does.
 
-        A set fails alone if its trajectory raises LinAlgError or StepError. Other errors leave as
-        they are.
+        A set fails alone if its trajectory raises LinAlgError or StepError. Other errors are not
+        caught.
 
         Args:
             points: At least one parameter set, shape (S, d), all of which together have failed.

@@ -68,9 +68,9 @@ class Midpoint:
             count: Number of steps from t = 0 on.
 
         Returns:
-            T, shape (S, 2n, 2n), and G, shape (S, 2n, 2 L), of x[k+1] = T x[k] + G load[k]; and the
-            numbers load[k] of each step, shape (count, 2 L): the line that stands for each load in
-            the step, its values at the beginning, then those at the end.
+            The map x[k+1] = T x[k] + G load[k]: T, shape (S, 2n, 2n); G, shape (S, 2n, 2 L); and
+            load, shape (count, 2 L). In each step a line stands for each load; load[k] has the
+            values of all lines at the beginning of the step, then those at its end.
 
         Raises:
             numpy.linalg.LinAlgError: M/h + D/2 + h K/4 is singular.
@@ -280,9 +280,9 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
 
 
 def linear_loads(loads: Sequence[History], step: float, count: int) -> Array:
-    """Return the line through each load in each step that has its impulse and its first moment.
+    """Return, for each load in each step, the line with the same integral and first moment.
 
-    A load that is linear in a step is its own line there.
+    For a load that is linear in a step, this line is the load itself.
 
     Args:
         loads: The L loads; there may be none.

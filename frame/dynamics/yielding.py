@@ -664,7 +664,7 @@ def _add_works(
 
 @compiled
 def _energy(storeys: Array, q: Array, v: Array, plastic: Array) -> float:
-    """Return the kinetic and the elastic energy of a state, less the work of weights, in J.
+    """Return the sum of kinetic and elastic energy of a state, less the work of weights, in J.
 
     It is ½ Σ [m v² + (a k − s) d² + (1 − a) k (d − p)²] over floors and storeys, with the drift d,
     the plastic drift p, the hardening a and the softening s by weight.
@@ -700,9 +700,9 @@ def _add_peaks(
 ) -> None:  # fmt: skip
     """Raise the peaks of outputs, in place, by those from τ = 0 to τ = `end` of a substep.
 
-    An output scale · x + shift, x a displacement or drift, is looked at where the velocity of x
-    changes its sign and at the end. The beginning was the end of the substep before. Outputs of the
-    codes from 4 on are passed over.
+    An output is scale · x + shift, with a displacement or drift x. Its magnitude is taken
+    where the velocity of x changes its sign, and at the end. Outputs with codes from 4 on are
+    passed over.
 
     Args:
         kinds: Code and storey (from 0) of each of m outputs, shape (m, 2). Codes are 0
@@ -783,6 +783,8 @@ def _observe(
         mass, k, softening, hardening, yield_drift = storeys[:5, z]
         drift = _drift(q, z)
         offset_force = (1 - hardening) * k * plastic[z]
+        # `_net_force` is the force of a storey's columns less the softening by weight times drift.
+        # The columns below pull the floor z back, those above pull it on.
         force = -_net_force(storeys, q, plastic, z)
         moment = 0.0
         if z + 1 < len(q):

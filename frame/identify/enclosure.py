@@ -420,10 +420,11 @@ class ChainRelaxation(LinearRelaxation):
 
             λ_k - ε² / (q - λ_(k-1)) ≤ q ≤ λ_k + ε² / (λ_(k+1) - q),
 
-        where ε² is (K x - q M x)ᵀ M⁻¹ (K x - q M x) / xᵀM x. Any number in the place of q makes it
-        larger. The inequalities added are q ≥ low - e₁ and q ≤ high + e₂ for the measured range
-        [low, high] of λ_k, with bounds e₁ and e₂ of both fractions over the box. Nothing is added
-        if the neighbouring eigenvalues are not known to lie apart from q and λ_k over all the box.
+        where ε² is (K x - q M x)ᵀ M⁻¹ (K x - q M x) / xᵀM x. With any other number in place of q
+        this expression is larger, and still gives a bound. For the measured range [low, high] of
+        λ_k the inequalities are q ≥ low - e₁ and q ≤ high + e₂, where e₁ and e₂ bound the fractions
+        over the box. Nothing is added if the neighbouring eigenvalues are not known to lie apart
+        from q and λ_k over all the box.
 
         Args:
             cut: Number of the mode, from 1, and range of its eigenvalue, in 1/s².

@@ -184,8 +184,8 @@ def _record(
 ) -> Record:
     """Return a row of numbers about a parameter or a mode that was held out.
 
-    The last two columns, "narrowed by" of a parameter and "inside" of a mode, are left None and
-    empty.
+    The last two columns are left None and empty. The caller fills in "narrowed by" of a parameter
+    and "inside" of a mode.
 
     Args:
         name: Name of the parameter, or "mode 2" and so on.

@@ -45,9 +45,10 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     means that the amplitude was not measured.
 
     Returns:
-        For each mode its number, frequencies in Hz, and amplitudes by floor, an array of the rows
-        each, empty if fewer than two floors were measured; and the standard deviations that the
-        file states, relative to the mean frequency and to the largest amplitude, or None.
+        For each mode its number; its frequencies in Hz, one for each row; its amplitudes by floor,
+        an array with one for each row, no floors if fewer than two were measured; and the standard
+        deviations that the file states, or None. The deviation of the frequency is relative to
+        its mean, that of the amplitudes to the largest mean amplitude.
 
     Raises:
         RefusedError: The file is missing, its header or a row is wrong, a mode has an amplitude

@@ -105,12 +105,11 @@ def _cosmos_channels(file: TextFile) -> Iterator[_Channel]:
     a line that announces accelerations yields nothing.
 
     Yields:
-        For each series: `names` in small letters without repetition, of number ("1") and
-        orientation ("90 deg") in the last line "Sta Chan 1: 90 deg" above it, and of the code
-        ("hne") in the first line "End-of-data for Chan HNE acceleration" below it; those that the
-        file does not state are missing. `line`, the line that announces the samples, and `reals`,
-        the last line above it that announces a real header, both counted from 0; `reals` is -1 if
-        there is none.
+        For each series the channel. Its `names` are, in small letters, the number ("1") and the
+        orientation ("90 deg") in the last line "Sta Chan 1: 90 deg" above it, and the code ("hne")
+        in the first line "End-of-data for Chan HNE acceleration" below it, as far as the file
+        states them. Its `line` is the index, from 0, of the line that announces the samples. Its
+        `reals` is that of the last line above which announces a real header, or -1.
     """
     reals = -1
     names: list[str] = []
@@ -250,10 +249,10 @@ def _csmip_channels(file: TextFile) -> Iterator[_Channel]:
     before the next one. The first line of the file must be a title.
 
     Yields:
-        For each channel: `names`, its number and its orientation in small letters, as ("1", "90
-        deg"), from the first line with "Chan 1: 90 deg" among the first 13 lines; empty without
-        such a line. `line` and `end`, the indices of its first line and of the line behind its
-        last.
+        For each channel its `names`, number and orientation in small letters, as ("1", "90 deg").
+        They are read from the first line with "Chan 1: 90 deg" among its first 13 lines, and are
+        empty without one. Its `line` and `end` are the indices, from 0, of its first line and of
+        the line behind its last one.
 
     Raises:
         KeyError: There are titles, and the first line is none.

@@ -104,9 +104,10 @@ def read_geonet(file: TextFile, channel: str = "") -> Recording:
         The recording, with samples in m/s². Its peak is compared with the one in the head.
 
     Raises:
-        RefusedError: The file is not corrected; there is no such component; a head does not tell
-            counts and step, or states others elsewhere; samples are missing or are no numbers; the
-            step is not from 4e-5 s to below 0.5 s; or the samples have another peak than the head.
+        RefusedError: The file is not corrected; there is no such component; the lines of a head do
+            not tell count and step, or contradict each other; samples are missing or are no
+            numbers; the step is not from 4e-5 s to below 0.5 s; or the samples have another peak
+            than the head.
     """
     match = MARK.match(file.lines[0])  # its group is UN in "UNCORRECTED ACCELEROGRAM"
     if match is not None and match[1]:

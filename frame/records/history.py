@@ -127,8 +127,8 @@ class History:
         """Return an upper bound of |f| in the step before each of rising times.
 
         The history is f(t) = g(t) sin(Ω (t - start) + phase), where g is linear between its samples
-        and zero outside them, or f = g where Ω = 0. Of a jump at the beginning of a step the value
-        after it counts, of one at the end the value before it, and of one inside both.
+        and zero outside them, or f = g where Ω = 0. If f jumps at the beginning of a step, the
+        value after the jump counts; at the end of a step the value before it; inside both count.
 
         Args:
             time: Times in s in strictly rising order, shape (T,), with T ≥ 1.

@@ -76,9 +76,9 @@ def peaks_in_text(lines: Iterable[str], unit: str) -> Iterator[StatedPeak]:
 def remarks_on_peak(
     location: str, samples: Array, stated: Iterable[StatedPeak], unit: str, *, step: float
 ) -> tuple[str, ...]:
-    """Return a clause if the peak of the samples, or its time, is none that the head states.
+    """Return a clause if the samples have another peak, or at another time, than the head states.
 
-    Else, and if there are no samples or no stated peaks, the result is empty.
+    The result is empty if they agree, or if there are no samples or no stated peaks.
 
     A peak may be that of the samples or of the samples without their mean: networks state the peak
     of a record before or after they remove the offset of its sensor. Differences up to 5 %, beside

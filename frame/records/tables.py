@@ -175,8 +175,8 @@ class _Table:
     def has_times(self) -> bool:
         """Whether the first column has times.
 
-        It does if the last line above the numbers begins with "time" or "t", or if its cells are
-        numbers that never fall, so also if there are no rows.
+        It does if the last line above the numbers begins with "time" or "t", or if the numbers in
+        the column never fall from row to row.
         """
         if _Column.of(self.head).is_time:
             return True
@@ -215,8 +215,8 @@ class _Table:
 
         Raises:
             RefusedError: A cell is no finite number; a row has another count of cells than the
-                first; or the numbers change less from row to row within a column than along the
-                rows, on average. Then the columns are several components, and not one series.
+                first; or the columns seem to be several components, since numbers change less from
+                row to row within a column than along the rows, on average.
         """
         *full, last = self.rows
         numbers = self.numbers(rows=full)
@@ -239,13 +239,13 @@ class _Table:
     def resolution(self) -> float:
         """Return the unit of the last digit of the times, such as 0.001 for 1.023.
 
-        It is in the unit of the times. The times are the first column; all its cells must be
-        numbers, and there must be one at least. Programs write them with a fixed number of
-        decimals, or with a fixed number of digits. The coarser of both is returned: the last
-        decimal of the cell with most decimals, or, for the largest time, the last of as many digits
-        as the cell with most digits has. Zeros at the end may be missing, so that the cells with
-        most of them tell.
+        The times are the first column, one at least, all of them numbers. The result is in their
+        unit.
         """
+        # Programs write times with a fixed number of decimals, or with a fixed number of digits.
+        # As zeros at the end may be missing, the cell with most of them tells this number. Of both
+        # units the coarser one is taken, and with a fixed number of digits that of the largest
+        # time.
         times = [Decimal(cells[0]) for cells in self.rows.values()]
         finest = min(int(time.as_tuple().exponent) for time in times)
         digits = max(len(time.as_tuple().digits) for time in times)
@@ -289,9 +289,8 @@ def _wrong_row(table: _Table, line: int) -> RefusedError:
 
     Returns:
         The error. If the time alone is no number, and the times around it tell it, its hint is that
-        time. Otherwise it is chosen by what stands in the row: clock times, dates, separators of
-        thousands, missing values, empty cells, units, words, decimal commas or a number that is cut
-        off; without any of these it has no hint.
+        time. Otherwise the hint is chosen by the text of the row, such as a clock time, an empty
+        cell or a unit; there may be none.
     """
     *_, last_row = table.rows
     text_cure = "text stands among the numbers: write the number that belongs there"
@@ -327,8 +326,8 @@ def _wrong_row(table: _Table, line: int) -> RefusedError:
 def _likely_time(table: _Table, line: int) -> float:
     """Return the time that fits into a row whose time alone is no number, or 0 if none is likely.
 
-    Two rows before it and the one behind must be numbers whose first ones are evenly spaced, if
-    this row is left in between.
+    A time is likely if the two rows before this one and the one behind it are numbers, and the
+    times on both sides of this row are two steps apart.
 
     Args:
         table: The table. Its times are in the unit of their column.

@@ -103,9 +103,8 @@ class TextFile:
                 over.
             width: Characters of a number in files of fixed columns, where empty columns are passed
                 over; 0 where blanks separate the numbers.
-            count: If it is above 0: number of values from which on a line with a word that is no
-                number ends the reading, as text behind the samples does. If it is 0, no such line
-                is allowed.
+            count: Number of values that are expected. Once so many have been read, the next line
+                with a word that is no number ends the reading. If it is 0, no such line is allowed.
 
         Raises:
             RefusedError: A word is no finite number.

@@ -189,9 +189,9 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
         number: 55 (modes and other data at nodes) or 58 (functions, such as time histories).
 
     Yields:
-        The data set: `head`, the 8 (55) or 11 (58) lines of its head; `lines`, the lines of its
-        values, and `content`, None; or, of a binary one, no lines, the bytes of its values, and
-        `byte_order`, ">" for the code 2, else "<". If the file is cut off, values are missing.
+        The data set: `head`, the 8 (55) or 11 (58) lines of its head, and `lines`, the lines of its
+        values. A binary one has no lines; the bytes of its values are `content`, which is None
+        otherwise, and their `byte_order` is ">" or "<". If the file is cut off, values are missing.
 
     Raises:
         ValueError: A data set of the number ends inside its head, or the line of a binary one does
@@ -292,7 +292,7 @@ def _parse_history(data_set: DataSet) -> _History:
 
 
 def _even_step(key: str, times: Array) -> float:
-    """Return the step in s of times that are even but for the six digits that the format has.
+    """Return the step in s of even times, which the format has rounded to six digits.
 
     Args:
         key: What the times are of, for messages.

@@ -193,9 +193,9 @@ def _expressions(
         List of `count` expressions; numbers have become expressions.
 
     Raises:
-        RefusedError: It gives another number of them, or something that is no expression; or it
-            raises KeyError, IndexError, TypeError or AttributeError, as for a name or an operation
-            that is not there. Other errors of the function leave as they are.
+        RefusedError: The function gives another number of expressions, or something that is none;
+            or it raises KeyError, IndexError, TypeError or AttributeError, as for an unknown name.
+            Its other errors are not caught.
     """
     import sympy
 

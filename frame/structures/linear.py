@@ -79,10 +79,10 @@ class Assembly(Generic[Number]):
     def forces(self) -> Number | None:
         """Force on the unknowns under a unit of each load history, shape (…, n, histories), in N.
 
-        The histories are those of the loads, each once, in the order of their first use; loads with
-        equal histories are added at their amplitudes. None if no load has a history, so also if all
-        are impulses. The … stands for the parameter sets of a jet (values with derivatives), and
-        for nothing for a Taylor model (polynomials with error bounds over a box).
+        A column is the sum of all loads with one history, at their amplitudes; columns stand in the
+        order of the first use of their histories. None if no load has a history, as with impulses
+        alone. Over parameter sets the result is a jet (values with derivatives), and … counts the
+        sets; over a box it is a Taylor model (polynomials with error bounds), without the axis ….
         """
         histories = distinct_histories(self.loads)
         belongs = np.zeros((len(self.loads), len(histories)))
@@ -114,10 +114,10 @@ class Assembly(Generic[Number]):
             weights: One row for each load, in their order, and k columns, shape (loads, k).
 
         Returns:
-            Array with derivatives (a jet) or with bounds over a box (a Taylor model). Column j is
-            the sum of the loads, each at its amplitude, times weights[:, j]; … stands for the
-            parameter sets of a jet, and for nothing for a Taylor model. None if there are no loads,
-            or all weights are 0.
+            Column j is the sum of the loads, each at its amplitude, times weights[:, j]. Over
+            parameter sets the result is a jet (values with derivatives), and … counts the sets;
+            over a box it is a Taylor model, without the axis …. None if there are no loads, or all
+            weights are 0.
         """
         if self.columns is None or not weights.any():
             return None
@@ -200,8 +200,8 @@ def histories(system: LinearSystem) -> dict[str, History]:
     """Return the histories of all loads by name.
 
     The base acceleration comes first and is named "load". The histories of the forces follow as
-    "force1", "force2" …, each distinct one once, in the order of their first use. Impulses have no
-    history. A structure without loads gives an empty dictionary.
+    "force1", "force2" … in the order of their first use; equal histories appear once. Impulses have
+    no history. A structure without loads gives an empty dictionary.
     """
     named: dict[str, History] = {}
     if system.ground is not None:
@@ -481,7 +481,9 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
-    """Raise an error if modes of unequal damping ratio change places between parameter sets.
+    """Raise an error if modes with unequal damping ratios change their order by frequency.
+
+    The order at the nominal parameters is compared with the order at other parameter sets.
 
     Args:
         mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
