@@ -373,8 +373,8 @@ def _require_range(system: StructureModel, name: str, low: float, high: float) -
 def _on_levels(bounds: Envelope, alpha: Array, rows: Ints) -> Envelope:
     """Return an envelope on more levels, with the bounds of each level copied from a row.
 
-    It undoes the computation on different cuts alone. What does not depend on the level, such as
-    the addition between time nodes, and facts and notes stay as they are.
+    Cuts that are equal on several levels are computed once; here each level gets its bounds back.
+    What does not depend on the level, such as the addition between time nodes, stays as it is.
 
     Args:
         bounds: The envelope.

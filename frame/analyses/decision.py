@@ -368,7 +368,8 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
     margins = []
     for part in single:
         margin = np.stack(part.margin)
-        # Limits of different units compare as fractions only; of a limit of 0 the sign is left.
+        # Only fractions of limits compare where units differ. A limit of 0 has no fraction, so that
+        # the sign of its margin is taken.
         if part.limit:
             margins.append(margin / abs(part.limit))
         else:

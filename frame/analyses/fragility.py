@@ -176,9 +176,9 @@ class CriticalMeasures:
             by_some, by_all = record.is_exceeded(name)
             count = len(record.measure)
             measure_or_infinite = np.append(record.measure, np.inf)
-            # Index of the first measure at which some structure exceeds the limit, and of the first
-            # one of the last measures at which all structures do; `count` if there is none.
-            # argmax of a mask is the index of its first true entry, and 0 if there is none.
+            # `crossing` is the index of the first measure at which some structure exceeds the
+            # limit, `count` if there is none. `after_last` is the index behind the last measure at
+            # which some structure keeps it. argmax gives the first true entry of a mask.
             crossing = np.where(by_some.any(axis=1), by_some.argmax(axis=1), count)
             after_last = count - (~by_all)[:, ::-1].argmax(axis=1)
             ends = (

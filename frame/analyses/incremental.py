@@ -284,8 +284,8 @@ class IncrementalAnalysis:
     def _move(self, scale: float, points: Array) -> None:
         """Compute the demands of structures at a scale and add them to `self.moved[scale]`.
 
-        This is a pair of arrays, which is made if it is missing: inputs, shape (structures,
-        inputs), and peaks over limits, shape (structures, limits and events).
+        `self.moved[scale]` is a pair of arrays: inputs, shape (structures, inputs), and peaks over
+        limits, shape (structures, limits and events). It is made if it is missing.
 
         Args:
             scale: Scale of the record.

@@ -427,7 +427,8 @@ def _peak_ratios(
     of_points = []
     for k in range(len(points)):
         magnitudes = np.abs(flow.values(_joined(points[k], draws))[:, :, columns]).swapaxes(1, 2)
-        # A magnitude is not negative, whatever the error.
+        # A magnitude is not negative, whatever the error. `within_steps` gives upper bounds over
+        # the whole step before each node.
         low = np.maximum(magnitudes - step_error, 0.0)  # (draws, limits, times)
         high = magnitudes + step_error
         bounds = (low, high, within_steps(high, between))
@@ -541,8 +542,7 @@ def _bounds_over_points(values: Array, level: Ints) -> Ends:
 
     Args:
         values: Values, shape (points, …).
-        level: Index of the level of each point, shape (points,); each level up to the largest index
-            that occurs has a point itself or on a higher level.
+        level: Index of the level of each point, shape (points,).
 
     Returns:
         Both bounds, shape (levels, …), with as many levels as the largest index says.

@@ -383,10 +383,11 @@ def _midpoint_step(
 def _step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
     """Advance the derivatives of a state by one midpoint step, in place.
 
-    A state is n coordinates and then n momenta. The new coordinates depend on the d inputs through
-    the equations π[k](new, old, inputs) = momenta of the state, which are differentiated once and
-    twice (implicit function theorem): J new_i is the derivative of the state's momenta less that of
-    π[k] with the new coordinates held, where J are the derivatives of π[k] by the new coordinates.
+    A state is n coordinates and then n momenta. The new coordinates solve the equations π[k](new,
+    old, inputs) = momenta of the state, which are differentiated by the d inputs once and twice
+    (implicit function theorem). With the matrix J of the derivatives of π[k] by the new
+    coordinates, J new_i is the derivative of the state's momenta by input i, less that of π[k] with
+    the new coordinates held.
 
     Args:
         flat: One array after another: the n momenta before and the n after the step, shape (2n,),

@@ -34,10 +34,8 @@ def read_recording(
     Args:
         path: The file.
         channel: Name of the channel; empty where there is only one.
-        step: Time between samples in s, for files that do not state it. A step in the file goes
-            before it.
-        unit: Unit of the samples, as "g", for files that state none. A unit in the file goes before
-            it.
+        step: Time between samples in s, for files that do not state it; other files ignore it.
+        unit: Unit of the samples, as "g", for files that state none; other files ignore it.
 
     Returns:
         The recording: two or more finite samples in m/s², its step in s, and what the file says of

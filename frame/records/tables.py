@@ -600,9 +600,9 @@ def _require_acceleration(table: _Table, heads: Sequence[str]) -> None:
 def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
     """Return what is to be mended in the head of times and accelerations; empty if it is complete.
 
-    Complete means: times, if the head names them, in a known unit; accelerations in the second
-    place, not a spectrum; a known unit of acceleration, from the head or the user; and no other one
-    in a head whose names are not known.
+    Complete means: times, if the head names them, have a known unit; the column is neither one of
+    times nor a spectrum; and the unit of acceleration, from the head or the user, is known. If the
+    names in the head are unknown, the unit in it must not be another one than that taken.
 
     Args:
         table: The table, with one column at least.

@@ -106,8 +106,7 @@ class MatrixStructure(LinearSystem):
                 vector or an array has a wrong shape, or an array is not symmetric; a factor names
                 no parameter or gives no number; the mass of the unknowns that have mass is not
                 positive definite; an unknown without mass has a damper, a force or no stiffness; a
-                damping ratio is outside [0, 1), or there are neither none, one, nor one for each
-                mode.
+                damping ratio is outside [0, 1), or their number is not 0, 1 or that of the modes.
         """
         for name in ("parameters", "observed", "row_factors"):
             value = getattr(self, name)

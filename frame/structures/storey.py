@@ -145,9 +145,10 @@ class StoreyFrame(LinearSystem):
     def __post_init__(self) -> None:
         """Check all fields, store lists as tuples, and fill empty ones with their defaults.
 
-        Empty dampers, q0 and v0 become zeros for each floor; empty columns two in each storey,
-        unless stiffnesses are given; empty hardening zeros, where columns yield; empty outputs the
-        displacements "q1" … of all floors. Outputs become texts that know their unit.
+        Without dampers, q0 or v0, each floor gets a zero. Without columns, each storey gets two,
+        unless stiffnesses are given. Without hardening, columns that yield get zeros. Without
+        outputs, the displacements "q1" … of all floors are taken. Outputs become texts that know
+        their unit.
 
         Raises:
             RefusedError: A list has a wrong length; a number is outside the range of its parameter;
@@ -671,8 +672,8 @@ def chain_matrix(links: Array) -> Array:
             masses z - 1 and z, and link 0 joins the ground and mass 0.
 
     Returns:
-        Symmetric tridiagonal matrices, shape (…, n, n): the diagonal has the sums of both links of
-        a mass, the others the negative of the link between two masses.
+        Symmetric tridiagonal matrices, shape (…, n, n). The diagonal has the sum of the links at
+        each mass; beside it stands, with a minus sign, the link between two masses.
     """
     place = np.arange(links.shape[-1])
     below = place[:-1]
