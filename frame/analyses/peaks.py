@@ -531,10 +531,9 @@ def loose_peaks(peaks: Peaks, names: Sequence[str], gap: float) -> tuple[str, ..
     Args:
         peaks: Known peaks by name.
         names: Names of the peaks of interest.
-        gap: Largest distance allowed on any level between the guaranteed bound of the farthest
-            peaks and the attained value, as a fraction of the bound. It does not matter for inputs
-            whose box only encloses a set of admissible inputs, since no value counts as attained
-            then.
+        gap: Largest distance allowed on any level between the guaranteed bound of the most extreme
+            peak and the attained value, as a fraction of the bound. Inputs whose box only encloses
+            a set have no attained values, so that a guarantee alone is enough there.
     """
 
     def is_close(peak: Peak) -> bool:

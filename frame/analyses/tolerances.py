@@ -78,9 +78,9 @@ class Tolerances(Answer):
         """Return a table of texts: a row on the scale, then a row on the support of each input.
 
         The columns are the quantity; the scale, or the support, up to which exceeding a limit is
-        excluded, rounded inwards ("none" or "–" if there is none); the guarantee; and beside the
-        scale at which scale a limit is exceeded, beside a support its deviations from the nominal
-        value in per cent.
+        excluded, rounded inwards ("none" or "–" if there is none); and the guarantee. The last
+        column says, for the scale, at which scale a limit is exceeded, and for a support its
+        deviations from the nominal value in per cent.
         """
         scale = "none"
         if self.kept is not None:

@@ -287,7 +287,8 @@ def load_substeps(loads: Sequence[History], time: Array, *, longest: float) -> L
     Returns:
         E substeps up to the last node: `edges`, the times between them, shape (E + 1,), in s;
         `is_node`, which of these are time nodes, shape (E + 1,); and `first` and `last`, the loads
-        at the beginning and at the end of each substep, on its side of a jump, shape (E, loads).
+        at the beginning and at the end of each substep, shape (E, loads). Where a load jumps there,
+        its value inside the substep counts.
     """
     step = time[1]
     sample_times: list[Array] = [np.zeros(0)]  # so that there may be no loads

@@ -156,8 +156,8 @@ def _read_cosmos(file: TextFile, channel: _Channel, unit: str) -> Recording:
     unit = match[3].rstrip(".")
     header = _real_header(file, channel.reals)
     first = channel.line + 1
-    # The first line tells how many samples stand in a line: files exist whose format says another
-    # number of them. A count of 0 is taken as 1 by `fixed_columns`.
+    # The first line of samples tells how many stand in a line, since the stated format is wrong in
+    # some files. A count of 0 is taken as 1 by `fixed_columns`.
     line_of_samples = file.lines[first].rstrip() if first < len(file.lines) else ""
     per_line = len(line_of_samples) // max(width, 1)
     samples = file.fixed_columns(

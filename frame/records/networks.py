@@ -90,9 +90,8 @@ def read_peer(file: TextFile, unit: str) -> Recording:
 
     Args:
         file: The file.
-        unit: Unit of acceleration that the user states. It counts only if the head names none,
-            neither as "UNITS OF G" nor as "ACCELERATION TIME HISTORY IN G"; it may be empty if the
-            head does.
+        unit: Unit of acceleration that the user states, or empty. It counts only if the head names
+            none, as in "UNITS OF G" or "ACCELERATION TIME HISTORY IN G".
 
     Returns:
         The recording, with samples in m/s². Its channel is the last word of the second line behind

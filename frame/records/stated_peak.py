@@ -122,7 +122,7 @@ def remarks_on_peak(
 
 
 def _remarks_on_time(samples: Array, times: Sequence[float], step: float) -> tuple[str, ...]:
-    """Return a clause if the samples are far from their peak at all times of it in the head.
+    """Return a clause if the samples come near their peak at none of the times the head states.
 
     Args:
         samples: Accelerations, shape (n,), with n ≥ 1.

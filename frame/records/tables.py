@@ -639,9 +639,9 @@ def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[floa
 
     Args:
         table: The table of two rows or more, whose first column has the times.
-        stated_step: Step that the user states, in s; None if it states none. It is returned where
-            the times do not tell their step: if they count the samples, are all equal, or are
-            rounded too coarsely. Else it is ignored.
+        stated_step: Step that the user states, in s, or None. It is returned where the times do not
+            tell their step: if they count the samples, are all equal, or are rounded too coarsely.
+            Else it is ignored.
 
     Raises:
         RefusedError: The times are uneven, or their step is not from 4e-5 s to below 0.5 s.

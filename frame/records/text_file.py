@@ -248,7 +248,7 @@ def recording_in_si(
 
     Raises:
         RefusedError: The unit is missing or not one of accelerations, the step is not from 4e-5 s
-            to below 0.5 s, or the peak in the head is another one.
+            to below 0.5 s, or all stated peaks differ by more than a factor of 2.
     """
     to_si = acceleration_factor(unit)
     if to_si is None:
