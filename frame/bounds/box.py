@@ -263,11 +263,11 @@ class Box:
 def over_box(
     system: LinearSystem, names: Sequence[str], low: Array, high: Array
 ) -> ClassicalStructure:
-    """Return a structure as Taylor models in those inputs whose lower end is below the upper one.
+    """Return a structure as Taylor models of its inputs of nonzero width.
 
     A Taylor model is a polynomial over the unit box [−1, 1]^d with a bound of what it leaves out.
-    Here d is the number of inputs of nonzero width; their order is that of `names`. Inputs without
-    a width, and all other parameters of the structure, enter as constants.
+    Here d is the number of these inputs, in the order of `names`. Inputs without a width, and all
+    other parameters of the structure, enter as constants.
 
     Args:
         system: The structure.

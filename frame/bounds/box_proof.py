@@ -165,7 +165,7 @@ class Hull:
         return np.asarray(np.maximum(largest, 0.0))
 
     def close(self, level: int, peaks: Mask, upper: Array) -> None:
-        """Raise bounds of some peaks, in place, to those over one more sub-box, at all nodes.
+        """Take over the bounds of some peaks in one more sub-box, in place, where they are higher.
 
         A peak is the largest value over time of one side, −q or q, of one output q. The bounds over
         the whole box, `self.upper`, are the largest over all sub-boxes that have been closed so

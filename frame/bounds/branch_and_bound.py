@@ -56,10 +56,10 @@ def bound_problems(
 ) -> tuple[Array, int]:
     """Return upper bounds of side × output for all N problems, by spatial branch and bound.
 
-    A problem is one side (−1 or 1) of one of m outputs at one of T time nodes; problem number (node
-    · m + output) · 2 + (0 for the side −1, 1 for 1). Points are in unit coordinates, in which each
-    of the d inputs runs over [−1, 1]. Outputs are those of the modal model: a bound of its error is
-    not added here.
+    A problem is one side (−1 or 1) of one of m outputs at one of T time nodes. Its number is (node
+    · m + output) · 2 for the side −1, and one more for the side 1. Points are in unit coordinates,
+    in which each of the d inputs runs over [−1, 1]. Outputs are those of the modal model: a bound
+    of its error is not added here.
 
     Args:
         model: The modal model, polynomials of eigenvalues and coefficients of the modes.
@@ -407,8 +407,8 @@ def refine(
     """Improve the best points of some problems by Newton's method within a box, in place.
 
     A problem ends when its quadratic model predicts a gain of at most `min_gain`, or after a fixed
-    number of steps. Values never decrease, unless they are not given. Problems are taken in chunks
-    that limit the memory.
+    number of steps. Values never decrease if `has_values`. Problems are taken in chunks that limit
+    the memory.
 
     Args:
         model: The modal model, whose outputs are maximised with the sign of the problem's side.

@@ -342,11 +342,11 @@ def maximand(
 
 @loops
 def remainder_bound(mu: Array, data: DualFunctionData) -> float:
-    """Bound Σ_z μ_z (cubic terms of z) over the box, less what D(μ) has already expected of it.
+    """Bound Σ_z μ_z (cubic terms of z) over the box, less the allowance for it in D(μ).
 
-    Each variable z of the modes is a polynomial of the inputs in [−1, 1]. D(μ) contains Σ |μ_z|
-    `expected_cubic[z]` in place of the cubic terms, which may be too little: the result, also if
-    negative, corrects it.
+    Each variable z of the modes is a polynomial of the inputs in [−1, 1]. D(μ) contains the
+    allowance Σ |μ_z| `expected_cubic[z]` for the cubic terms, which may be too small or too large.
+    The result is to be added to D(μ), also if it is negative.
 
     Args:
         mu: Multipliers, shape (Z,).

@@ -64,7 +64,7 @@ def separable_bound(g: Array, H: Array, r: Array) -> float:
     """Return an upper bound of g·x + x·H·x/2 for |x_i| ≤ r_i, as a sum of bounds along each axis.
 
     Mixed terms are moved to the diagonal: 2 x_i x_j ≤ x_i² r_j/r_i + x_j² r_i/r_j. Axes with r_i =
-    0 do not count; without any other the bound is 0.
+    0 are left out.
 
     Args:
         g: Shape (d,).
@@ -89,10 +89,9 @@ def separable_bound(g: Array, H: Array, r: Array) -> float:
 
 @compiled
 def has_cholesky_factor(H: Array, shift: Array, r: Array, factor: Array) -> bool:
-    """Return whether diag(s) − H is positive definite, by more than rounding, on axes with a width.
+    """Return whether diag(s) − H is positive definite, by more than rounding, where r_i > 0.
 
-    The factorisation counts a pivot as positive from 1e-12 (s_i + |H_ii|) on. Without any such axis
-    the result is True.
+    A pivot counts as positive above 1e-12 (s_i + |H_ii|). If all r_i are 0 the result is True.
 
     Args:
         H: Symmetric, shape (d, d).
@@ -255,9 +254,9 @@ def rising_faces(g: Array, bend: Array, slope_error: Array, r: Array, is_outer: 
         is_outer: Whether the lower and the upper faces lie on those of the whole box, shape (2, d).
 
     Returns:
-        Σ_i 3^i over these axes, twice that for upper faces; 0 if there are none. `INSIDE` = −1 if
-        one of the faces lies inside the whole box: then the neighbouring sub-box holds higher
-        points.
+        Σ_i 3^i e_i, where e_i is 1 for the lower face of axis i, 2 for its upper face and 0 for
+        neither. `INSIDE` = −1 if one of the faces lies inside the whole box: then the neighbouring
+        sub-box holds higher points.
     """
     faces = 0
     stride = 1

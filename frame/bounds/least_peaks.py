@@ -55,9 +55,9 @@ def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
 
     Returns:
         The bound, 0 or more, in the unit of the output; and a point of the box in unit coordinates,
-        shape (d,), at which the peak is expected to be small. Nothing is proved of this point, the
-        one at which the dual function of the cell with the lowest bound has its maximum over
-        inputs; it is 0 where no node gave a bound.
+        shape (d,), at which the peak is expected to be small. Nothing is proved of this point,
+        which is near the maximum over inputs in the dual function of the cell with the lowest
+        bound. It is 0 where no node gave a bound.
 
     Raises:
         UnprovedError: A number of the models exceeds the range of the dual function.

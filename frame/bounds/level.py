@@ -411,8 +411,8 @@ class OutputBounds:
         """Lower the largest of the bounds at some time nodes, in place, with few of the nodes.
 
         Nodes are improved one by one from the highest bound down, until the next bound is not above
-        the highest one that is left: lower bounds there would not lower the peak. Without nodes
-        nothing happens.
+        the highest of those that are improved: the other nodes would not lower the largest bound.
+        Without nodes nothing happens.
 
         Args:
             nodes: Indices of the nodes, shape (J,).

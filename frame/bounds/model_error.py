@@ -151,7 +151,7 @@ class EnergyNorms:
 
 
 def _energy_rates(structure: DampedStructure, modes: DampedModes, norms: EnergyNorms) -> Array:
-    """Bound the energy norm of the defects of each mode and source, over |exp(λ t)|, shape (S, n).
+    """Bound the energy norm of each source's and mode's defects for |exp(λ t)| = 1, shape (S, n).
 
     The defects are d = λ φ − ψ in q̇ = v and p = λ M ψ + D ψ + K φ in the balance of forces, and
     their norm is √(d* K d + p* M⁻¹ p).

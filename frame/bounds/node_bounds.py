@@ -159,8 +159,8 @@ def target_value(model_value: float, min_gap: float, effort: Effort, constant: A
         model_value: Largest known value of side × output in the model, without its constants.
         min_gap: Smallest gap worth any effort.
         effort: `wanted_gap`, `incumbent` and `slack_below_peak`.
-        constant: What is added to the model value for the response, and to that for the bound,
-            (2,).
+        constant: Two numbers. The first is the part of the response that no input changes, which
+            model value and dual function leave out; the second is added to the bound alone.
     """
     below_peak = max(0.0, effort.incumbent - model_value - constant[0])
     gap = max(effort.wanted_gap, min_gap) + effort.slack_below_peak * below_peak

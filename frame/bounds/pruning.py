@@ -30,9 +30,10 @@ class PrunedBox(NamedTuple):
 def prune_ends(level: LevelModels, bounds: OutputBounds, above: Ints) -> PrunedBox:
     """Prune ends of the box [−1, 1]^d that hold no peak above the incumbent by more than the gap.
 
-    Of each input the half or quarter of its range away from the best inputs found is bounded. Where
-    the bound exceeds `bounds.attained`, the incumbent, by at most `bounds.wanted_gap` at every
-    node, that end cannot hold a peak that is worth a search, and is pruned.
+    For each input, bounds are computed over a quarter or a half of its range, at the end away from
+    the best inputs found. Where the bound exceeds `bounds.attained`, the incumbent, by at most
+    `bounds.wanted_gap` at every node, that end cannot hold a peak that is worth a search, and is
+    pruned.
 
     Args:
         level: Models over the box.

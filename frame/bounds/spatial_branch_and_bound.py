@@ -390,10 +390,10 @@ class Queue:
 
         These are the peaks that are abandoned with a finite bound, or whose bound exceeds the
         largest attained value by no more than the wanted gap. Their bounds go into the hull. A
-        level keeps all its peaks as long as one that is still open has a very wide gap. The
-        sub-box's `peaks`, and `is_wide` of the levels that have no wide gaps any more, are changed;
-        when a level loses its wide gaps, `min_peak_lower` of the sub-box, its lower bounds of the
-        smallest max |q| over time, go into the hull as well.
+        level keeps all its peaks while any open one has a very wide gap. The sub-box's `peaks`, and
+        `is_wide` of the levels that have no wide gaps any more, are changed; when a level loses its
+        wide gaps, `min_peak_lower` of the sub-box, its lower bounds of the smallest max |q| over
+        time, go into the hull as well.
 
         Args:
             box: The sub-box.
@@ -496,10 +496,10 @@ def _bisection_axis(boxes: Boxes, votes: Array) -> int:
 
 
 def halvings(gap_fractions: Array, max_boxes: int) -> Array:
-    """Return how often an input can be halved with `max_boxes` sub-boxes, on average over a gap.
+    """Return how often an input can be halved with `max_boxes` sub-boxes, on average over inputs.
 
     A path through the tree of sub-boxes has log2(max_boxes) bisections, of which each input gets
-    its fraction of the gap. The average over inputs is taken with the same fractions as weights.
+    its fraction of the gap. The fractions are also the weights of the average.
 
     Args:
         gap_fractions: Fraction of the gap that each input accounts for, shape (…, inputs).

@@ -533,7 +533,7 @@ class SolutionBounds:
             y = np.asarray(scale * np.linalg.norm(scale * right) / self.min_eigenvalue)
         if self.inverse_bound is not None:
             y = np.minimum(y, self.inverse_bound @ right)
-        # Each row gives a bound by those of the other entries, |y_j| ≤ (r_j + Σ_l |A_jl| |y_l|) /
+        # Each row bounds y_j by the bounds of the other entries, |y_j| ≤ (r_j + Σ_l |A_jl| |y_l|) /
         # |A_jj|, where |A_jj| cannot be zero. Eight rounds suffice; more change little.
         min_diagonal = self.abs_diagonal - np.diag(self.radius)
         off_diagonal = self.radius - np.diag(np.diag(self.radius))

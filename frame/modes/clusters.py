@@ -118,7 +118,7 @@ def _decreases(centre: CentredMatrices, steepest_input: int) -> tuple[float, flo
         steepest_input: Index of the input that changes eigenvalues most, for the error.
 
     Raises:
-        UnprovedError: One of both is not below 1. Its attribute `along` is `steepest_input`, as the
+        UnprovedError: μ or κ is not below 1. Its attribute `along` is `steepest_input`, as the
             input to bisect.
     """
     # S M(0) S and S K(0) S are the identity, but for coordinates without mass
@@ -150,8 +150,8 @@ def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centred
         stiffness: K, shape (n, n), in the same inputs.
 
     Returns:
-        The matrices as functions of the inputs that M or K depends on, of one input if they depend
-        on none; and the indices of these inputs, rising.
+        The matrices as functions of the inputs that M or K depends on, or of the first input if
+        they depend on none; and the indices of these inputs, rising.
 
     Raises:
         UnprovedError: The structure can move rigidly, or is unstable, at the midpoint.

@@ -170,7 +170,7 @@ class DampedModes:
 def needed_modes(
     structure: DampedStructure, loads: Sequence[History], time: Array, tolerance: Array | float
 ) -> Ints:
-    """Return the modes without which outputs would miss more than a tolerance.
+    """Return the indices of the modes that are needed for outputs within a tolerance.
 
     An output r q + s q̇ is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) √(qᵀ K q + q̇ᵀ M q̇). All is estimated at
     the midpoint of the box; what is left out counts as an error of the initial state in the proof.
@@ -183,8 +183,8 @@ def needed_modes(
             all. At 0 all modes are needed that add anything.
 
     Returns:
-        Their indices among the modes with Im λ ≥ 0, which are ordered by rising |λ| with those that
-        oscillate first; rising, shape (n,), one at least.
+        Rising indices, shape (n,), n ≥ 1, in the list of modes with Im λ ≥ 0. In this list
+        oscillating modes stand before real ones, each kind by rising |λ|.
     """
     modes = _midpoint_modes(structure)
     rate = modes.eigenvalue

@@ -235,8 +235,8 @@ def wave_factors(eigenvalues: Array, C: Array, d: int) -> Array:
 
     Returns:
         Real numbers, shape (B, m, 6 parts n, q). The third axis runs over parts, then w, w′, w″,
-        then modes, then real and imaginary parts: its scalar product with those of w gives value
-        and derivatives of the outputs.
+        then modes, then real and imaginary parts. The scalar product along it with the values of w,
+        w′ and w″ in this order gives value and derivatives of the outputs.
     """
     rate = eigenvalues[..., np.newaxis, :, np.newaxis]
     _, points, parts, n, m = C.shape

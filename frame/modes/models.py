@@ -250,8 +250,8 @@ def _truncation_error(
     """Estimate the error of an output without the modes from k on, for each k, shape (n,).
 
     By Cauchy and Schwarz it is √(Σ a² Σ β²) times the radius of the range of λ^κ e over these
-    modes, where the terms of the sums are divided by λ so that together they have λ^(−2κ): neither
-    at κ = 0, Σ a² at ½, both at 1. It is an estimate at the midpoint of the box, and no bound.
+    modes. At κ = ½ each a² is divided by λ, and at κ = 1 each a² and each β². It is an estimate at
+    the midpoint of the box, and no bound.
 
     Args:
         output_modes: Output row times mode shape a of n modes by rising frequency, shape (n,).

@@ -168,7 +168,7 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
             too, where weights reduce its stiffness (P-Delta).
 
     Raises:
-        UnprovedError: One of both may differ from zero in the box.
+        UnprovedError: The dashpots or this factor may differ from zero in the box.
     """
     if assembly.dashpots.magnitude().any():
         raise UnprovedError(

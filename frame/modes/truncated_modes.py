@@ -108,8 +108,8 @@ def truncated_modes(
 ) -> TruncatedModes | None:
     """Bound the response of all modes that are not enclosed one by one or in blocks.
 
-    Sums over all modes are known without the modes; what the enclosed modes leave of them belongs
-    to the truncated ones.
+    Sums over all modes are found without computing modes. The sums over the enclosed modes are
+    subtracted from them; the rest belongs to the truncated modes.
 
     Args:
         structure: The structure over the box.
@@ -310,9 +310,9 @@ def _weighted_sums(
 ) -> list[WeightedSums]:
     """Return C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ for the exponents κ = 0, ½, 1, over the box.
 
-    By Cauchy and Schwarz R = √(A B) with A = Σ a² and B = Σ β², divided by λ as κ demands: neither,
-    A alone, or both. It is replaced by (A t + B/t)/2 with a number t > 0, which is not smaller and
-    a Taylor model. C is not known for ½, where 0 stands in its place.
+    By Cauchy and Schwarz R = √(A B) with A = Σ a² and B = Σ β². At κ = ½ each a² is divided by λ,
+    and at κ = 1 each a² and each β². R is replaced by (A t + B/t)/2 with a number t > 0, which is
+    not smaller and a Taylor model. C is not known for ½, where 0 stands in its place.
 
     Args:
         sums: The sums over modes with eigenvalues λ, as functions of the inputs of mass and
@@ -357,8 +357,8 @@ def _with_best_weights(
     """Bound the response of truncated modes, with the best weight for each source and output.
 
     If all λ_k^κ e_k(t) lie in an interval with the midpoint m(t) and the radius r(t), the truncated
-    modes add C m(t) ± R r(t) with C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ. The exponent κ with the
-    smallest largest R r(t) is taken.
+    modes add C m(t) ± R r(t) with C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ. The exponent κ is taken
+    whose largest R r(t) over time is smallest.
 
     Args:
         structure: Structure whose outputs take the derivatives by time `derivative_orders`, shape
@@ -513,8 +513,8 @@ def _coupling_factors(
             = N⁻¹ Xᵀ M v of the sources.
 
     Returns:
-        `by_slope`, a bound of the coupling over sup |de/dλ| of responses e, shape (sources, m);
-        `by_range`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
+        `by_slope`, a bound of the coupling divided by sup |de/dλ| of responses e, shape (sources,
+        m); `by_range`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
         `off_diagonal`, a bound of |L| off its diagonal, with zeros on it, shape (p, p), transposed
         as the block holds L.
 
@@ -582,8 +582,8 @@ def _largest_within_steps(
 
         G(t + τ) = exp(σ τ) G(t) + σ^n I,   I = ∫ exp(σ s) f(t + τ − s) ds over 0 ≤ s ≤ τ ≤ h,
 
-    and with |f| ≤ `max_force`, |I| ≤ max_force h and |dI/dσ| ≤ max_force h²/2. Column 0 has no
-    step, and is not meant to be used.
+    and with |f| ≤ `max_force`, |I| ≤ max_force h and |dI/dσ| ≤ max_force h²/2. Column 0 belongs to
+    no step and has no meaning.
 
     Args:
         largest: Bounds of |G| and |dG/dσ| at the nodes, shape (2, T).

@@ -70,8 +70,8 @@ class Response(NamedTuple):
         """Return the response of the oscillator in the middle of the grid, with exact factors κ.
 
         A response Re κ σ^order ρ is given on a grid of Q values of q = g/ω and W values of ω; the
-        new one has the point (Q // 2, W // 2), and no error of κ. That of a load itself, without a
-        grid, keeps its factors.
+        new one has the point (Q // 2, W // 2), and no error of κ. A response that is a load itself
+        has no grid and keeps its factors.
         """
         _, q_points, w_points = self.coefficient.shape
         q = q_points // 2

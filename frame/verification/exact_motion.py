@@ -35,9 +35,9 @@ class LoadHistory(NamedTuple):
     def values(self, times: Array) -> Array:
         """Return the load g(t) sin(Ω (t − start) + phase), or g(t) if Ω is 0, at times, (T,).
 
-        g is linear between its samples and zero before the first and after the last one, at which
-        it stays if `is_held`. At a jump the value after it is returned: at the first sample that
-        sample, and at the last one 0 unless it is held. Without samples NumPy raises ValueError.
+        g is linear between its samples and zero before the first one. After the last one it keeps
+        its value if `is_held`, and is zero otherwise. At the first sample that sample is returned,
+        at the last one 0 unless `is_held`. Without samples NumPy raises ValueError.
 
         Args:
             times: In s, shape (T,), in any order.
@@ -163,8 +163,8 @@ class _ScaledSystem:
     ) -> _ScaledSystem:
         """Return a structure as ẋ = A x in the states x = [Lᵀ q; Lᵀ q̇/ω], where L Lᵀ is its mass.
 
-        In these states A has about the norm of the highest frequency ω = √‖L⁻¹ K L⁻ᵀ‖, which is 1
-        if the stiffness is zero.
+        In these states A has about the norm of the highest frequency ω = √‖L⁻¹ K L⁻ᵀ‖. If the
+        stiffness is zero, ω is 1.
 
         Args:
             lower: Cholesky factor L of the mass, lower triangular, shape (n, n).
@@ -255,8 +255,8 @@ class _ScaledSystem:
 def _recursion(step: Array, start: Array, forcing: Array) -> Array:
     """Return the states of x_{k+1} = A x_k + f_k, with x_0 = `start`, for k = 0 … count − 1.
 
-    By recursive doubling (Kogge, Stone 1973): with what a span of 2, 4, … substeps before each one
-    adds to its state, that of twice the span follows at once.
+    It is recursive doubling (Kogge, Stone 1973): each pass doubles the number of earlier forcings
+    that a state contains, so that log2(count) passes suffice.
 
     Args:
         step: A, shape (2n, 2n).

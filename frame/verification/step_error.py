@@ -60,8 +60,8 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     The error is the larger one of `steps` and of the estimate at inputs that attain bounds. A new
     envelope is returned; its fact "step_error" is the largest time-stepping error of the outputs in
     the unit of the reference output, the first displacement, and "estimated_error" the largest of
-    all errors in comparison with the scale of tolerances, unless its bounds are merely attained
-    values.
+    all errors divided by the scale of tolerances. The latter is left out if the bounds are merely
+    attained values.
 
     Args:
         bounds: Envelope of the trajectories of the scheme.
@@ -71,8 +71,8 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     Raises:
         StepError: The step is too coarse for a trajectory that attains a bound.
         RefusedError: A trajectory does not exist, or is not finite.
-        FailedError: The reference method that the peaks of a system that is not linear are compared
-            with does not reach the last time.
+        FailedError: The system is not linear, and the reference method for its peaks does not reach
+            the last time.
     """
     if not flow.flow.exact:
         steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
@@ -180,8 +180,9 @@ def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
 def node_deviation(flow: Flow, points: Array) -> Array:
     """Estimate the distance of outputs from straight lines between time nodes.
 
-    It is 1.5 times the largest distance in the step and its neighbours, and in any step a tenth of
-    the largest of all steps at least: where some trajectories are straight, others may bend.
+    It is 1.5 times the largest distance in the step and both its neighbours, or a tenth of the
+    largest distance in any step if that is more: where some trajectories are straight, others may
+    bend.
 
     In a step in which a force jumps, so does an acceleration. It is far from the straight line
     then, but hardly beyond its values at both ends: there the distance beyond these is taken.
@@ -289,8 +290,8 @@ def _fed_through(flow: Flow, points: Array) -> _FedThrough:
 def _fed_between(fed: _FedThrough, time: Array, substeps: int) -> Array:
     """Return what forces add to outputs between finer time nodes, shape (steps, m).
 
-    A force may be zero at all of these and not between them. In a step in which it jumps, what it
-    exceeds its values at both ends by is taken, else its distance from a straight line.
+    A force may be zero at all of these and not between them. Where a force jumps in a step, the
+    excess over its values at both ends is taken; in other steps, its distance from a straight line.
 
     Args:
         fed: Histories of the forces, the magnitudes that a unit of each adds to outputs, shape
