@@ -46,8 +46,8 @@ def local_maximum(
         H: Symmetric Hessians, shape (N, d, d).
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends of the boxes, shape (N, d).
-        start: Where the ascents begin, inside the boxes, shape (N, d), not changed; x = 0 if None,
-            which must lie in the boxes, too.
+        start: Where the ascents begin, inside the boxes, shape (N, d), not changed. None stands for
+            x = 0, which must lie in the boxes then.
         rounds: Largest number of rounds. An ascent ends earlier where a round gains at most 1e-10
             of the value, or 1e-16.
 
@@ -127,9 +127,9 @@ def _value(g: Array, H: Array, x: Array) -> float:
 def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> float:
     """Make a projected Newton step on a quadratic within a box, and return its value afterwards.
 
-    The quadratic is g·x + x·H·x/2. Axes at whose end of the box it rises outwards are held. The
-    step is tried in its full length, in half and in a quarter, each clipped to the box; x moves, in
-    place, to the best of these points that gains, and stays if none does.
+    The quadratic is g·x + x·H·x/2. An axis is held where x is at an end of the box beyond which the
+    quadratic rises. The step is tried in its full length, in half and in a quarter, each clipped to
+    the box; x moves, in place, to the best of these points that gains, and stays if none does.
 
     Args:
         g: Gradient at x = 0, shape (d,).
@@ -254,7 +254,7 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
         lower: Lower ends of the boxes, shape (N, d).
         upper: Upper ends of the boxes, shape (N, d).
         free: Indices of the axes along which these faces extend, rising; along the others they lie
-            at an end of the box. All corners are meant if there are none.
+            at an end of the box. Without free axes the faces are the corners.
 
     Returns:
         The points, clipped to their faces, shape (N, 2^(d − len(free)), d). The last fixed axis

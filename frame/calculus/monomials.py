@@ -232,8 +232,8 @@ def product_part(
 def _add_products(a: Array, b: Array, at: Ints, out: Array) -> None:
     """Add the elementwise products a[x] b[y] to out[at[x, y]] for all pairs of monomials x, y.
 
-    a and out have the shapes (monomials, v), b as well, each with its own number of monomials;
-    `at`, of shape (monomials of a, monomials of b), has the place of each product in `out`.
+    a, b and out have the shape (monomials, v), each with its own number of monomials; `at`, of
+    shape (monomials of a, monomials of b), has the place of each product in `out`.
     """
     for x in range(len(a)):
         if not a[x].any():

@@ -147,8 +147,8 @@ class _Writer:
         """Write the operations that compute base ** exponent, and return the place of the result.
 
         Whole powers up to 4 become products and half powers become roots, which are exact to a few
-        roundings and faster than a general power. The exponent is no 0, which SymPy has replaced by
-        1.
+        roundings and faster than a general power. The exponent is never 0, since SymPy writes 1 for
+        x⁰.
 
         Raises:
             RefusedError: Base or exponent has a function that no operation computes.

@@ -177,11 +177,11 @@ class Auto:
     def _dual(self, flow: UnitFlow) -> DualProof:
         """Return the dual bound with gaps that fit the tolerance.
 
-        Its gaps are left at their defaults if a tolerance is stated for all time nodes. Otherwise,
-        if the tolerance is a fraction of the peaks and there are few inputs, both the gap of the
-        nodes and that of the peaks are the tolerance, at least 1e-4: with up to four inputs, or up
-        to six for a stated tolerance. With more inputs a stated tolerance asks for a gap of a tenth
-        of the peaks only. If magnitudes alone count, bounds below peaks get no effort.
+        Its gaps keep their defaults if a tolerance is stated for all time nodes. Otherwise, if the
+        tolerance is a fraction of the peaks and there are at most four inputs (six if it is
+        stated), the gap of nodes and that of peaks are the tolerance, but at least 1e-4. In all
+        other cases a stated tolerance sets the gap of peaks to a tenth, and without one the
+        defaults stay. If magnitudes alone count, bounds below peaks get no effort.
 
         Args:
             flow: The response over the boxes of the inputs.
@@ -205,9 +205,9 @@ class Auto:
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
         """Return whether the gap of a guaranteed envelope suffices, so that no proof follows.
 
-        If a tolerance is stated for all time nodes, each gap must be within it. Otherwise gaps of
-        peaks count: up to twice a tolerance that is stated as a fraction of the peaks, if there are
-        at most four inputs, and else up to a tenth of each peak.
+        If a tolerance is stated for all time nodes, each gap must be within it. Otherwise the gaps
+        of peaks count, which may be a tenth of each peak; or twice the tolerance, if it is stated
+        as a fraction of the peaks and there are at most four inputs.
 
         Args:
             proved: The envelope, whose `error` is the gap at each time node.

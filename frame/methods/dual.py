@@ -474,8 +474,8 @@ def _least_peaks(
 def _exact_bounds(box: Box) -> BoxBounds:
     """Return the bounds over a box without width, which is one point: its exact response.
 
-    Guaranteed bounds lie above and attained values below it by the bound of its rounding. No gap
-    can be narrowed by bisections, so that the fractions of the inputs in it are zero.
+    Guaranteed bounds lie above and attained values below it by the bound of its rounding.
+    Bisections cannot narrow this gap, so that no input accounts for it: `gap_fractions` is zero.
 
     Args:
         box: The box, whose lower and upper ends are equal.

@@ -99,7 +99,7 @@ class Proof:
                 the tolerance.
             FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
-        # A gap alone is the tolerance, too.
+        # Without a tolerance the gap is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
         return prove(replace(self, tolerance=tolerance), flow, progress)
 
@@ -162,10 +162,9 @@ class Proof:
             time nodes, with the inputs that attain them.
 
         Raises:
-            UnprovedError: The modal model is not accurate enough even for the largest gap, with the
-                input to bisect as a `GapError` if bisections would help and as a `BisectionError`
-                if they would not; or the structure has no smooth oscillating modes over the
-                sub-box.
+            UnprovedError: The modal model is not accurate enough even for the largest gap: a
+                `GapError` with the input to bisect, or a `BisectionError` if bisections would not
+                help. Or the structure has no smooth oscillating modes over the sub-box.
         """
 
         def bounds_within(gap: float) -> list[BoxBounds]:
@@ -421,7 +420,7 @@ def _line_deviation(model: ModalModel) -> Array:
 
 
 def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:
-    """Return by how much the error of a modal model may exceed its smaller end within a step.
+    """Return by how much a model's error within a step may exceed the smaller one at its ends.
 
     Args:
         model: The model, which tells the growth rates of its modes and the step.

@@ -137,7 +137,7 @@ class PeakSearch:
             what the search found, or that the budget is spent.
 
         Raises:
-            RefusedError: A trajectory does not exist, as one that collapses.
+            RefusedError: A trajectory does not exist, for example since the structure collapses.
             StepError: A trajectory has too many events in a step, or its energy is not in balance.
         """
         cuts = flow.boxes
@@ -230,7 +230,7 @@ class _Band:
             Largest magnitude over time by output, shape (trajectories,) each.
 
         Raises:
-            RefusedError: A trajectory does not exist, as one that collapses.
+            RefusedError: A trajectory does not exist, for example since the structure collapses.
             StepError: A trajectory has too many events in a step, or its energy is not in balance.
         """
         points = np.column_stack([inputs[name] for name in self.names])

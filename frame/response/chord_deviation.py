@@ -141,15 +141,15 @@ class Response(NamedTuple):
         return np.asarray(deviation * real)
 
     def off_chords(self, nodes: Array, parts: int) -> tuple[Array, Array]:
-        """Return lower and upper bounds at nodes of the distance from chords, (nodes, m) each.
+        """Return lower and upper bounds of the response less its chords at nodes, (nodes, m) each.
 
         They hold for all oscillators between the points of the response's grid. At the ends of
         chords they contain 0.
 
         Args:
             nodes: Rising times, shape (nodes,), in s.
-            parts: Every `parts`-th node is the end of a step, between which the chords, straight
-                lines, run. The last node must be one of these.
+            parts: Every `parts`-th node from the first on is the end of a step, and the last node
+                must be one of these. A chord is the straight line between both ends of a step.
 
         Raises:
             UnprovedError: An oscillator is out of the range in which responses are computed to
@@ -231,9 +231,9 @@ class Response(NamedTuple):
                 low[:, o] = np.minimum(low[:, o], value.min(-1))
                 minus_high[:, o] = np.minimum(minus_high[:, o], -value.max(-1))
         # Between the points of the grid G differs from bilinear interpolation by at most `missed`,
-        # in which the rounding of G, with that of the chord's ends, is counted twice.
-        # κ G differs by what κ changes in a cell besides: at most the sum of its changes along the
-        # sides, since κ is monotonic along both.
+        # in which the rounding of G, with that of the chord's ends, is counted twice. Besides, κ
+        # changes within a cell, by at most the sum of its changes along the sides, since κ is
+        # monotonic along both.
         real, imag, second, rounding = largest
         between = _between_points(self.sigma)
         missed = between * (second + between * fourth) + 2 * chords.with_ends(rounding)

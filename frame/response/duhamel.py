@@ -78,10 +78,11 @@ class LinearPieces(NamedTuple):
 
 
 def linear_pieces(history: History, time: Array) -> LinearPieces:
-    """Return a load up to the last node as intervals in which it is linear, and node places.
+    """Return a load up to the last node in linear intervals, and the places of nodes in them.
 
     A sine by which the load may be multiplied is left out. Intervals have the length of the load's
-    step; so many without load are set in front that its first sample begins one.
+    step. Intervals with a load of zero stand in front of the load's start, so that its first sample
+    begins an interval.
 
     Args:
         history: The load.
@@ -89,9 +90,9 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
 
     Returns:
         For I intervals the load at the beginning, `first`, and at the end, `last`, of each (I,),
-        and the `step` in s; for each node the index `interval` (T,), and `offset` (T,), the index
-        among `offsets` (P,), the distinct times from the beginning of an interval to a node; and
-        `time_rounding`, a bound of what these times miss (T,), in s.
+        and the `step` in s; for each node the index of its interval, `interval` (T,), and the index
+        `offset` (T,) of its time since that interval began in the list `offsets` (P,) of all such
+        times; and `time_rounding`, a bound of what these times miss (T,), in s.
     """
     samples = history.samples
     step = history.step
@@ -324,7 +325,7 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
 def _respond_at_nodes(
     sigma: Array, load: LinearPieces, orders: Orders, length: int, out: Array, error: Array
 ) -> None:
-    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, S exponents at all T time nodes.
+    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, for S exponents at all T time nodes.
 
     Args:
         sigma: Exponents, shape (S,).
@@ -355,7 +356,7 @@ def _respond_at_nodes(
 def _respond_at_given(
     sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array, error: Array
 ) -> None:
-    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, rows of exponents at one node each.
+    """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, for rows of exponents at a node each.
 
     The integrals begin at t = 0, the beginning of interval 0, which the start (0, −1) stands for.
 
@@ -556,7 +557,7 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
 
 @compiled
 def error_of_integrals(sigma: complex, h: float) -> float:
-    """Return a bound, in s, of the rounding of J₀ and of that of 2 J₁/h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ.
+    """Return one bound, in s, of the rounding of both J₀ and 2 J₁/h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ.
 
     It belongs to the values of `step_integrals`, and is 0 for h = 0. Bounds are a few units of
     rounding times h, times exp(Re σ h) where this grows.

@@ -262,8 +262,9 @@ class Direct(LoadTables):
             growth: Not used.
         """
         load = self.history
-        # The place between two samples is off by some u t/step, of which a line makes twice as much
-        # of the largest sample; a sine has a phase with the rounding of Ω t.
+        # The place between two samples is off by some u t/step. The line between them turns this
+        # into at most twice as much times the largest sample. The phase of a sine has the rounding
+        # of Ω t.
         turned = load.frequency * self.time + abs(load.phase)
         roundings = 16 + 4 * self.time / load.step + 4 * turned
         errors: Array = np.zeros((3, *waves.shape[1:]))

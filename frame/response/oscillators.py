@@ -82,8 +82,8 @@ def grid_over(
 ) -> Grid:
     """Return a grid of equally spaced points over ranges of frequency ω and of q = decay/ω.
 
-    A range of one value, or whose upper end lies below the lower one, becomes a slightly wider one
-    from the lower end on: by 1e-9 of ω, or by 1e-12 in q.
+    A range without width, or with its ends reversed, is replaced by a narrow one that begins at the
+    lower end given: its width is 1e-9 of ω, or 1e-12 in q.
 
     Args:
         omega: Lower and upper end of ω, in rad/s, positive.
@@ -506,7 +506,7 @@ def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array
     Args:
         value: Values at the points of the grid, bilinear between them, shape (T, Q, W), W ≥ 2:
             times, quotients g/ω, frequencies ω.
-        error: Bound of the distance from that, shape (T,).
+        error: Bound of how far the values differ from this interpolation, shape (T,).
         factor: Positive factors, shape (Q, W), monotonic along Q and rising along W.
     """
     # A bilinear function is largest at corners, so strips between neighbouring ω, each over all Q,
