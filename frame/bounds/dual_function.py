@@ -196,10 +196,11 @@ def dual_value(
 ) -> float:
     """Return the dual function D(μ) of side × output at a node, less constants and cubic terms.
 
-    D(μ) is the sum of two maxima and of Σ_z |μ_z| R_z: the maximum, for each mode on its own, of
-    the response minus Σ μ_z z over points of a table of frequencies ω and decays g; and that of Σ
-    μ_z z(u) plus truncated modes over inputs u in [−1, 1]^L. Here z are Z = K (2 + S) variables,
-    scaled to [−1, 1]: ω, g and a participation factor for each of S sources, mode by mode.
+    Z = K (2 + S) variables z, scaled to [−1, 1], describe K modes: mode by mode the frequency ω,
+    the decay g, and a participation factor for each of S sources. D(μ) has three terms. The first
+    is a sum over modes: the maximum of the mode's response minus its Σ μ_z z over a table of ω and
+    g. The second is the maximum of Σ μ_z z(u) plus the truncated modes over inputs u in [−1, 1]^L.
+    The third is Σ_z |μ_z| R_z.
 
     Args:
         mu: Multipliers μ, shape (Z,).

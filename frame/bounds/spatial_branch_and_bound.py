@@ -412,10 +412,10 @@ class Queue:
     def _pruned_children(self, box: SubBox, answers: Sequence[Answer]) -> Iterator[SubBox]:
         """Yield the smaller sub-boxes to which the proof has confined single peaks.
 
-        These peaks leave `box`, in place, and the bounds over what was pruned go into the hull.
-        Where less was pruned than half the width of an input, summed over all inputs, the halves of
-        the smaller sub-box are yielded instead; where nothing was, the peak stays in `box`. So do
-        all peaks of a level with very wide gaps (`is_wide`).
+        These peaks leave `box`, in place, and the bounds over what was pruned go into the hull. The
+        pruned fractions of the inputs' widths are added up. If the sum is below a half, the halves
+        of the smaller sub-box are yielded instead. Peaks for which nothing was pruned stay in
+        `box`, and so do all peaks of a level with very wide gaps (`is_wide`).
 
         Args:
             box: The sub-box that has just been bounded.
