@@ -569,7 +569,9 @@ def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_Tru
         constant[1] += mode.participation.magnitude()[:, output] @ error
     d = level.structure.rayleigh.inputs
     if not level.models.truncated:
+        # no terms, whatever the node; the constants are sums of one bound of each source and mode
         none = _TruncatedTerms(np.zeros((0, 1)), np.zeros((0, d)), np.zeros((0, d * (d + 1) // 2)))
+        constant[1] *= 1 + gamma(len(modes) * (modes[0].participation.shape[0] + 1) + 4)
         return none, constant
 
     responses = list[Array]()

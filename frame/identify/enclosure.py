@@ -161,8 +161,8 @@ class LinearRelaxation:
 
         A variable is added to the linear program, and rows, which are expressions that must not
         exceed 0. Since the exponential is convex, it lies above its tangents at both ends and at
-        the midpoint of the range of y, and below the secant of this range. The ends and the secant
-        are widened by a few units of rounding. If y is constant, nothing is added.
+        the midpoint of the range of y, and below the secant of this range. Ends, tangents and
+        secant are widened by more than their rounding. If y is constant, nothing is added.
 
         Args:
             y: Expression, given by its coefficients by all variables, shape (size,).
@@ -171,11 +171,14 @@ class LinearRelaxation:
         if low == high:
             return float(np.exp(low)) * self.one
         x = self.variable(float(np.exp(low)) * (1 - 1e-15), float(np.exp(high)) * (1 + 1e-15))
+        # Each line is a slope of at most e^high, off by 6 units of rounding u = 1.1e-16, times y,
+        # and a constant of at most e^high (1 + |y|), off by 10 u: 2e-15 is some 18 u.
+        rounding = 2e-15 * float(np.exp(high)) * (1 + max(abs(low), abs(high)))
         for point in (low, (low + high) / 2, high):
-            self.rows.append(np.exp(point) * (y + (1 - point) * self.one) - x)
+            self.rows.append(np.exp(point) * (y + (1 - point) * self.one) - x - rounding * self.one)
         # expm1 keeps the digits of a secant over a short interval.
         slope = np.exp(low) * np.expm1(high - low) / (high - low)
-        self.rows.append(x - slope * y - (np.exp(low) - slope * low + 1e-15) * self.one)
+        self.rows.append(x - slope * y - (np.exp(low) - slope * low + rounding) * self.one)
         return x
 
     def bounds(self, expression: Array) -> tuple[float, float]:
