@@ -52,7 +52,6 @@ charts:
 	$(IN) python -m benchmarks.rve.voxels --chart
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
-	$(IN) python -m benchmarks.frame.envelopes --wide 3
 	$(IN) python -m benchmarks.costs
 	$(IN) python cases/make_composite.py
 	$(IN) xvfb-run -a python cases/make_tomogram.py --picture

@@ -98,6 +98,15 @@ def with_keys(
     lines += [""]
 
 
+def with_bars(
+    _app: Sphinx, _what: str, _name: str, _documented: object, _options: object, lines: list[str]
+) -> None:
+    """Keeps the bars of absolute values, between which reStructuredText expects a substitution."""
+    for number, line in enumerate(lines):
+        if "``" not in line and not line.lstrip().startswith((">>>", "...")):
+            lines[number] = line.replace("|", "\\|")
+
+
 def described(field: FieldInfo) -> str:
     """The description of a key in reStructuredText."""
     return (field.description or "section of its own").replace("`", "``")
@@ -132,6 +141,7 @@ def without_signature(
 def setup(app: Sphinx) -> None:
     """Hooks into the build."""
     app.connect("builder-inited", copy_mathjax)
+    app.connect("autodoc-process-docstring", with_bars)
     app.connect("autodoc-process-docstring", with_keys)
     app.connect("autodoc-process-signature", without_signature)
     app.connect("html-page-context", without_modules, priority=900)

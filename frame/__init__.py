@@ -15,6 +15,7 @@ from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
 from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.frame.analyses.suites import SuitePeaks, over_records
 from alphacut.frame.analyses.tolerances import Tolerances, tolerances
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -53,8 +54,9 @@ __all__ = [
     "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow",
     "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction",
     "Predictions", "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks",
-    "Sensitivity", "StoreyFrame", "SuitePeaks", "Tolerances", "damping_from_loss", "decide",
-    "envelope", "fragility", "identify", "incremental", "measured_mode", "over_records",
-    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
-    "read_suite", "require_envelope", "sensitivity", "spectral_acceleration", "tolerances",
+    "Sensitivity", "StoreyFrame", "SuitePeaks", "Tolerances", "UnprovedError",
+    "damping_from_loss", "decide", "envelope", "fragility", "identify", "incremental",
+    "measured_mode", "over_records", "peaks", "pendulum", "probability", "read_matrix",
+    "read_modes", "read_record", "read_suite", "require_envelope", "sensitivity",
+    "spectral_acceleration", "tolerances",
 ]  # fmt: skip

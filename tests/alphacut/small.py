@@ -2,7 +2,7 @@
 
 import json
 
-from alphacut.entry import main
+from alphacut import main
 
 FRAME = """
 title = "One floor"

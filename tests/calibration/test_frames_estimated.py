@@ -7,8 +7,7 @@ import pytest
 
 from alphacut.frame import GraphFollower, ImprovedFollower, envelope
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy import Interval
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import Interval, Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import DualProof, Proof, envelope
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.fuzzy.result import Nature
+from alphacut.frame import DualProof, Proof, UnprovedError, envelope
+from alphacut.fuzzy import Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 

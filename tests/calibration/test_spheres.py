@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.rve import Phase
-from alphacut.rve.spheres.model import SpheresModel
+from alphacut.rve import Phase, SpheresModel
 from alphacut.stochastic import HermiteMap
 from tests.calibration.declared import Calibration, free_seed
 

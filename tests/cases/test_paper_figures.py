@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from alphacut.figures.style import figure_style
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Ends

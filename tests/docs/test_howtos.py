@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs/howto").glob("*.md"))]

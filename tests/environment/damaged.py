@@ -27,7 +27,7 @@ from zlib import crc32
 
 import numpy as np
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from tests.frame.records import samples
 
 MOST_MEGABYTES, MOST_SECONDS = 1000.0, 20

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from tests.environment import damaged
 from tests.environment.damaged import HEAD, Format, outcome_of
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import read_matrix
+from alphacut.fuzzy import RefusedError
 from alphacut.io.quantity import parse_number
 from alphacut.rve.image.files import read_grid
 

@@ -18,11 +18,11 @@ from alphacut.frame import (
     Midpoint,
     Proof,
     StoreyFrame,
+    UnprovedError,
     envelope,
 )
 from alphacut.frame.bounds.model_error import proved_error
 from alphacut.frame.boxes import boxes
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.load_tables import Direct

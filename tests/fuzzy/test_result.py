@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import FailedError, RefusedError
-from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.result import Bounds, Ends, Nature
+from alphacut.fuzzy import Bounds, FailedError, Nature, RefusedError, Triangular
+from alphacut.fuzzy.result import Ends
 
 ALPHA = np.array([0.0, 1.0])
 

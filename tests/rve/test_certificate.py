@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.rve.cell.cell import LOADS, Phase
+from alphacut.rve import LOADS, Phase
 from alphacut.rve.result.checks import CertificateError, checks_within_limits, stress_checks
 from alphacut.rve.result.moduli import reuss, voigt
 from alphacut.stochastic import HermiteMap
@@ -79,7 +79,7 @@ class TestProductSpace:
 
     def solve(self, **options):
         pytest.importorskip("alphacut.rve.fenicsx")
-        from alphacut.rve.prism.model import PrismModel
+        from alphacut.rve import PrismModel
 
         options = {"mesh_size": 0.4, "layers": 3, "stiffness": True, **options}
         return PrismModel(**options).solve(PAPER, SOFT, [HARD])[0]

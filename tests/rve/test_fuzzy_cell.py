@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.entry import main
-from alphacut.fuzzy import Interval, Reduced, Signed, Triangular, from_data
+from alphacut import main
+from alphacut.fuzzy import Interval, Reduced, RefusedError, Signed, Triangular, from_data
 from alphacut.rve import (
     Phase,
     SeriesModel,

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel
-from alphacut.rve.result.loss_factors import first_order, loss_factors
-from alphacut.rve.spheres.model import SpheresModel
+from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel, SpheresModel, loss_factors
+from alphacut.rve.result.loss_factors import first_order
 from alphacut.stochastic import HermiteMap
 
 RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)

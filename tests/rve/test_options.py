@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from alphacut import rve
-from alphacut.base.errors import RefusedError
-from alphacut.rve.spheres.model import SpheresModel
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import SpheresModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.rve import Phase, effective_modulus
-from alphacut.rve.cell.cell import STRAIN
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import STRAIN, Phase, SeriesModel, effective_modulus
 from alphacut.rve.result.moduli import (
     AVERAGES,
     AXES,
@@ -18,7 +17,7 @@ from alphacut.rve.result.moduli import (
     square_voigt,
 )
 from alphacut.rve.series.fibre_constants import fibre_constants, longitudinal_shear
-from alphacut.rve.series.model import SeriesModel, square_stiffness
+from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from tests.alphacut.small import summary_of
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ import pytest
 import xarray
 from PIL import Image
 
-from alphacut.entry import main
+from alphacut import main
 from alphacut.rve.image.model import solve_image
 from alphacut.rve.image.phases import PhaseModuli
 from alphacut.stages.modulus import fuzzy_loss

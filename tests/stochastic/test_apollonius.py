@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic import Particles
 from alphacut.stochastic.tessellation.apollonius import apollonius
 
 

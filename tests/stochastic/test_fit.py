@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeEnds, least_pbox, slope_band

@@ -12,16 +12,22 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.stages.microstructure import fragment
-from alphacut.stochastic import HermiteMap, microstructure
+from alphacut.stochastic import (
+    HermiteMap,
+    LogNormalRadii,
+    MeasuredRadii,
+    Particles,
+    fit_radius_map,
+    microstructure,
+    pack,
+    read_particles,
+)
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.microstructure import RadiusLimits, fit_map, fit_radius_map
-from alphacut.stochastic.particles.measured import circles_in, read_particles
+from alphacut.stochastic.microstructure import RadiusLimits, fit_map
+from alphacut.stochastic.particles.measured import circles_in
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.packings import pack
-from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_distributions import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 from alphacut.stochastic.sections import reduced_radii, with_cells
 from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours

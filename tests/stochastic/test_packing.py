@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut.fuzzy import FailedError, RefusedError
+from alphacut.stochastic import LogNormalRadii, MeasuredRadii, Packings, Particles, gauss_rule, pack
 from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
-from alphacut.stochastic.particles.packings import Packings, pack
-from alphacut.stochastic.particles.particles import Particles
-from alphacut.stochastic.particles.radius_distributions import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 from alphacut.stochastic.sections import with_cells
-from alphacut.stochastic.theta.quadrature import gauss_rule
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.stochastic.segmentation import CONFIDENT, segment
 
 SIZE = 96

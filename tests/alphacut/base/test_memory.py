@@ -6,11 +6,11 @@ import resource
 import pytest
 
 from alphacut.base import memory
-from alphacut.base.errors import RefusedError
 from alphacut.base.memory import free_memory, require_free_memory
 from alphacut.frame import read_matrix
 from alphacut.frame.identify.uff_modes import uff_mode_rows
 from alphacut.frame.records.read import read_recording
+from alphacut.fuzzy import RefusedError
 from alphacut.stochastic import read_particles
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from alphacut.base.nature import Nature, rounded
+from alphacut.base.nature import rounded
+from alphacut.fuzzy import Nature
 
 
 @pytest.mark.parametrize("value", [5e-324, 3.33333e-310, -1.23456e-306, 1.23456e-300, 1.23456e308])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from alphacut.base import memory, pictures
-from alphacut.base.errors import RefusedError
 from alphacut.base.pictures import opened_picture
+from alphacut.fuzzy import RefusedError
 from alphacut.rve.image.files import read_grid
 from alphacut.stochastic.particles.measured import section_picture
 

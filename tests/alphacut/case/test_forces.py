@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from alphacut import main
 from alphacut.case.content import load
-from alphacut.entry import main
 from alphacut.frame import envelope
 from alphacut.frame.envelope import within_steps
 from alphacut.io.files import BadInput

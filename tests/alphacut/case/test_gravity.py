@@ -2,8 +2,8 @@
 
 import pytest
 
+from alphacut import main
 from alphacut.case.content import load
-from alphacut.entry import main
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import BadInput
 

@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
-from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy import Interval, RefusedError, Triangular
 from alphacut.io.files import BadInput
 from tests.alphacut.small import CELL, FRAME
 

@@ -5,10 +5,10 @@ import pytest
 import scipy.io
 import scipy.sparse
 
-from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.frame import Exact, LinearFlow, StoreyFrame
 from alphacut.frame.structures.matrix import Monomial
+from alphacut.fuzzy import RefusedError
 from alphacut.io.files import BadInput
 
 CASE = """

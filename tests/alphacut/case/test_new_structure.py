@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 import pytest
 
+from alphacut import main
 from alphacut.case.structure import Mass, Stiffness, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES
-from alphacut.entry import main
 from alphacut.frame import Accelerogram, Output
 from alphacut.frame.structures.linear import Assembly, LinearSystem
 from tests.alphacut.small import summary_of_run, written

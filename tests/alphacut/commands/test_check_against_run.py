@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from tests.alphacut.small import CELL, FRAME, written
 
 QUESTIONS = """

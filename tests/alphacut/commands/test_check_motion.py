@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 
 CASE = """
 title = "Two equal storeys"

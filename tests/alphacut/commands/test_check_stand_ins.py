@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from tests.alphacut.small import CELL, summary_of_run, written
 
 FRAME = """

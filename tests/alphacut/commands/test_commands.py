@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut import main
 from alphacut.commands import check
-from alphacut.entry import main
 from alphacut.frame import propagation
 from alphacut.frame.verification.self_test import with_motions_tested
+from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, summary_of, written
 

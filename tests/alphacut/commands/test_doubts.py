@@ -2,7 +2,7 @@
 
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from tests.alphacut.small import written
 
 FRAME = """

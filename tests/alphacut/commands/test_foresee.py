@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from alphacut import main
 from alphacut.case.content import load
 from alphacut.commands import foresee as module
 from alphacut.commands.foresee import begun_seconds, foresee, whole_seconds
-from alphacut.entry import main
 from alphacut.frame.analyses import tolerances
 from alphacut.stages.store import Stage, StageResult
 from tests.alphacut.small import CELL, FRAME, TWO_FLOORS, summary_of, written

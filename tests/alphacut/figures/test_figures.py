@@ -13,11 +13,19 @@ import xarray
 from alphacut.base.number_text import ShownUnit
 from alphacut.figures import answers, envelope, material
 from alphacut.figures.style import figure_style
-from alphacut.frame import Accelerogram, Decision, Limit, Peak, StoreyFrame, fragility, propagation
+from alphacut.frame import (
+    Accelerogram,
+    Decision,
+    Limit,
+    Output,
+    Peak,
+    StoreyFrame,
+    fragility,
+    propagation,
+)
 from alphacut.frame.analyses.decision import LimitDecision
-from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy import Nature, Triangular
+from alphacut.fuzzy.result import Ends
 from alphacut.report.page import caption, named_words
 from tests.alphacut.small import summary_of, two_floors_run
 

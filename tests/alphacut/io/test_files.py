@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from alphacut.base.errors import FailedError, RefusedError
 from alphacut.base.kept_files import locked, whole_file, write_text
+from alphacut.fuzzy import FailedError, RefusedError
 
 
 def test_a_link_stays_and_its_target_is_replaced(tmp_path):

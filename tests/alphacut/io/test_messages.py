@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
+from alphacut import main
 from alphacut.base.errors import checked_number
 from alphacut.base.extras import MissingLibraryError
-from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, General, Interval, RefusedError, propagate
 from alphacut.io.files import missing

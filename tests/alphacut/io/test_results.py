@@ -11,8 +11,8 @@ import sqlite3
 
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.entry import main
+from alphacut import main
+from alphacut.fuzzy import RefusedError
 from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, summary_of, written
 

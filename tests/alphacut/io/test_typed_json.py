@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from alphacut.base.arrays import Array
-from alphacut.base.nature import Nature
+from alphacut.fuzzy import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import plain_name
 from alphacut.io.typed_json import from_document, to_document

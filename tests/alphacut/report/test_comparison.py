@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from alphacut.frame import SuitePeaks
 from alphacut.report.results import comparison
 from alphacut.stages.summary import Parts

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page
 

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import range_text
 from alphacut.frame import Decision, Peak, SuitePeaks
 from alphacut.frame.analyses.decision import LimitDecision
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy import Nature, RefusedError
+from alphacut.fuzzy.result import Ends
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page
 from alphacut.report.results import answers, drivers, peak_table, run_text

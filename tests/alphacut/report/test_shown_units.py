@@ -6,8 +6,8 @@ import re
 import matplotlib.pyplot as plt
 import pytest
 
+from alphacut import main
 from alphacut.base.number_text import ShownUnit
-from alphacut.entry import main
 from alphacut.figures.style import figure_style, prefix_axis
 from alphacut.frame.analyses.limits import LimitResult
 from alphacut.io.results import ResultsFolder

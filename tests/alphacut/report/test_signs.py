@@ -11,7 +11,7 @@ from alphacut.case.content import load
 from alphacut.case.limits import DecisionSection
 from alphacut.frame import Peak, decide
 from alphacut.frame.analyses.limits import ANY
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import Nature
 from alphacut.report.page import render_template
 from alphacut.report.results import peak_table, run_text
 from alphacut.report.tables import frames, latex, tables, write_csv

@@ -5,14 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.case.content import Content, load
 from alphacut.case.limits import CaseLimit, parse_limit
 from alphacut.figures.answers import DRAWINGS
 from alphacut.frame import Accelerogram, Decision, StoreyFrame, envelope, peaks
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.fuzzy import Interval
+from alphacut.fuzzy import Interval, RefusedError
 from alphacut.io.typed_json import from_document
 from alphacut.stages.answers import ANSWERS
 from tests.alphacut.small import summary_of, summary_of_run, written

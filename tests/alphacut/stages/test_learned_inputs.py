@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from alphacut.entry import main
+from alphacut import main
 from tests.alphacut.small import summary_of
 
 CASE = """

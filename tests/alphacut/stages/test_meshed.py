@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.entry import main
+from alphacut import main
 from alphacut.rve import MeshModel, Phase
 from alphacut.stochastic import TruncatedNormal
 from tests.alphacut.small import CELL, summary_of, summary_of_run, written

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from alphacut.base.errors import FailedError
 from alphacut.case.content import load
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import FailedError, Nature
 from alphacut.io.typed_json import from_document
 from alphacut.report.results import material
 from alphacut.rve.fuzzy_cell import CellSamples, FuzzyCell, require_consistent

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.case.content import load
 from alphacut.case.microstructure import PackingSection
+from alphacut.fuzzy import RefusedError
 from alphacut.stages.cell import CellProblem, require_bounds
 from tests.alphacut.case.test_load import fraction_case
 

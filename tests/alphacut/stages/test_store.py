@@ -11,12 +11,12 @@ import pytest
 import xarray
 
 import alphacut
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut import main
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import load
-from alphacut.entry import main
-from alphacut.frame.analyses.peaks import Peak, mirrored
-from alphacut.fuzzy.result import Nature
+from alphacut.frame import Peak
+from alphacut.frame.analyses.peaks import mirrored
+from alphacut.fuzzy import FailedError, Nature, RefusedError
 from alphacut.io.files import as_json
 from alphacut.io.results import ResultsFolder
 from alphacut.io.typed_json import from_document, to_document

@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut import main
 from alphacut.case.content import load
-from alphacut.entry import main
 from alphacut.figures.answers import draw_incremental
 from alphacut.figures.style import save
 from alphacut.frame import Fragility, spectral_acceleration
 from alphacut.frame.analyses.suites import nominal_mode
+from alphacut.fuzzy import RefusedError
 from alphacut.io.files import BadInput
 from alphacut.io.typed_json import from_document
 from alphacut.stages.suite import suite_records

@@ -2,7 +2,7 @@
 
 import pytest
 
-from alphacut.entry import main
+from alphacut import main
 
 CASE = """
 title = "Columns far from yielding"

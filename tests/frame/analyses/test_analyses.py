@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import (
     Accelerogram,
     Limit,
@@ -24,8 +23,7 @@ from alphacut.frame.analyses.limits import ANY
 from alphacut.frame.analyses.peaks import loose_peaks, tightest
 from alphacut.frame.analyses.probability import shaped_like
 from alphacut.frame.analyses.tolerances import scale_supports
-from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import Interval, Nature, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points
 
 OUTPUTS = ("q1", "drift2", "base_shear")

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, Limit, StoreyFrame, fragility
 from alphacut.frame.analyses.fragility import CriticalMeasures
 from alphacut.frame.analyses.probability import clopper_pearson
-from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy import Nature, RefusedError, Triangular
+from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.numbers import Stepwise
 from tests.frame.analyses.test_analyses import one_level
 

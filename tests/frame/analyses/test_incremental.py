@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import (
     Accelerogram,
     Limit,
@@ -15,6 +14,7 @@ from alphacut.frame import (
     fragility,
     incremental,
     over_records,
+    peaks,
 )
 from alphacut.frame.analyses.fragility import CriticalMeasures, counts_between
 from alphacut.frame.analyses.incremental import (
@@ -25,9 +25,8 @@ from alphacut.frame.analyses.incremental import (
     IncrementalAnalysis,
     Increments,
 )
-from alphacut.frame.analyses.peaks import peaks
 from alphacut.frame.boxes import boxes
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import RefusedError, Triangular
 
 ALPHA = (0.0, 0.5, 1.0)
 STEADY = Accelerogram(0.1, np.ones(60))

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import Accelerogram, StoreyFrame
-from alphacut.frame.analyses.spectral import spectral_acceleration
+from alphacut.frame import Accelerogram, StoreyFrame, spectral_acceleration
 from alphacut.frame.analyses.suites import scaled_records
+from alphacut.fuzzy import RefusedError
 
 
 @pytest.mark.parametrize("period", [0.05, 0.3, 2.0])

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, DualProof, Force, Proof, StoreyFrame, envelope
-from alphacut.frame.records.history import History
+from alphacut.frame import Accelerogram, DualProof, Force, History, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Triangular
 from tests.frame.motions import exact_motions, random_points
 

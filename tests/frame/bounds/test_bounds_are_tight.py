@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    StoreyFrame,
+    UnprovedError,
+)
 from alphacut.frame.bounds.branch_and_bound import (
     Frontier,
     Optima,
@@ -24,7 +32,6 @@ from alphacut.frame.bounds.model_error import (
 )
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes

@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Accelerogram, DualProof, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.bounds import dual_function as kernel
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
-from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import Nature, Triangular
 from tests.frame.motions import exact_motions, random_points, require_inside
 
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from alphacut.frame import Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, Midpoint, StoreyFrame, UnprovedError
 from alphacut.frame.bounds.model_error import EnergyNorms, proved_error
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.fuzzy import Interval

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, Envelope, MatrixStructure, Proof, envelope
-from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame import Accelerogram, Envelope, MatrixStructure, Proof, UnprovedError, envelope
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, require_inside
 

@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, UnprovedError, envelope
 from alphacut.frame.bounds.dual_function import require_in_range, subgradient_step
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.proof import Proof
-from alphacut.frame.records.history import Accelerogram
 from alphacut.fuzzy import Crisp, Triangular
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Force, History, StoreyFrame, envelope
-from alphacut.frame.methods.dual import DualProof
+from alphacut.frame import DualProof, Force, History, StoreyFrame, envelope
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.sets.boxes import quasi_random_points
 

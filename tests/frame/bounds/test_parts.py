@@ -6,13 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
+from alphacut.frame import (
+    Accelerogram,
+    DualProof,
+    Exact,
+    LinearFlow,
+    MatrixStructure,
+    Proof,
+    StoreyFrame,
+    UnprovedError,
+    envelope,
+)
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.fuzzy import Interval, Triangular
 from tests.frame.motions import exact_motions, random_points, require_inside
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from alphacut.frame import Exact, LinearFlow
 from alphacut.frame.bounds.box import Box
 from alphacut.frame.bounds.level import OutputBounds
 from alphacut.frame.bounds.pruning import prune_ends
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from tests.frame.bounds.test_dual_proof import each_storey, near, record, storeys
 
 TIME = np.arange(0, 4.01, 0.05)

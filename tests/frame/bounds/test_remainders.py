@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.frame import StoreyFrame
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
 from alphacut.frame.bounds.level import LevelModels, OutputBounds, _dual_function_data
@@ -15,9 +15,7 @@ from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import Excitation
 from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import inverse_form
-from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import Grid, Oscillators
-from alphacut.frame.structures.matrix import MatrixStructure
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""

@@ -6,9 +6,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame import UnprovedError
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound, solve
-from alphacut.frame.calculus.unproved import UnprovedError
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""

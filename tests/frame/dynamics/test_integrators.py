@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import INTEGRATORS, Accelerogram, Exact, LinearFlow, StoreyFrame
 from alphacut.frame.dynamics.integrators import Integrator
+from alphacut.fuzzy import RefusedError
 from benchmarks.frame.envelopes import FRAME
 from tests.frame.differences import require_derivatives
 

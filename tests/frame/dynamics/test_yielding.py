@@ -6,12 +6,19 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import Accelerogram, Exact, Force, History, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.analyses.peaks import peaks
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    StoreyFrame,
+    envelope,
+    peaks,
+)
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.fuzzy import Interval, Nature, Triangular
+from alphacut.fuzzy import Interval, Nature, RefusedError, Triangular
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
 OMEGA, YIELD_DRIFT = (STIFFNESS / MASS) ** 0.5, YIELD_FORCE / STIFFNESS

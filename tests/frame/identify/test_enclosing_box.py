@@ -3,13 +3,20 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import Limit, StoreyFrame, decide, envelope, identify, peaks, tolerances
+from alphacut.frame import (
+    Limit,
+    StoreyFrame,
+    decide,
+    envelope,
+    identify,
+    measured_mode,
+    peaks,
+    tolerances,
+)
 from alphacut.frame.analyses.fragility import CriticalMeasures
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.identify.modes import measured_mode
-from alphacut.fuzzy import Interval, Signed, from_data, jointly, propagate
-from alphacut.fuzzy.knowledge.known import Knowledge
+from alphacut.fuzzy import Interval, Knowledge, Signed, from_data, jointly, propagate
 
 FRAME = StoreyFrame(
     [20e3, 20e3],

@@ -5,12 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.identify.identify import Identified, RefutedError, identify
-from alphacut.frame.identify.modes import Chain, MeasuredMode, chain_modes, measured_mode
+from alphacut.frame import (
+    Identified,
+    MeasuredMode,
+    RefutedError,
+    StoreyFrame,
+    envelope,
+    identify,
+    measured_mode,
+)
+from alphacut.frame.identify.modes import Chain, chain_modes
 from alphacut.frame.structures.linear import frequencies
-from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
+from alphacut.fuzzy import FuzzyNumber, Interval, RefusedError, Triangular, from_data
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
 NAMES = ("c1", "c2", "c3")

@@ -2,9 +2,8 @@
 
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import StoreyFrame, identify, read_modes
-from alphacut.fuzzy import Crisp, Interval
+from alphacut.fuzzy import Crisp, Interval, RefusedError
 from tests.frame.records.samples import uff55
 
 MODES = "mode,frequency [Hz],q1,q2\n1,1.5,0.5,1\n1,1.6,0.52,1\n2,4,-1,0.5\n"

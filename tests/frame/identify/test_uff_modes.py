@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame.identify.uff_modes import phase_collinearity, uff_mode_rows
+from alphacut.fuzzy import RefusedError
 from tests.frame.records.samples import uff55
 
 FLOORS = {"11.x": 1, "12.x": 2, "13.x": 3}

@@ -7,13 +7,11 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from alphacut import frame
-from alphacut.base.errors import FailedError, RefusedError
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.sampled import independent_excess
-from alphacut.fuzzy import Interval, Triangular
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy import FailedError, Interval, Nature, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points, require_inside
 
 FRAME = StoreyFrame(

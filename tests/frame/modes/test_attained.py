@@ -6,12 +6,10 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Accelerogram, DualProof, StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.modes import superposition
 from alphacut.frame.modes.superposition import _curvature_bound, modes_at
-from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.fuzzy import Interval
 from tests.frame.bounds.test_remainders import masses_on_springs

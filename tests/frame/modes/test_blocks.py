@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
 
-from alphacut.frame import MatrixStructure
+from alphacut.frame import Accelerogram, MatrixStructure, UnprovedError
 from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes import truncated_modes
 from alphacut.frame.modes.blocks import SubspaceEquations
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -29,7 +28,6 @@ from alphacut.frame.modes.truncated_modes import (
     coupling_bounds,
     response_slopes,
 )
-from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.oscillators import (
     Oscillators,
     grid_over,

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, sqrtm
 
-from alphacut.frame import Proof, StoreyFrame, envelope
+from alphacut.frame import Proof, StoreyFrame, UnprovedError, envelope
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.geometric_mean import geometric_mean, right_side_bound
 from alphacut.fuzzy import Interval
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from alphacut.frame import UnprovedError
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.intervening import BlockParticipation, Excitation
 from alphacut.frame.modes.truncated_modes import (

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
+from alphacut.fuzzy import RefusedError
 
 N_SAMPLES, STEP = 403, 0.02
 WAVES = [k * 250 * np.sin(0.05 * np.arange(N_SAMPLES) + k) for k in (1, 2, 3)]

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
+from alphacut.fuzzy import RefusedError
 from tests.frame.records import samples as written
 
 NAMED = "NPTS=   400, DT=   .0050 SEC,"

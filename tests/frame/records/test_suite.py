@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, read_matrix, read_modes, read_record, read_suite
+from alphacut.fuzzy import RefusedError
 
 
 def write_column(path, samples):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.tables import read_force_history
+from alphacut.fuzzy import RefusedError
 
 G = 9.80665
 STEP = 1 / 256

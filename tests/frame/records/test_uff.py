@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.uff import floats
+from alphacut.fuzzy import RefusedError
 from tests.frame.records.samples import uff58
 
 

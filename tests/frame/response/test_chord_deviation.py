@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.records.history import History
+from alphacut.frame import History
 from alphacut.frame.response.chord_deviation import Response, narrowed_deviation
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import grid_over

@@ -6,9 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame import Accelerogram, History, UnprovedError
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.response.duhamel import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,

@@ -6,8 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame import Accelerogram, History
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.records.history import Accelerogram, History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.response.load_tables import LoadTable
 

@@ -6,9 +6,14 @@ import pickle
 
 import numpy as np
 
-from alphacut.frame import LinearFlow, Midpoint, StoreyFrame
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+from alphacut.frame import (
+    LagrangianFlow,
+    LagrangianSystem,
+    LinearFlow,
+    Midpoint,
+    StoreyFrame,
+    pendulum,
+)
 from tests.frame.differences import require_derivatives
 
 SWING = pendulum(phi0=1.5, damping=0.1)

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.records.history import Accelerogram
-from alphacut.fuzzy import Interval
+from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, UnprovedError, envelope
+from alphacut.fuzzy import Interval, RefusedError
 from tests.frame.motions import exact_motions
 
 K = np.array([[3.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 1.5, -0.4], [0, 0, -0.4, 1.0]])

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import damping_from_loss
-from alphacut.fuzzy import Triangular
+from alphacut.fuzzy import RefusedError, Triangular
 
 
 def test_joints_come_on_top_on_every_level():

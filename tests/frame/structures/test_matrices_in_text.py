@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import read_matrix
+from alphacut.fuzzy import RefusedError
 
 MATRIX = np.array([[2.5e6, -1.25, 0], [-1.25, 3e-3, 7], [0, 7, 1]])
 

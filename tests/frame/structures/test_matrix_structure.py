@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
-from alphacut.frame.records.history import History
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    MatrixStructure,
+    StoreyFrame,
+    envelope,
+)
 from alphacut.frame.structures.linear import frequencies
-from alphacut.frame.structures.loads import Force
 from alphacut.frame.structures.matrix import Monomial
-from alphacut.fuzzy import Interval
+from alphacut.fuzzy import Interval, RefusedError
 
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
 HISTORIES = (History(0.3, [1.0, 1.6, 0.4], is_static=True), History.harmonic(1.3, 0.4, 0.35), None)

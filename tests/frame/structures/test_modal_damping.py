@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.verification.exact_motion import LinearMotion
-from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy import Interval, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points, require_inside
 from tests.frame.verification.test_exact_motion import UNFORCED
 

@@ -9,12 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.frame import Output, StoreyFrame, envelope
-from alphacut.frame.analyses.peaks import peaks
+from alphacut.frame import Output, StoreyFrame, envelope, peaks
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_frame
-from alphacut.fuzzy import Interval, Nature
+from alphacut.fuzzy import Interval, Nature, RefusedError
 
 FRAME = StoreyFrame((1.0, 2.0), (1.0, 1.0), 1.0, 1.0, q0=(1.0, 0.0))
 

@@ -8,8 +8,8 @@ import scipy.io
 import scipy.sparse
 
 from alphacut.base import memory
-from alphacut.base.errors import RefusedError
 from alphacut.frame import read_matrix
+from alphacut.fuzzy import RefusedError
 
 MATRIX = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, -0.25], [0.0, -0.25, 2.0]])
 WRITE = {

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import sympy
 
-from alphacut.base.errors import RefusedError
 from alphacut.frame import (
     Accelerogram,
     Force,
@@ -22,6 +21,7 @@ from alphacut.frame import (
     pendulum,
 )
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.fuzzy import RefusedError
 
 COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
 SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))

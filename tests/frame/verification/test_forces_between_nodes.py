@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.base.errors import FailedError
 from alphacut.frame import Auto, DualProof, Force, History, Proof, StoreyFrame, envelope
 from alphacut.frame.modes.truncated_modes import _largest_within_steps
 from alphacut.frame.response.chord_deviation import line_deviations
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import ContradictionError
-from alphacut.fuzzy import Interval
+from alphacut.fuzzy import FailedError, Interval
 
 STEPS = 12
 

@@ -7,16 +7,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from alphacut.base.errors import FailedError
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.envelope import Ends
-from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.proof import Proof
-from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import ContradictionError, Trial
-from alphacut.fuzzy import Crisp, Triangular
+from alphacut.fuzzy import Crisp, FailedError, Triangular
 
 INPUTS = {"k1": Triangular(3.9e6, 4e6, 4.1e6), "m2": Triangular(990.0, 1e3, 1020.0)}
 METHODS = [Proof(gap=1e-5), DualProof(gap=1e-3)]

@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from alphacut.base.errors import FailedError, RefusedError
 from alphacut.frame import (
     Accelerogram,
     Exact,
@@ -24,7 +23,7 @@ from alphacut.frame import (
 from alphacut.frame.dynamics.flow import StepError
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
-from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy import FailedError, Interval, RefusedError, Triangular
 
 DUFFING = LagrangianSystem(
     1,

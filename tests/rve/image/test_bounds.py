@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import FailedError
+from alphacut.fuzzy import FailedError
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
 from alphacut.rve.image.fields.element import element_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve.image.bounds import Enclosure
 from alphacut.rve.image.files import read_grid
 from alphacut.rve.image.memory import needed_memory

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phases import ModuliInterval, moduli_images
 from alphacut.stochastic.segmentation import segment

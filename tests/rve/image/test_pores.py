@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.base.errors import RefusedError
-from alphacut.fuzzy import Interval, Triangular, from_data
+from alphacut.fuzzy import Interval, RefusedError, Triangular, from_data
+from alphacut.rve import GreyImage, fuzzy_image_stiffness
 from alphacut.rve.image.fields.element import element_of, stress_derivatives
 from alphacut.rve.image.fields.energy import modes_of
 from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.model import ImageModel, solve_image
 from alphacut.rve.image.phases import ModuliImages
-from alphacut.rve.image.study import GreyImage, fuzzy_image_stiffness
 
 E, NU = 1.0, 0.25
 K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from alphacut.fuzzy import RefusedError
+from alphacut.rve import read_image
 from alphacut.rve.image.files import files_of, read_grid
 from alphacut.rve.image.memory import require_memory
-from alphacut.rve.image.study import read_image
 
 tifffile = pytest.importorskip("tifffile")
 SHAPE, CUBE = (12, 5, 7), (1, 1, 1)

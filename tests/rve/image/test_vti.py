@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve import GreyImage, image_fields
 from alphacut.rve.image.vti import write_vti
 

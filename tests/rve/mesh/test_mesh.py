@@ -5,8 +5,9 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
-from alphacut.rve.cell.outline import Ellipse, area, circle
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import Ellipse
+from alphacut.rve.cell.outline import area, circle
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude

@@ -7,7 +7,8 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve.cell.outline import Ellipse, circle
+from alphacut.rve import Ellipse
+from alphacut.rve.cell.outline import circle
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude, grid_of
 from alphacut.rve.mesh.file import read_prisms

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.stochastic import HermiteMap

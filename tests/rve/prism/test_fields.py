@@ -5,8 +5,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve.cell.cell import LOADS, Phase
-from alphacut.rve.prism.model import PrismModel
+from alphacut.rve import LOADS, Phase, PrismModel
 from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap
 

@@ -8,7 +8,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 import ufl
 from dolfinx import fem
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve import LevelSetModel, MeshModel, Phase, PrismModel, ProductSpace
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from tests.rve.prism.test_own_mesh import MESHES

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve import LevelSetModel, Phase, SeriesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 

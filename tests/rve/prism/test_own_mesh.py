@@ -11,9 +11,9 @@ from scipy.spatial import KDTree
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
-from alphacut.rve import MeshModel, Phase, PrismModel
-from alphacut.rve.cell.outline import Ellipse, circle
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import Ellipse, MeshModel, Phase, PrismModel
+from alphacut.rve.cell.outline import circle
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import (

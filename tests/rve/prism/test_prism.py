@@ -5,21 +5,23 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
-from alphacut.fuzzy import Interval
-from alphacut.rve import fuzzy_stiffness
-from alphacut.rve.cell.cell import Phase, VoigtPhase
-from alphacut.rve.cell.outline import Ellipse
+from alphacut.fuzzy import Interval, RefusedError
+from alphacut.rve import (
+    Ellipse,
+    Phase,
+    PrismModel,
+    SeriesModel,
+    SlicesModel,
+    VoigtPhase,
+    fuzzy_stiffness,
+    loss_factors,
+)
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
-from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.modulus_basis import ModulusBasis
 from alphacut.rve.prism.problem import FoldedMeshError
 from alphacut.rve.prism.slices import slice_mesh
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
-from alphacut.rve.result.loss_factors import loss_factors
-from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.stochastic import HermiteMap
 from tests.rve.series.test_series import EXACT

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import RefusedError
 from alphacut.rve import LOADS, LevelSetModel, MeshModel, Phase, PrismModel, ProductSpace
 from alphacut.rve.fenicsx import PETSc, fem, ufl
 from alphacut.rve.solver.krylov import solve

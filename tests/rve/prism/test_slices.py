@@ -11,7 +11,8 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve.cell.cell import AREA, THREE_LOADS, Phase
+from alphacut.rve import Phase
+from alphacut.rve.cell.cell import AREA, THREE_LOADS
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.periodicity import unknowns

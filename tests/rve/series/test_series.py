@@ -3,12 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.rve import Phase
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import Phase, SeriesModel, SlicesModel
 from alphacut.rve.result.moduli import square_moduli
 from alphacut.rve.series.means import RuleError, SeriesError
-from alphacut.rve.series.model import CIRCLES, SeriesModel, square_stiffness
-from alphacut.rve.slices.model import SlicesModel
+from alphacut.rve.series.model import CIRCLES, square_stiffness
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from tests.rve.test_result import Bent
 

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.base.errors import RefusedError
-from alphacut.rve import Phase
-from alphacut.rve.cell.cell import Cell, VoigtPhase
-from alphacut.rve.cell.outline import Ellipse, circle
+from alphacut.fuzzy import RefusedError
+from alphacut.rve import Cell, Ellipse, Phase, SeriesModel, VoigtPhase
+from alphacut.rve.cell.outline import circle
 from alphacut.rve.result.moduli import axial_moduli, square_moduli
-from alphacut.rve.series.model import SeriesModel, square_stiffness
+from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap, gauss_rule
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
+from alphacut.rve import SlicesModel
 from alphacut.rve.mesh.curved import plane_mesh
-from alphacut.rve.slices.model import PlaneCell, SlicesModel, solve_slice, theta_error
+from alphacut.rve.slices.model import PlaneCell, solve_slice, theta_error
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9)
 ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 40e9, 0.0), (5e9, 0.0, 25e9)))

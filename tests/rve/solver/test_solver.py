@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve.cell.cell import Phase
+from alphacut.rve import Phase
 from alphacut.rve.fenicsx import MPI, PETSc, option_is_used
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.prism.problem import PrismProblem

@@ -3,10 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.rve import Phase
+from alphacut.rve import Phase, SpheresModel
 from alphacut.rve.result.checks import CertificateError
 from alphacut.rve.result.moduli import hashin_shtrikman, mori_tanaka
-from alphacut.rve.spheres.model import SpheresModel
 from alphacut.rve.spheres.result import cubic_moduli, cubic_voigt, hill_average, spheres_with_checks
 from alphacut.stochastic import HermiteMap
 
