@@ -11,6 +11,7 @@ from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.intervening import BlockParticipation, Excitation
 from alphacut.frame.modes.truncated_modes import (
     _coupling_factors,
+    _largest_within_steps,
     coupling_bounds,
     inverse_form,
 )
@@ -145,3 +146,21 @@ def test_a_block_whose_modal_masses_may_be_singular_is_refused():
     structure = SimpleNamespace(output_factors=TaylorModel.constant(np.ones(1), 1))
     with pytest.raises(UnprovedError, match="singular"):
         _coupling_factors(structure, of_block)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_slope_of_a_slow_mode_within_a_step_is_bounded(order, rng):
+    """d/dσ of σ^order ∫ exp(σ s) ds from 0 to h, at σ = iω."""
+    for omega in 10 ** rng.uniform(-3, 1, 10):
+        h = rng.uniform(0.1, 1.0)
+        time = np.array([0.0, h])
+        _, slopes = _largest_within_steps(
+            np.zeros((2, 2)), time, max_force=1.0, max_sigma=omega, order=order
+        )
+        s = np.linspace(0, h, 4001)
+        waves = np.exp(1j * omega * s)
+        power = (1j * omega) ** order
+        exact = power * np.trapezoid(s * waves, s)
+        if order:
+            exact += order * (1j * omega) ** (order - 1) * np.trapezoid(waves, s)
+        assert slopes[1] >= abs(exact) * (1 - 1e-6)

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from alphacut.frame import History
-from alphacut.frame.response.chord_deviation import Response, narrowed_deviation
+from alphacut.frame.response.chord_deviation import (
+    Response,
+    line_deviations,
+    narrowed_deviation,
+)
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.oscillators import grid_over
 
@@ -209,3 +213,17 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
             assert low[-3, 0] <= off[20] <= high[-3, 0]
         else:
             assert np.abs(off).max() <= response.line_deviation(TIME)[-1, 0]
+
+
+def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
+    for _ in range(40):
+        omega = 10 ** rng.uniform(-1, 2)
+        step, count = rng.uniform(0.01, 0.45) / omega, int(rng.integers(1, 60))
+        force = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
+        time = np.arange(count + 1) * step
+        row = (-0.01 + 1j) * np.array([[0.01 * omega, 0.0101 * omega]])
+        sigma = np.vstack([row, row * 1.0001])
+        bound = line_deviations(sigma, force, time, (2,), is_force=True)[2][1].max()
+        fine = np.linspace(0, time[-1], 40 * count + 1)
+        chord = np.interp(fine, time, force.values(time))
+        assert bound >= np.abs(force.values(fine) - chord).max()

@@ -5,13 +5,9 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Auto, DualProof, Force, History, Proof, StoreyFrame, envelope
-from alphacut.frame.modes.truncated_modes import _largest_within_steps
-from alphacut.frame.response.chord_deviation import line_deviations
-from alphacut.frame.verification import self_test
-from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy import FailedError, Interval
 
-STEPS = 12
+STEPS = 8
 
 
 def zero_at(step, parts, rng):
@@ -50,8 +46,7 @@ def acceleration(mass, omega, ratio, force, amplitude, times):
     return out
 
 
-@pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1), Auto(workers=1)])
-@pytest.mark.parametrize("parts", [1, 4])
+@pytest.mark.parametrize(("method", "parts"), [(Proof(workers=1), 4), (DualProof(workers=1), 1)])
 def test_no_acceleration_leaves_its_bounds_between_nodes(method, parts, rng):
     step, mass = 0.05, 2.0
     stiffness = float(mass * rng.uniform(0.5, 6.0) ** 2)
@@ -99,51 +94,8 @@ def test_the_test_of_an_envelope_sees_forces_that_vanish_at_quarter_points(monke
 
     monkeypatch.setattr(Proof, "run", forgetful)
     motion = {"duration": STEPS * step, "step": step, "alpha": [0.0], "progress": False}
-    with pytest.raises(ContradictionError, match="a1 at t"):
+    with pytest.raises(FailedError, match="the proof is wrong: a1 at t"):
         envelope(frame, {"m1": Interval(1.9, 2.1)}, Proof(workers=1), **motion)
-
-
-def test_times_within_steps_are_the_same_in_each_test_and_others_in_other_cases():
-    time, ends = np.linspace(0, 1, 11), np.array([[1.0, 2.0]])
-    first = self_test.fractions_of_steps(time, ends, ends + 1)
-    assert np.array_equal(first, self_test.fractions_of_steps(time, ends, ends + 1))
-    other = self_test.fractions_of_steps(time, ends, ends + 1.0000001)
-    assert not np.isclose(first[:, 1:], other[:, 1:]).any()
-    assert (first[:, 0] == 0).all()
-    assert (np.diff(first, axis=1) > 0).all()
-    assert first.max() < 1
-
-
-def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
-    for _ in range(40):
-        omega = 10 ** rng.uniform(-1, 2)
-        step, count = rng.uniform(0.01, 0.45) / omega, int(rng.integers(1, 60))
-        force = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
-        time = np.arange(count + 1) * step
-        row = (-0.01 + 1j) * np.array([[0.01 * omega, 0.0101 * omega]])
-        sigma = np.vstack([row, row * 1.0001])
-        bound = line_deviations(sigma, force, time, (2,), is_force=True)[2][1].max()
-        fine = np.linspace(0, time[-1], 40 * count + 1)
-        chord = np.interp(fine, time, force.values(time))
-        assert bound >= np.abs(force.values(fine) - chord).max()
-
-
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_the_slope_of_a_slow_mode_within_a_step_is_bounded(order, rng):
-    """d/dσ of σ^order ∫ exp(σ s) ds from 0 to h, at σ = iω."""
-    for omega in 10 ** rng.uniform(-3, 1, 10):
-        h = rng.uniform(0.1, 1.0)
-        time = np.array([0.0, h])
-        _, slopes = _largest_within_steps(
-            np.zeros((2, 2)), time, max_force=1.0, max_sigma=omega, order=order
-        )
-        s = np.linspace(0, h, 4001)
-        waves = np.exp(1j * omega * s)
-        power = (1j * omega) ** order
-        exact = power * np.trapezoid(s * waves, s)
-        if order:
-            exact += order * (1j * omega) ** (order - 1) * np.trapezoid(waves, s)
-        assert slopes[1] >= abs(exact) * (1 - 1e-6)
 
 
 def test_a_harmonic_force_and_an_acceleration_are_proved_with_seven_inputs():
@@ -173,8 +125,8 @@ def test_a_harmonic_force_and_an_acceleration_are_proved_with_seven_inputs():
 @pytest.mark.parametrize("is_small", [True, False], ids=["dual", "auto"])
 def test_modes_known_by_sums_feel_a_force_that_vanishes_at_nodes(is_small):
     """A mass of 1 kg on 1e6 kg: within a step its acceleration is the force over the mass."""
-    step, amplitude = 0.001, 0.1
-    samples = np.zeros(41)
+    step, steps, amplitude = 0.001, 8, 0.1
+    samples = np.zeros(2 * steps + 1)
     samples[1::2] = 1.0
     mass, stiffness = np.diag([1e6, 1.0]), np.array([[1e6 + 9, -9.0], [-9.0, 9.0]])
     _, shapes = eigh(stiffness, mass)  # the start leaves the second mode at rest
@@ -194,7 +146,7 @@ def test_modes_known_by_sums_feel_a_force_that_vanishes_at_nodes(is_small):
         for x in names
     }
     method = DualProof(workers=1) if is_small else Auto(workers=1)
-    motion = {"duration": 20 * step, "step": step, "alpha": [0.0], "progress": False}
+    motion = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
     bounds = envelope(frame, inputs, method, **motion)
     assert bounds.nature == "guaranteed"
     assert amplitude * 0.999 <= bounds.between[:, 0].max() <= 1.2 * amplitude
@@ -203,8 +155,8 @@ def test_modes_known_by_sums_feel_a_force_that_vanishes_at_nodes(is_small):
 @pytest.mark.parametrize(("start", "gap"), [(0.0, 0.1), (1.0, 0.1), (1e3, 1e-2)])
 def test_what_a_model_errs_of_a_force_that_vanishes_at_nodes_is_counted(start, gap):
     """Soft springs and masses of ± 35 %: the acceleration between nodes is F/m, up to 1/0.65."""
-    step = 0.1
-    samples = np.zeros(161)
+    step, steps = 0.1, 4
+    samples = np.zeros(8 * steps + 1)
     samples[1::2] = 1.0
     frame = StoreyFrame(
         masses=[1.0],
@@ -215,7 +167,7 @@ def test_what_a_model_errs_of_a_force_that_vanishes_at_nodes_is_counted(start, g
         loads=[Force(1, 1.0, History(step / 8, samples))],
     )
     method = Proof(gap=gap, tolerance=gap, workers=1)
-    motion = {"duration": 20 * step, "step": step, "alpha": [0.0], "progress": False}
+    motion = {"duration": steps * step, "step": step, "alpha": [0.0], "progress": False}
     bounds = envelope(frame, {"m1": Interval(0.65, 1.35)}, method, **motion)
     # the springs' part of the acceleration of the lightest mass falls from k q0/m
     spring = 1e-6 * start / 0.65

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from alphacut.frame import (
-    Auto,
     DualProof,
     Force,
     GraphFollower,
@@ -17,7 +16,7 @@ from alphacut.frame.verification.exact_motion import LinearMotion, LoadHistory
 from alphacut.fuzzy import Interval
 from tests.frame.motions import random_points
 
-FRAMES, MOTIONS = 3, 16
+MOTIONS = 12
 RANDOM, EQUAL = 20, 47
 """Times within each step: random ones, and equally spaced ones that show what motions stray."""
 
@@ -138,19 +137,20 @@ def ratios_of_a_random_frame(method, rng):
 
 @pytest.mark.parametrize(
     "method",
-    [Proof(workers=1), DualProof(workers=1, slabs=4), Auto(workers=1), GraphFollower()],
+    [Proof(workers=1), DualProof(workers=1, slabs=4), GraphFollower()],
     ids=lambda method: method.name,
 )
-def test_bounds_hold_at_all_times_and_are_close_between_nodes(method, rng):
-    ratios = np.concatenate([ratios_of_a_random_frame(method, rng) for _ in range(FRAMES)])
+@pytest.mark.parametrize("frames", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_bounds_hold_at_all_times_and_are_close_between_nodes(frames, method, rng):
+    ratios = np.concatenate([ratios_of_a_random_frame(method, rng) for _ in range(frames)])
     assert np.median(ratios) <= 3.0
 
 
-@pytest.mark.parametrize("count", [11, 16], ids=["inner node", "last node"])
+@pytest.mark.parametrize("count", [5, 7], ids=["inner node", "last node"])
 @pytest.mark.parametrize("method", [Proof(workers=1), DualProof(workers=1)], ids=["proof", "dual"])
 def test_the_jump_of_a_force_at_a_node_widens_no_bound(method, count, rng):
     """With it the acceleration jumps, by far more than motions lie beyond their nodes."""
-    step, steps = 0.02, 75
+    step, steps = 0.02, 30
     samples = rng.uniform(1.0, 1.6, count)
     samples[-1] = 3.0  # the force rises until it ends, so that motions exceed both nodes there
     frame = StoreyFrame(

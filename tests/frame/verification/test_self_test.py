@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, Proof, StoreyFrame, envelope
-from alphacut.frame.boxes import boxes
-from alphacut.frame.envelope import Ends
-from alphacut.frame.verification import self_test
-from alphacut.frame.verification.self_test import ContradictionError, Trial
+from alphacut.frame.verification.self_test import (
+    ContradictionError,
+    Trial,
+    fractions_of_steps,
+    inputs_at_peaks,
+    structures_at,
+    with_motions_tested,
+)
 from alphacut.fuzzy import Crisp, FailedError, Triangular
 
 INPUTS = {"k1": Triangular(3.9e6, 4e6, 4.1e6), "m2": Triangular(990.0, 1e3, 1020.0)}
@@ -32,10 +36,10 @@ def frame():
 motion = partial(envelope, duration=1.0, step=0.02, alpha=(0.0, 0.5, 1.0), progress=False)
 
 
-def planted(monkeypatch, method, change):
-    """Lets a fault into the envelope that a method returns."""
-    run = type(method).run
-    monkeypatch.setattr(type(method), "run", lambda *given: change(run(*given)))
+@pytest.fixture(scope="module")
+def found():
+    """The right envelope of each method, with its tests passed."""
+    return {method.name: motion(frame(), INPUTS, method=method) for method in METHODS}
 
 
 def narrower(found):
@@ -45,7 +49,7 @@ def narrower(found):
 def smaller(found):
     """Proved bounds that are too small, past the comparison with what is attained."""
     faulty = copy(found)
-    vars(faulty)["proved"] = Ends(found.proved.lower, 0.98 * found.proved.upper)
+    vars(faulty)["proved"] = found.proved._replace(upper=0.98 * found.proved.upper)
     return faulty
 
 
@@ -57,7 +61,7 @@ def attained_off(found, share):
     """One attained value, that of the first output's peak, differs by a share."""
     upper, node = found.inner.upper.copy(), found.upper[0, :, 0].argmax()
     upper[0, node, 0] *= 1 + share
-    return replace(found, inner=Ends(found.inner.lower, upper))
+    return replace(found, inner=found.inner._replace(upper=upper))
 
 
 def no_number(found):
@@ -77,8 +81,8 @@ def no_number(found):
         (no_number, "nan|inf"),
     ],
 )
-def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
-    planted(monkeypatch, method, change)
+def test_a_fault_in_the_result_raises(monkeypatch, found, method, change, words):
+    monkeypatch.setattr(type(method), "run", lambda *_: change(found[method.name]))
     with pytest.raises(FailedError, match=words):
         motion(frame(), INPUTS, method=method)
 
@@ -86,19 +90,18 @@ def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
 @pytest.mark.parametrize(
     ("change", "check"), [(smaller, "require_inside"), (straight, "require_interpolation_error")]
 )
-def test_each_check_alone_sees_its_fault(change, check):
-    found = motion(frame(), INPUTS, method=METHODS[0])
-    faulty, others = (
-        change(found),
-        {"require_inside", "require_interpolation_error", "require_attained"},
-    )
-    cuts, points = boxes(found.inputs, found.alpha), self_test.inputs_at_peaks(found, 0)
+def test_each_check_alone_sees_its_fault(found, change, check):
+    found = found["proof"]
+    faulty = change(found)
+    others = {"require_inside", "require_interpolation_error", "require_attained"}
+    points = inputs_at_peaks(found, 0)
+    cuts = np.array([[x.cut(alpha) for x in found.inputs.values()] for alpha in found.alpha])
     with pytest.MonkeyPatch.context() as patch:
         for other in others - {check}:
             patch.setattr(Trial, other, lambda *_: None)
         with pytest.raises(ContradictionError):
-            Trial(faulty, cuts.lower, cuts.upper).require_agreement(
-                points, self_test.structures_at(frame(), faulty, points)
+            Trial(faulty, cuts[..., 0], cuts[..., 1]).require_agreement(
+                points, structures_at(frame(), faulty, points)
             )
 
 
@@ -111,7 +114,7 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
     system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
     found = motion(system, inputs, method=DualProof(), alpha=(1.0,))
     wide = np.abs(found.upper).max(1, keepdims=True) * np.ones_like(found.upper)
-    (exact,) = self_test.structures_at(system, found, np.array([[4e6]]))
+    (exact,) = structures_at(system, found, np.array([[4e6]]))
     deviation = np.zeros_like(found.between)
     nodes = exact.outputs(found.time)[0]
     for fraction in np.arange(1, 40) / 40:
@@ -122,7 +125,7 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
         found, lower=-3 * wide, upper=3 * wide, inner=None, outer=None, between=0.75 * deviation
     )
     with pytest.raises(ContradictionError, match="from the straight line"):
-        self_test.with_motions_tested(faulty, system)
+        with_motions_tested(faulty, system)
 
 
 def between_too_small(found, exact):
@@ -143,7 +146,7 @@ def between_too_small(found, exact):
 
 def smaller_by_rounding(found, _):
     faulty = copy(found)
-    vars(faulty)["proved"] = Ends(found.proved.lower, (1 - 1e-8) * found.proved.upper)
+    vars(faulty)["proved"] = found.proved._replace(upper=(1 - 1e-8) * found.proved.upper)
     return faulty
 
 
@@ -160,7 +163,7 @@ def test_a_fault_far_below_all_tolerances_is_seen_by_its_check(change, check, wo
     system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
     found = motion(system, {"k1": Crisp(4e6)}, method=DualProof(), alpha=(1.0,))
     point = np.array([[4e6]])
-    (exact,) = self_test.structures_at(system, found, point)
+    (exact,) = structures_at(system, found, point)
     faulty, others = change(found, exact), {"require_inside", "require_attained"}
     with pytest.MonkeyPatch.context() as patch:
         for other in (others | {"require_interpolation_error"}) - {check}:
@@ -172,3 +175,14 @@ def test_a_fault_far_below_all_tolerances_is_seen_by_its_check(change, check, wo
 def test_inputs_without_width_are_tested_at_their_one_point():
     found = motion(frame(), {"k1": Crisp(4e6)}, method=DualProof())
     assert found.facts["motions_tested"] == 1
+
+
+def test_times_within_steps_are_the_same_in_each_test_and_others_in_other_cases():
+    time, ends = np.linspace(0, 1, 11), np.array([[1.0, 2.0]])
+    first = fractions_of_steps(time, ends, ends + 1)
+    assert np.array_equal(first, fractions_of_steps(time, ends, ends + 1))
+    other = fractions_of_steps(time, ends, ends + 1.0000001)
+    assert not np.isclose(first[:, 1:], other[:, 1:]).any()
+    assert (first[:, 0] == 0).all()
+    assert (np.diff(first, axis=1) > 0).all()
+    assert first.max() < 1

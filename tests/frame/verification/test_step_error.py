@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
+from scipy.linalg import eigvalsh, expm
 
 from alphacut.frame import (
     Accelerogram,
@@ -20,8 +20,6 @@ from alphacut.frame import (
     envelope,
     pendulum,
 )
-from alphacut.frame.dynamics.flow import StepError
-from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import FailedError, Interval, RefusedError, Triangular
 
@@ -33,31 +31,38 @@ DUFFING = LagrangianSystem(
     {"x": lambda q, v, p: q[0]},
     lambda q, v, p: [-p["c"] * v[0]],
 )
-MOTION = {"duration": 10.0, "step": 0.02, "alpha": (0,), "progress": False}
+MOTION = {"duration": 5.0, "step": 0.04, "alpha": (0,), "progress": False}
 
 
-def truth(a, c):
-    nodes = np.linspace(0, 10, 501)
-    right = lambda t, y: [y[1], -y[0] - a * y[0] ** 3 - c * y[1]]  # noqa: E731
-    return solve_ivp(right, (0, 10), [1, 0], t_eval=nodes, rtol=1e-9, atol=1e-11).y[:1].T
+def truth(a, c, time):
+    """Motions of the oscillator at the nodes for parameters (S,), shape (S, T)."""
+
+    def right(_, state):
+        x, v = np.split(state, 2)
+        return np.append(v, -x - a * x**3 - c * v)
+
+    start = np.append(np.ones(len(a)), np.zeros(len(a)))
+    accuracy = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-11}
+    return solve_ivp(right, (0, time[-1]), start, t_eval=time, **accuracy).y[: len(a)]
 
 
 def test_the_declared_error_covers_that_of_time_stepping():
     inputs = {"a": Triangular(0.3, 0.5, 0.8), "c": Triangular(0.05, 0.1, 0.2)}
-    values = np.array([truth(a, c) for a in np.linspace(0.3, 0.8, 11) for c in (0.05, 0.1, 0.2)])
+    a, c = np.meshgrid(np.linspace(0.3, 0.8, 11), [0.05, 0.1, 0.2])
     found = envelope(DUFFING, inputs, method=ImprovedFollower(1e-3), **MOTION)
+    values = truth(a.ravel(), c.ravel(), found.time)[..., None]
     missed = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
     assert (missed <= found.error[0] + 1e-9).all()
     assert missed.max() > 3e-4
 
 
-@pytest.mark.parametrize("step", [0.02, 0.1])
+@pytest.mark.parametrize("step", [0.04, 0.1])
 def test_the_estimate_is_the_error_of_the_steps(step):
     """Attained bounds of a single motion are those of its steps, give or take their error."""
     motion = {**MOTION, "step": step, "method": Sampled(4)}
     found = envelope(DUFFING, {"a": Interval(0.5, 0.5)}, **motion)
-    values = LagrangianFlow(DUFFING, (), 10.0, step).values(np.zeros((1, 0)))[0]
-    off = np.abs(values - truth(0.5, 0.1)[:: round(step / 0.02)]).max()
+    values = LagrangianFlow(DUFFING, (), 5.0, step).values(np.zeros((1, 0)))[0]
+    off = np.abs(values[:, 0] - truth(np.full(1, 0.5), 0.1, found.time)[0]).max()
     assert found.nature == "attained"
     assert "estimated_error" not in found.facts  # how far other motions go is not known
     assert found.basis == (f"midpoint steps of {step:g} s",)
@@ -97,21 +102,25 @@ def test_motions_that_do_not_exist_and_steps_that_fail_are_named():
         envelope(falling, {"a": Interval(2.9, 3)}, Sampled(4), duration=3, step=0.6)
 
 
-def angle(parameters, time):
-    """Angle of the pendulum, from its equation of motion written here."""
+def angles(parameters, starts, time):
+    """Angles of the pendulum let go at some, (S, T), from its equation of motion written here."""
     p = parameters
     damping = p["d"] / (p["m"] * p["l"] ** 2)
-    right = lambda t, y: [y[1], -p["g"] / p["l"] * np.sin(y[0]) - damping * y[1]]  # noqa: E731
+
+    def right(_, state):
+        phi, omega = np.split(state, 2)
+        return np.append(omega, -p["g"] / p["l"] * np.sin(phi) - damping * omega)
+
     accuracy = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12}
-    start = [p["phi_0"], p["omega_0"]]
-    return solve_ivp(right, (0, time[-1]), start, t_eval=time, **accuracy).y[0]
+    state = np.append(starts, np.full(len(starts), p["omega_0"]))
+    return solve_ivp(right, (0, time[-1]), state, t_eval=time, **accuracy).y[: len(starts)]
 
 
 def test_a_step_too_coarse_near_the_upright_is_refused_and_a_finer_one_taken():
     near_upright, inputs = pendulum(phi0=3.0, damping=0.01), {"omega_0": Interval(0.4435, 0.4445)}
     motion = {"duration": 5.0, "alpha": (0,), "method": Sampled(32), "progress": False}
     with pytest.raises(
-        StepError, match=r"too coarse where a bound is attained, at omega_0 = .*smaller step"
+        FailedError, match=r"too coarse where a bound is attained, at omega_0 = .*smaller step"
     ):
         envelope(near_upright, inputs, step=0.05, **motion)
     assert envelope(near_upright, inputs, step=0.00625, **motion).error.max() > 0
@@ -124,12 +133,11 @@ def test_declared_errors_hold_where_bounds_are_attained(low):
     found = envelope(system, inputs, method=Sampled(16), **motion)
     output = list(found.outputs).index("phi")
     for places, bounds in ((found.lower_at, found.lower), (found.upper_at, found.upper)):
-        for point in np.unique(places[0, :, output], axis=0):
-            named = (places[0, :, output] == point).all(-1)
-            exact = angle({**system.parameters, "phi_0": point[0]}, found.time)
-            off = np.abs(exact - bounds[0, :, output])[named]
-            assert (off <= found.error[0, named, output] + 1e-9).all()
-            assert found.error[0, -1, output] < 0.1  # the error is not simply large
+        starts, row = np.unique(places[0, :, output, 0], return_inverse=True)
+        exact = angles(system.parameters, starts, found.time)[row, np.arange(len(row))]
+        off = np.abs(exact - bounds[0, :, output])
+        assert (off <= found.error[0, :, output] + 1e-9).all()
+        assert found.error[0, -1, output] < 0.1  # the error is not simply large
 
 
 def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
@@ -137,7 +145,10 @@ def test_modes_that_turn_several_times_within_a_step_are_seen() -> None:
         random = np.random.default_rng(seed)
         stiffness, start = 10 ** random.uniform(5, 6.5, 3), 0.01 * random.normal(size=3)
         frame = StoreyFrame((1e4,) * 3, stiffness=stiffness, q0=start, damping_ratio=0.01)
-        step, point = random.uniform(15, 50) / frequencies(frame)[-1], np.empty((1, 0))
+        springs = np.diag(stiffness + np.append(stiffness[1:], 0))
+        springs -= np.diag(stiffness[1:], 1) + np.diag(stiffness[1:], -1)
+        highest = np.sqrt(eigvalsh(springs / 1e4)[-1])
+        step, point = random.uniform(15, 50) / highest, np.empty((1, 0))
         found = node_deviation(LinearFlow(frame, (), 12 * step, step, Exact()), point)
         fine = LinearFlow(frame, (), 12 * step, step / 100, Exact()).values(point)[0]
         fraction = np.linspace(0, 1, 101)[:, None]
