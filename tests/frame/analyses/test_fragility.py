@@ -1,103 +1,70 @@
-"""Fragility from intervals of peaks, against closed forms and random structures."""
+"""Fragility from intervals of peaks, against exact motions of random structures."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import beta
 
 from alphacut.frame import Accelerogram, Limit, StoreyFrame, fragility
-from alphacut.frame.analyses.fragility import CriticalMeasures
-from alphacut.frame.analyses.probability import clopper_pearson
-from alphacut.fuzzy import Nature, RefusedError, Triangular
-from alphacut.fuzzy.result import Ends
+from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.sets.numbers import Stepwise
-from tests.frame.analyses.test_analyses import one_level
+from tests.frame.motions import exact_motions, random_points
 
-LIMIT = 0.02
-
-
-def peaks(lower, upper, reached):
-    """Peak of an output on one level, by what is proved and reached."""
-    return one_level(lower, upper, reached, Nature.GUARANTEED)["q1"]
-
-
-def suite(count=12, seed=4):
-    rng = np.random.default_rng(seed)
-    middle = 0.01 * rng.lognormal(0, 0.4, count)
-    return middle, [peaks(0.8 * x, 1.25 * x, 1.2 * x) for x in middle]
-
-
-def fractions(critical, measure):
-    """Bounds of the fraction of the records under which a structure exceeds the limit."""
-    return Ends(*(count / critical.low.shape[1] for count in critical.counts(measure)))
-
-
-def test_every_structure_of_the_cut_lies_in_the_band():
-    middle, each = suite()
-    measures = np.full(len(middle), 2.0)
-    critical = CriticalMeasures.from_peaks(each, measures, LIMIT)
-    assert critical.low[0] == pytest.approx(2 * LIMIT / (1.25 * middle))
-    assert critical.high[0] == pytest.approx(2 * LIMIT / (0.8 * middle))
-    measure = np.linspace(0.5, 12, 200)
-    band = fractions(critical, measure)
-    rng = np.random.default_rng(7)
-    for _ in range(200):
-        exact = 2 * LIMIT / (middle * rng.uniform(0.8, 1.25, len(middle)))
-        share = (exact[:, None] < measure).mean(0)
-        assert (band.lower[0] <= share).all()
-        assert (share <= band.upper[0]).all()
-        assert critical.median.lower[0] <= np.median(exact) <= critical.median.upper[0]
-        fitted = critical.lognormal_median
-        assert fitted.lower[0] <= np.exp(np.log(exact).mean()) <= fitted.upper[0]
-        spread = np.log(exact).std(ddof=1)
-        assert critical.dispersion.lower[0] <= spread <= critical.dispersion.upper[0]
-
-
-def test_confidence_limits_are_those_of_clopper_and_pearson():
-    middle, each = suite()
-    critical = CriticalMeasures.from_peaks(each, np.ones(len(middle)), LIMIT)
-    measure = np.linspace(0.5, 6, 23)
-    band = fractions(critical, measure)
-    limits = clopper_pearson(*critical.counts(measure), 12, 0.025)
-    for k in range(len(measure)):
-        least, most = (round(12 * end[0, k]) for end in band)
-        lower = beta.ppf(0.025, least, 13 - least) if least else 0.0
-        upper = beta.ppf(0.975, most + 1, 12 - most) if most < 12 else 1.0
-        assert limits.lower[0, k] == pytest.approx(lower)
-        assert limits.upper[0, k] == pytest.approx(upper)
-
-
-def test_any_of_the_limits_is_the_least():
-    _, each = suite()
-    one = CriticalMeasures.from_peaks(each, np.ones(12), LIMIT)
-    two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), LIMIT)
-    either = CriticalMeasures.of_any([one, two])
-    assert either.low == pytest.approx(np.minimum(one.low, two.low))
-    assert (either.high >= either.low_reached).all()
-
-
-def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
-    critical = CriticalMeasures.from_peaks([peaks(0.0, 0.01, 0.01)] * 2, [1.0, 1.0], LIMIT)
-    assert np.isinf(critical.high).all()
-    assert fractions(critical, np.array([5.0])).lower[0, 0] == 0.0
-    assert np.isinf(critical.dispersion.upper[0])
-    with pytest.raises(RefusedError, match="two records"):
-        _ = CriticalMeasures.from_peaks([peaks(0.01, 0.02, 0.015)], [1.0], LIMIT).dispersion
+NOISE = np.random.default_rng(3).normal(size=(3, 60))
+SUITE = [Accelerogram(0.02, x * row, name=f"r{x}") for x, row in zip((1, 3, 9), NOISE, strict=True)]
+FRAME = StoreyFrame([2e4, 2e4], stiffness=[8e6, 6e6], damping_ratio=0.05)
+INPUTS = {"k1": Triangular(7.2e6, 8e6, 8.8e6)}
 
 
 @pytest.fixture(scope="module")
 def two_storeys():
-    """Fragility of a frame with two limits of all storeys, under five records."""
-    rng = np.random.default_rng(3)
-    suite = [Accelerogram(0.02, x * rng.normal(size=60), name=f"r{x}") for x in (1, 2, 3, 5, 9)]
-    frame = StoreyFrame([2e4, 2e4], stiffness=[8e6, 6e6], damping_ratio=0.05)
+    """Fragility of a frame with two limits of all storeys, under three records."""
     limits = [
         Limit(f"drift{storey}", value, stated=text, event=f"drift <= {text}")
         for text, value in (("0.5 %", 0.015), ("1 %", 0.03))
         for storey in (1, 2)
     ]
-    inputs = {"k1": Triangular(7.7e6, 8e6, 8.3e6)}
-    times = {"duration": 3.0, "step": 0.02, "alpha": (0, 1)}
-    return fragility(frame, inputs, suite, limits, intensity="PGA", **times)
+    times = {"duration": 2.0, "step": 0.04, "alpha": (0, 1)}
+    return fragility(FRAME, INPUTS, SUITE, limits, intensity="PGA", independent=True, **times)
+
+
+def test_every_structure_of_the_cut_lies_in_the_band(two_storeys, rng):
+    points = random_points(INPUTS, 60, rng)
+    peaks = []  # a little below those between the nodes
+    for record in SUITE:
+        frame = replace(FRAME, ground=record, outputs=("drift1", "drift2"))
+        peaks.append(np.abs(exact_motions(frame, points, INPUTS, 2.0, 0.002)).max(1))
+    measures = np.array([np.abs(record.samples).max() for record in SUITE])
+    for storey, of_storey in enumerate(np.moveaxis(peaks, -1, 0), 1):
+        part = two_storeys.limits[f"drift{storey} <= 1 %"]
+        exact = measures * 0.03 / of_storey.T  # (S, records)
+        low, high, rounding = part.critical.low[0], part.critical.high[0], 1 + 1e-3
+        assert (low <= exact).all()
+        assert (exact <= high * rounding).all()
+        assert (exact.min(0) <= 1.02 * low).all()
+        assert (high <= 1.2 * exact.max(0)).all()
+        share = (exact[..., None] < part.measure).mean(1)
+        assert (share <= part.band.upper[0]).all()
+        at_least = (exact[..., None] / rounding < part.measure).mean(1)
+        assert (part.band.lower[0] <= at_least).all()
+        for ends, own in (
+            (part.median, np.median(exact, axis=1)),
+            (part.lognormal_median, np.exp(np.log(exact).mean(1))),
+            (part.dispersion, np.log(exact).std(1, ddof=1)),
+        ):
+            assert (ends.lower[0] <= own).all()
+            assert (own <= ends.upper[0] * rounding).all()
+
+
+def test_confidence_limits_are_those_of_clopper_and_pearson(two_storeys):
+    for part in two_storeys.limits.values():
+        for k in range(len(part.measure)):
+            least, most = (round(3 * end[0, k]) for end in part.band)
+            lower = beta.ppf(0.025, least, 4 - least) if least else 0.0
+            upper = beta.ppf(0.975, most + 1, 3 - most) if most < 3 else 1.0
+            assert part.confidence.lower[0, k] == pytest.approx(lower)
+            assert part.confidence.upper[0, k] == pytest.approx(upper)
 
 
 def test_a_limit_of_all_storeys_is_one_event_and_there_is_none_of_all_limits(two_storeys):
@@ -118,8 +85,8 @@ def test_the_median_is_that_of_the_sample_and_the_fit_has_the_geometric_mean(two
         for end, of_sample, of_fit in zip(
             (part.critical.low, part.critical.high), part.median, part.lognormal_median, strict=True
         ):
-            assert of_sample == pytest.approx(np.sort(end, axis=1)[:, 2])
-            assert of_fit == pytest.approx(end.prod(axis=1) ** 0.2)
+            assert of_sample == pytest.approx(np.sort(end, axis=1)[:, 1])
+            assert of_fit == pytest.approx(np.cbrt(end.prod(axis=1)))
         curves = part.lognormal_fit(-1)
         half = [np.interp(0.5, curve, part.measure) for curve in curves]
         ends = [part.lognormal_median.lower[-1], part.lognormal_median.upper[-1]]
@@ -131,19 +98,21 @@ def test_measures_of_a_band_are_finite_where_no_peak_is_known_to_be_reached():
     """A limit on "max q1" under wide inputs of which only an enclosing box is known."""
     frame = StoreyFrame([2e4], stiffness=[4e6], damping_ratio=0.05, outputs=("q1",))
     # A push to one side: when q1 comes back, and how far, depends on the stiffness.
-    record = Accelerogram(0.05, np.append(np.ones(8), np.zeros(12)), name="push")
+    push = np.append(np.ones(8), np.zeros(12))
+    records = [Accelerogram(0.05, x * push, name=f"push {x}") for x in (1, 2)]
     enclosing = Stepwise((0.0,), (1e6,), (9e6,), encloses="the learned set")
     found = fragility(
         frame,
         {"k1": enclosing},
-        [record],
+        records,
         Limit("q1", 0.02, largest=True),
-        duration=2.0,
-        step=0.05,
+        duration=1.0,
+        step=0.1,
         alpha=[0],
     )
-    critical = found.limits["max q1"].critical
-    assert np.isinf([critical.low_reached, critical.high]).all()
-    measure = found.limits["max q1"].measure
-    assert np.isfinite(measure).all()
-    assert measure[0] < critical.low[0, 0] < measure[-1]
+    part = found.limits["max q1"]
+    assert np.isinf([part.critical.low_reached, part.critical.high]).all()
+    assert np.isinf(part.dispersion.upper).all()
+    assert (part.band.lower == 0).all()
+    assert np.isfinite(part.measure).all()
+    assert part.measure[0] < part.critical.low[0, 0] < part.measure[-1]
