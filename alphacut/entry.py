@@ -14,11 +14,11 @@ import traceback
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from types import FrameType
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
+from alphacut.commands.table import COMMANDS
 from alphacut.fuzzy.campaign.call import CampaignError
 from alphacut.io.files import (
     BadInput,
@@ -30,22 +30,11 @@ from alphacut.io.files import (
     standard_output,
 )
 from alphacut.io.provenance import own_version
-from alphacut.rve.interruption import STOP_SIGNALS, uninterrupted
+from alphacut.rve.interruption import STOP_SIGNALS
 
 LOG = logging.getLogger(__name__)
 DEBUG = "--debug"
 """The option of every command that shows what is logged."""
-COMMANDS = {
-    "run": "run",
-    "check": "check",
-    "microstructure": "run",
-    "cell": "cell",
-    "modulus": "run",
-    "identify": "run",
-    "report": "run",
-    "verify": "check",
-}
-"""Commands by the names that a user writes, each with its file in `alphacut.commands`."""
 STATUSES = """\
 exit status:
   0    done
@@ -56,13 +45,14 @@ exit status:
 """
 
 
-def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
+def build_parsers(
+    program: str, commands: Mapping[str, Command]
+) -> tuple[Parser, dict[str, Parser]]:
     """Return the parser of a program, and the parser of each of its commands by name.
 
     Args:
         program: Name of the program, for its texts.
-        commands: File in `alphacut.commands` of each command, by the command's name. Only these
-            files are imported.
+        commands: Its commands by name.
     """
     parser = Parser(
         prog=program,
@@ -76,8 +66,7 @@ def build_parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, di
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )
     by_name: dict[str, Parser] = {}
-    for name, file in commands.items():
-        command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
+    for name, command in commands.items():
         about = f"{command.about[:1].upper()}{command.about[1:]}."
         # No abbreviations of options: one that is unique today need not be so with the next option.
         of_command = subparsers.add_parser(
@@ -95,7 +84,7 @@ def main(
     arguments: Sequence[str] | None = None,
     *,
     program: str = "alphacut",
-    names: Mapping[str, str] = COMMANDS,
+    commands: Mapping[str, Command] = COMMANDS,
 ) -> int:
     """Run one command of the command line, and return its exit status.
 
@@ -107,7 +96,7 @@ def main(
     Args:
         arguments: The command line after the program's name; the process's own if left out.
         program: The program's name, for messages.
-        names: File in `alphacut.commands` of each command, by the command's name.
+        commands: Its commands by name.
     """
     words = arguments
     if words is None:
@@ -115,7 +104,7 @@ def main(
     with interrupt_on_stop_signals() as signals:
         try:
             with show_log(DEBUG in words):
-                return _run_command(words, program, names)
+                return _run_command(words, program, commands)
         except (BadInput, RefusedError) as error:
             for line in str(error).splitlines():  # one for each problem
                 say(line)
@@ -214,7 +203,7 @@ def show_log(is_on: bool) -> Iterator[None]:
         logger.setLevel(logging.NOTSET)
 
 
-def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
+def _run_command(arguments: Sequence[str], program: str, commands: Mapping[str, Command]) -> int:
     """Read a command line and run its command; return the exit status.
 
     Python's warnings become lines "warning: …" on standard error while the command runs.
@@ -224,18 +213,14 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
             which begin with -rve_, may stand anywhere; commands on a case get them as
             `options.petsc`, and for other commands they are refused.
         program: The program's name, for messages.
-        names: File in `alphacut.commands` of each command, by the command's name.
+        commands: Its commands by name.
 
     Raises:
         RefusedError: An option is unknown or does not fit, or a file cannot be written. Errors of
             the command itself leave this function as well.
     """
     words, petsc = split_petsc(arguments)
-    # The parser of the named command alone saves the imports of the others.
-    named = {name: names[name] for name in words[:1] if name in names}
-    # An exception raised amid imports could be swallowed by the code that they run: a signal waits.
-    with uninterrupted():
-        parser, by_name = build_parsers(program, named or names)
+    parser, by_name = build_parsers(program, commands)
     options, unknown = parser.parse_known_args(words)
     if unknown:
         # Values of an unknown option are unknown words as well: the option is named.

@@ -28,7 +28,6 @@ from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.structures.linear import evaluate, has_matrices, require_modal_order
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import yields
-from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
 
@@ -110,6 +109,8 @@ def envelope(
         bounds = with_node_deviation(bounds, flow)
         # Guaranteed bounds are tested by exact responses that another algorithm computes.
         if has_matrices(model) and np.isfinite(bounds.proved.upper).all():
+            from alphacut.frame.verification.self_test import with_motions_tested  # needs SciPy
+
             bounds = with_motions_tested(bounds, model)
         if tick:
             tick(1.0)

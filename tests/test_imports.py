@@ -157,9 +157,23 @@ def test_a_case_is_read_without_figures_and_stages():
     assert not {name for name in modules if name.startswith(wrong)}
 
 
+def test_help_and_version_import_no_command():
+    program = """
+from alphacut.entry import main
+for option in ("--help", "--version"):
+    try: main([option])
+    except SystemExit: pass
+"""
+    modules = modules_after(program)
+    assert "alphacut.commands.table" in modules
+    assert not {name for name in modules if name.startswith(("alphacut.case", "pydantic"))}
+    assert "alphacut.commands.check" not in modules
+
+
 def test_a_case_is_checked_without_what_takes_longer_to_import_than_to_use():
     """Two motions of a building, and records of a suite with their spectral accelerations."""
-    slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy.signal", "scipy.stats"}
+    slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy", "alphacut.rve.image.study"}
+    slow |= {"alphacut.commands.foresee", "alphacut.commands.pipeline", "sympy", "h5py"}
     for case in ("building", "suite"):
         words = ["check", f"cases/{case}.toml", "--quiet"]
         modules = modules_after(f"from alphacut.entry import main; assert not main({words})")

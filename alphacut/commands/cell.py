@@ -18,7 +18,7 @@ from alphacut.case.cell import CellCase
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.case.structures import with_structures
-from alphacut.commands.options import Command, add_common, require_petsc, write_answer
+from alphacut.commands.options import require_petsc, write_answer
 from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
@@ -37,24 +37,6 @@ from alphacut.stages.cell import (
     require_tolerance,
 )
 from alphacut.stochastic import ThetaDistribution
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `alphacut cell` to its parser.
-
-    They are those of every command on a case, --method and --export.
-    """
-    add_common(parser)
-    parser.add_argument(
-        "--method",
-        dest="set",
-        action="append",
-        type="modulus.method={}".format,  # --method is a short form of --set: it is checked there
-        help="prism, slices, series or auto; short for --set",
-    )
-    parser.add_argument(
-        "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf"
-    )
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
@@ -317,9 +299,3 @@ def table_rows(document: Document) -> Iterator[Row]:
         for key, constant in constants.items():
             label = f"{constant_label(key)} ({definition})"
             yield Row(label, f"{constant['value']:.6g}", constant["error"])
-
-
-COMMANDS = dict.fromkeys(
-    ("cell", "solve"),
-    Command("effective modulus and stresses of the cell at the nominal values", arguments, run),
-)

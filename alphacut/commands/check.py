@@ -1,26 +1,23 @@
-"""Commands that check: ``check`` a case before it runs, ``verify`` proved envelopes after that."""
+"""Command ``check``: a case before it runs, how it was read and what a run of it will compute."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from math import pi
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from alphacut.base.errors import FailedError, RefusedError, require
+from alphacut.base.errors import FailedError, RefusedError
 from alphacut.base.number_text import MINUS, STANDARD_GRAVITY, engineering, percent_text, text_table
 from alphacut.case.content import Content
 from alphacut.case.loads import ForceHistory, RecordsSection
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
-from alphacut.commands.options import Command, add_common, add_quiet, write_answer
-from alphacut.commands.pipeline import load_end_warnings, read_case, require_runnable
+from alphacut.commands.options import write_answer
+from alphacut.commands.required import load_end_warnings, read_case, require_runnable
 from alphacut.frame import Exact, History, LinearFlow
 from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import (
@@ -30,29 +27,22 @@ from alphacut.frame.analyses.suites import (
     short_record_warnings,
 )
 from alphacut.frame.boxes import AT_REST
-from alphacut.frame.envelope import Ends, Envelope, within_steps
+from alphacut.frame.envelope import within_steps
 from alphacut.frame.structures.linear import LinearSystem, NominalModes, histories, nominal_modes
 from alphacut.frame.structures.matrix import Monomial
 from alphacut.frame.structures.storey import yields
-from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.fuzzy.campaign.call import CampaignError
-from alphacut.fuzzy.result import Nature
 from alphacut.io.files import say
 from alphacut.io.quantity import QUANTITIES
-from alphacut.io.results import ResultsFolder
-from alphacut.report.results import agreement
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA
 from alphacut.stages.foreseen import MOST_TIMED_STEPS, foreseen_structure
-from alphacut.stages.image import study_of
 from alphacut.stages.suite import suite_records
 
 if TYPE_CHECKING:
-    import xarray
-
-    from alphacut.commands.foresee import Foreseen
+    from alphacut.commands.pieces import Foreseen
 
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
@@ -60,13 +50,13 @@ Row = tuple[str, str, str]
 
 
 def check(options: argparse.Namespace, out: TextIO) -> int:
-    """Check a case, show how it was read, and foresee what a run of it will take.
+    """Check a case, show how it was read, and count what a run of it will compute.
 
-    All that stages need is read and built, and small parts of their work are timed.
+    All that stages need is read and built. With `time` small parts of their work are timed as well.
 
     Args:
         options: Of the command line: the case file `case` with its changes `set`, PETSc's options
-            `petsc`, `json` and `quiet`.
+            `petsc`, `time`, `json` and `quiet`.
         out: Takes the text, or the JSON document with ``--json -``.
 
     Returns:
@@ -88,6 +78,8 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             say(f"warning: {doubt}")
         raise
     if content.image_cell is not None and study is None:
+        from alphacut.stages.image import study_of  # whose solvers take time to import
+
         study = study_of(content.image_cell)
     text = text_table(("key", "value", "kind"), rows)
     text += "".join(f"warning: {doubt}\n" for doubt in doubts(content, rows, structure))
@@ -117,7 +109,13 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
                 say(line)
     last_lines = f"{options.case}: no problems\n"
     if options.json or not options.quiet:
-        foreseen, failure = foreseen_stages(content, options.petsc)
+        from alphacut.commands.pieces import pieces_of  # of plans, which take time to import
+
+        failure = ""
+        if options.time:
+            foreseen, failure = foreseen_stages(content, options.petsc)
+        else:
+            foreseen = list(pieces_of(content, options.petsc))
         document["foreseen"] = [stage._asdict() for stage in foreseen]
         last_lines = foreseen_text(foreseen) + failure + last_lines
     write_answer(options, document, out, last_lines)
@@ -240,7 +238,7 @@ def foreseen_stages(content: Content, petsc: Mapping[str, str]) -> tuple[list[Fo
     Returns:
         An entry for each stage until the first one that fails; and the warning as a line, else "".
     """
-    from alphacut.commands.foresee import foresee  # it imports all stages, which takes a second
+    from alphacut.commands.foresee import foresee  # it imports all stages, which takes time
 
     found: list[Foreseen] = []
     try:
@@ -252,23 +250,30 @@ def foreseen_stages(content: Content, petsc: Mapping[str, str]) -> tuple[list[Fo
 
 
 def foreseen_text(foreseen: Sequence[Foreseen]) -> str:
-    """Return a text table of what the stages of a run will take.
+    """Return a text table of what the stages of a run will compute, and how long it will take.
 
     Args:
-        foreseen: Name of each stage, number and kind of its pieces, and its time in s.
+        foreseen: The stages. Either all of them have a time, or none.
 
     Returns:
-        Lines that end with a newline: the table and the sum of the times. Empty without stages.
+        Lines that end with a newline: the table and the sum of the times, or in its place the
+        option that times the stages. Empty without stages.
     """
     if not foreseen:
         return ""
+    counts = []
+    for x in foreseen:
+        number = "" if x.number is None else f"{x.number:,} "
+        counts.append((x.stage, f"{number}{x.pieces}"))
+    times = [x.seconds for x in foreseen if x.seconds is not None]
+    if not times:
+        return f"{text_table(('stage', 'pieces'), counts)}with --time: how long a run will take\n"
     rows = [
-        (x.stage, f"{x.number:,} {x.pieces}", f"{engineering(x.seconds, '', digits=2)} s")
-        for x in foreseen
+        (*count, f"{engineering(seconds, '', digits=2)} s")
+        for count, seconds in zip(counts, times, strict=True)
     ]
-    total = sum(x.seconds for x in foreseen)
     text = text_table(("stage", "pieces", "about, by one process"), rows)
-    return f"{text}a run takes about {engineering(total, '', digits=2)} s, without figures\n"
+    return f"{text}a run takes about {engineering(sum(times), '', digits=2)} s, without figures\n"
 
 
 def modes_document(modes: NominalModes) -> dict[str, object]:
@@ -550,105 +555,3 @@ def _numbers(number: FuzzyNumber, si: str) -> str:
     core = number.cut(1.0)
     corners = dict.fromkeys((support.lower, core.lower, core.upper, support.upper))
     return " … ".join(engineering(corner, si) for corner in corners)
-
-
-def add_folder(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``verify``."""
-    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/wind")
-    add_quiet(parser)
-
-
-def verify(options: argparse.Namespace, out: TextIO) -> int:
-    """Test all guaranteed envelopes in a folder of results by exact responses.
-
-    A run stores with each guaranteed envelope the inputs of some structures and their exact
-    responses. They are compared with the stored bounds, without the proof.
-
-    Args:
-        options: Of the command line: `folder`, `json` and `quiet`.
-        out: Takes a line for each envelope, or the JSON document with ``--json -``.
-
-    Returns:
-        Exit status 0.
-
-    Raises:
-        RefusedError: The folder holds no envelope, or its files are damaged.
-        ContradictionError: A response lies outside an envelope that is guaranteed.
-    """
-    folder = ResultsFolder.read(Path(options.folder))
-    names = [x.removesuffix(".nc") for x in folder.files if re.fullmatch(r"envelope_.*\.nc", x)]
-    value = str(folder.path)
-    if any(name.startswith("record_") for name in folder.files):
-        value += ", of a suite, whose peaks the run tested as it proved them"
-    require(bool(names), "FOLDER", value, "results of a run with an envelope")
-    document: dict[str, object] = {}
-    text = ""
-    for name in names:
-        data = folder.dataset(f"{name}.nc")
-        peaks = json.loads(folder.content(f"{name}.json"))["result"]["peak"].values()
-        nature = str(data.attrs["nature"])
-        n_motions = 0
-        # Responses are stored where the bounds of the envelope, or wider ones beside them, are
-        # guaranteed.
-        if "motion_inputs" in data:
-            points, motions = stored_motions(data)
-            lower, upper = np.moveaxis(data["cut"].values, -1, 0)  # of shape (levels, inputs)
-            Trial(envelope_of(data), lower, upper).require_agreement(points, motions)
-            n_motions = len(points)
-            verdict = f"{n_motions} exact motions {agreement(nature == Nature.GUARANTEED)}"
-        elif any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
-            verdict = "its guaranteed peaks were tested by the run, nothing else in it is proved"
-        else:
-            verdict = "nothing in it is proved"
-        document[name] = {"nature": nature, "motions_tested": n_motions}
-        text += f"{name}: {verdict} ({nature})\n"
-    write_answer(options, document, out, text)
-    return 0
-
-
-def envelope_of(data: xarray.Dataset) -> Envelope:
-    """Return the envelope that a dataset of a run holds.
-
-    Args:
-        data: Dataset of an envelope file, in SI units, with the axes alpha, time, output and
-            parameter. "cut" has the ends of the inputs, shape (alpha, parameter, 2); "label" the
-            name of each output with its unit in brackets. Attributes are "nature" and "method".
-            Three things may be missing: guaranteed bounds "proved_lower" and "proved_upper" beside
-            other bounds, attained bounds "inner_lower" and "inner_upper", and errors.
-
-    Returns:
-        The envelope. Its fuzzy inputs are only known as intervals: their cuts on the lowest level.
-
-    Raises:
-        KeyError: The dataset is no envelope.
-    """
-    values = {name: variable.values for name, variable in data.data_vars.items()}
-    names = ("lower", "upper", "lower_at", "upper_at", "error", "between", "attained_error")
-    arguments: dict[str, Any] = {name: values[name] for name in names if name in values}
-    for side, name in (("inner", "inner"), ("outer", "proved")):
-        if f"{name}_lower" in values:
-            arguments[side] = Ends(values[f"{name}_lower"], values[f"{name}_upper"])
-    # The lowest α-cut contains all others: as an interval it has the bounds of this level.
-    supports = zip(data["parameter"].values, values["cut"][0], strict=True)
-    return Envelope(
-        alpha=data["alpha"].values,
-        time=data["time"].values,
-        outputs=tuple(map(str, data["output"].values)),
-        inputs={str(name): Interval(*map(float, support)) for name, support in supports},
-        nature=Nature(data.attrs["nature"]),
-        method=str(data.attrs["method"]),
-        units=tuple(str(x).partition("[")[2].rstrip("]") for x in values["label"]),
-        **arguments,
-    )
-
-
-COMMANDS = {
-    "check": Command(
-        "check a case, and print what it was read as and its first natural period",
-        add_common,
-        check,
-    ),
-    "verify": Command(
-        "test the proved envelopes of a run by exact motions, without the proof", add_folder, verify
-    ),
-}

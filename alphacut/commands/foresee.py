@@ -1,4 +1,4 @@
-"""What a run of a case will take: its pieces are counted, and small parts of the work are timed.
+"""How long a run of a case will take: small parts of the work are timed.
 
 No speed of a machine is assumed. A motion is computed for parts of its duration, an image on parts
 of its pixels, particles are packed into some of their windows, and one record of a suite stands for
@@ -7,11 +7,10 @@ all. Work that reports its progress evenly is begun and interrupted.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,13 +20,13 @@ from alphacut.case.material import ImageCell, RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
+from alphacut.commands.pieces import Foreseen, pieces_of, sample_count
 from alphacut.frame import Probability
 from alphacut.frame import envelope as frame_envelope
 from alphacut.frame.analyses.peaks import PEAK_ERROR
 from alphacut.frame.analyses.tolerances import scale_supports
 from alphacut.frame.methods.auto import Auto
-from alphacut.fuzzy import Triangular, propagate
-from alphacut.rve.fuzzy_cell import FuzzyCell, proved_signs
+from alphacut.fuzzy import Triangular
 from alphacut.rve.image.study import (
     AlphaLevel,
     FuzzyImageStiffness,
@@ -49,22 +48,6 @@ LONG_ENOUGH = 2.0
 more, but let the user of `check` wait."""
 
 
-class Foreseen(NamedTuple):
-    """What a stage of a run will take by one process.
-
-    Args:
-        stage: Name of the stage.
-        number: Number of its pieces.
-        pieces: What its pieces are.
-        seconds: Time of all of them, in s.
-    """
-
-    stage: str
-    number: int
-    pieces: str
-    seconds: float
-
-
 def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     """Yield what each stage of a run of a case will take, but the shares of inputs and the figures.
 
@@ -81,20 +64,22 @@ def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     # What one stage finds is the input of the next: a radius map from few packings, and the modulus
     # of a part of an image, stand for those of the run.
     material = None
+    pieces = {entry.stage: entry for entry in pieces_of(content, petsc)}
     if "microstructure" in content.stages and content.microstructure is not None:
-        found, radius = _particles(content.microstructure, spheres=content.has_spheres)
+        seconds, radius = _particles(content.microstructure, spheres=content.has_spheres)
         content = content.model_copy(update={"radius": radius})
-        yield found
+        yield pieces["microstructure"]._replace(seconds=seconds)
     if "modulus" in content.stages:
         if content.image_cell is not None:
-            found, material = _image(content.image_cell, content)
-            yield found
+            seconds, material = _image(content.image_cell, content)
+            yield pieces["image"]._replace(seconds=seconds)
         else:
             problem = CellProblem.of(content, petsc)
             seconds = begun_seconds(modulus.stage(problem), has_setup=True)
-            yield Foreseen("modulus", sample_count(problem), "samples", seconds)
+            number = sample_count(problem)
+            yield pieces["modulus"]._replace(number=number, seconds=seconds)
     if "envelope" in content.stages and content.envelope is not None:
-        yield from _motion(content, content.envelope, material)
+        yield from _motion(content, content.envelope, material, pieces)
 
 
 def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:
@@ -198,9 +183,7 @@ def begun_seconds(stage: Stage[T], *, has_setup: bool = False, power: float = 1.
     return perf_counter() - start
 
 
-def _particles(
-    section: MicrostructureSection, *, spheres: bool
-) -> tuple[Foreseen, RadiusMapSection]:
+def _particles(section: MicrostructureSection, *, spheres: bool) -> tuple[float, RadiusMapSection]:
     """Return what the radius map of particles will take, and such a map from few packings.
 
     The fewest packings that a case may have are made, with the particles of the case; the time is
@@ -211,7 +194,7 @@ def _particles(
         spheres: Whether they are spheres.
 
     Returns:
-        The entry of stage microstructure, and the section [radius] of the fitted map.
+        Seconds of stage microstructure, and the section [radius] of the fitted map.
 
     Raises:
         RefusedError: The particles are too dense, or a file is not read.
@@ -220,13 +203,11 @@ def _particles(
     part = section
     number = 1
     fewest = 1
-    pieces = "sections"
     if (packing := section.packing) is not None:
         number = packing.packings
         # Five packings are the fewest that a case may have: they tell how far statistics vary,
         # without which no map is fitted.
         fewest = min(packing.packings, 5)
-        pieces = "packings"
         fewer = packing.model_copy(update={"packings": fewest})
         part = section.model_copy(update={"packing": fewer})
     # The time of the fit, which all packings share, is counted with each: too much by little.
@@ -234,36 +215,10 @@ def _particles(
     numbers = microstructure.stage(part, spheres=spheres).compute(StageContext()).numbers
     seconds = (perf_counter() - start) * number / fewest
     radius = RadiusMapSection.model_validate(numbers["radius"])
-    return Foreseen("microstructure", number, pieces, seconds), radius
+    return seconds, radius
 
 
-def sample_count(problem: CellProblem) -> int:
-    """Return how many samples the plan of a cell takes.
-
-    The plan is run with a function that returns 1 for all outputs. Plans that add samples where
-    results ask for it add none then.
-
-    Args:
-        problem: The cell, with its fuzzy inputs, plan and α-levels.
-
-    Raises:
-        RefusedError: The model of the cell needs a library that is missing, or the plan does not
-            fit.
-    """
-    cell = FuzzyCell.of(problem.nominal_radius, problem.nominal_phases, problem.inputs)
-    # The signs that mechanics proves shorten a plan: they are found from the model as in a run.
-    bounds = propagate(
-        lambda **_: dict.fromkeys(modulus.OUTPUTS, 1.0),
-        cell.inputs,
-        modulus.PLANS[problem.modulus.plan],
-        alpha=problem.modulus.alpha,
-        knowledge=proved_signs(problem.model(), cell),
-        progress=False,
-    )
-    return bounds.evaluations
-
-
-def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
+def _image(cell: ImageCell, content: Content) -> tuple[float, Material]:
     """Return what the bounds of an image or a volume will take, and the material of a part of it.
 
     Args:
@@ -271,7 +226,7 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
         content: The case, for the α-levels and for what the structure takes from the image.
 
     Returns:
-        The entry of the stage; and Young's modulus and the loss factor, as fuzzy numbers, of the
+        Seconds of the stage; and Young's modulus and the loss factor, as fuzzy numbers, of the
         largest part that was solved. Both are None if the structure takes nothing from the image.
 
     Raises:
@@ -293,11 +248,11 @@ def _image(cell: ImageCell, content: Content) -> tuple[Foreseen, Material]:
 
     # From fewer than three parts nothing is extrapolated, and the time of an image is about
     # proportional to its pixels: three are timed however long they take.
-    foreseen = Foreseen("image", len(alpha), "levels", whole_seconds(run, fewest=3))
+    seconds = whole_seconds(run, fewest=3)
     if content.has_stated_modulus and not content.has_material_damping:
-        return foreseen, Material()
+        return seconds, Material()
     largest = solved[-1]
-    return foreseen, Material(largest.modulus, largest.loss_factor)
+    return seconds, Material(largest.modulus, largest.loss_factor)
 
 
 def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
@@ -330,7 +285,10 @@ def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
 
 
 def _motion(
-    content: Content, section: EnvelopeSection, material: Material | None
+    content: Content,
+    section: EnvelopeSection,
+    material: Material | None,
+    pieces: Mapping[str, Foreseen],
 ) -> Iterator[Foreseen]:
     """Yield what the responses of the structure will take.
 
@@ -341,6 +299,7 @@ def _motion(
         content: The case.
         section: Its section [envelope].
         material: Material of the cell as far as it was computed for this; None if it was not.
+        pieces: Pieces of each stage by its name.
 
     Raises:
         RefusedError: A part of the work is refused.
@@ -350,16 +309,16 @@ def _motion(
     if content.identify is not None:
         start = perf_counter()
         _, structure = identify.identify_inputs(content.identify, structure, section.alpha)
-        yield Foreseen("identify", 1, "campaigns", perf_counter() - start)
+        yield pieces["identify"]._replace(seconds=perf_counter() - start)
     # Questions and suites are about the response of [envelope] itself, whatever the studies are.
     (own_task,) = envelope.tasks(section, ())
     if content.records is not None:
-        yield from _records(content, structure, own_task)
+        yield from _records(content, structure, own_task, pieces)
         return
     tasks = envelope.tasks(section, content.study, content.limited_outputs)
     seconds = sum(_envelope_seconds(structure, task) for task in tasks)
-    yield Foreseen("envelopes", len(tasks), "studies", seconds)
-    yield from _answers(content, structure, own_task)
+    yield pieces["envelopes"]._replace(seconds=seconds)
+    yield from _answers(content, structure, own_task, pieces)
 
 
 def _structure(content: Content, material: Material | None) -> Structure:
@@ -437,7 +396,9 @@ def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
     return whole_seconds(run)
 
 
-def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
+def _records(
+    content: Content, structure: Structure, task: EnvelopeTask, pieces: Mapping[str, Foreseen]
+) -> Iterator[Foreseen]:
     """Yield what the peaks under the records of a suite, and fragility over intensities, will take.
 
     The peaks under the record of median duration are computed; the time is taken as proportional to
@@ -447,6 +408,7 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
         content: The case, which has a suite.
         structure: The structure.
         task: The response of [envelope].
+        pieces: Pieces of each stage by its name.
 
     Raises:
         RefusedError: The records or the limits do not fit the structure.
@@ -464,7 +426,7 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
     start = perf_counter()
     suite.stage(structure, task, typical).compute(StageContext())
     seconds = (perf_counter() - start) * sum(durations) / typical.duration
-    yield Foreseen("records", len(records), "records", seconds)
+    yield pieces["records"]._replace(seconds=seconds)
     question = content.incremental_question
     if question is not None:
         analyses = suite.analyses_of(question, structure, task, records)
@@ -474,7 +436,9 @@ def _records(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
         yield Foreseen("fragility", motions, "motions", sum(time for _, time in foreseen))
 
 
-def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iterator[Foreseen]:
+def _answers(
+    content: Content, structure: Structure, task: EnvelopeTask, pieces: Mapping[str, Foreseen]
+) -> Iterator[Foreseen]:
     """Yield what the questions [probability] and [tolerances] will take.
 
     They compute responses of their own; all others follow from known peaks.
@@ -483,6 +447,7 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
         content: The case.
         structure: The structure.
         task: The response of [envelope].
+        pieces: Pieces of each stage by its name.
 
     Raises:
         RefusedError: Limits or random inputs do not fit the structure.
@@ -490,7 +455,7 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
     """
     if (section := content.questions.get("probability")) is not None:
         stage = answers.stage(Probability, section, Response(structure, task))
-        yield Foreseen("probability", 1, "campaigns", begun_seconds(stage))
+        yield pieces["probability"]._replace(seconds=begun_seconds(stage))
     if (section := content.questions.get("tolerances")) is not None:
         assert content.tolerances is not None
         # The largest scale is the widest box, whose envelope takes longest.
@@ -506,7 +471,5 @@ def _answers(content: Content, structure: Structure, task: EnvelopeTask) -> Iter
             frame_envelope(model, inputs, method, **times, alpha=[0.0], progress=False)
             return done
 
-        # Two scales are tried first, then the interval between them is halved until it is a
-        # hundredth of what it was.
-        count = 2 + math.ceil(math.log2(100))
-        yield Foreseen("tolerances", count, "envelopes", count * whole_seconds(run))
+        found = pieces["tolerances"]
+        yield found._replace(seconds=(found.number or 0) * whole_seconds(run))

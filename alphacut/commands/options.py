@@ -6,11 +6,13 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
 from alphacut.io.files import as_json, suggestion
+from alphacut.rve.interruption import uninterrupted
 
 if TYPE_CHECKING:
     from alphacut.case.cell import CellContent
@@ -20,11 +22,26 @@ PETSC_PREFIX = "-rve_"
 
 @dataclass(frozen=True)
 class Command:
-    """A command: what it does in a line, its options, and its run from them to the exit status."""
+    """A command of the command line.
+
+    Args:
+        about: What it does, in a line.
+        arguments: Function that adds its options to a parser.
+        place: The function that runs it, as "run:report" of a file in `alphacut.commands`.
+    """
 
     about: str
     arguments: Callable[[argparse.ArgumentParser], None]
-    run: Callable[[argparse.Namespace, TextIO], int]
+    place: str
+
+    def run(self, options: argparse.Namespace, out: TextIO) -> int:
+        """Run the command with its options, and return the exit status."""
+        # An exception raised amid imports could be swallowed by the code that they run: a signal
+        # waits. Help and wrong options need no command, whose imports take a second.
+        with uninterrupted():
+            function = resolve_name(f"alphacut.commands.{self.place}")
+        status: int = function(options, out)
+        return status
 
 
 class Parser(argparse.ArgumentParser):

@@ -15,8 +15,9 @@ import pandas as pd
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked, write_text
 from alphacut.base.number_text import text_table
-from alphacut.commands.options import Command, add_common, add_quiet, add_run, write_answer
-from alphacut.commands.pipeline import Pipeline, open_results, read_case
+from alphacut.commands.options import write_answer
+from alphacut.commands.pipeline import Pipeline, open_results
+from alphacut.commands.required import read_case
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import say
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions
@@ -39,20 +40,6 @@ from alphacut.stages.image import ImageResult
 from alphacut.stages.microstructure import fragment
 from alphacut.stages.modulus import ModulusResult
 from alphacut.stages.summary import SUMMARY, Parts, Results, Summary
-
-
-def add_modulus(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
-    """Add the options of a command that computes stage modulus."""
-    add_run(parser, default_place)
-    about = "where an image is solved: cpu (default), or cuda by CuPy"
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=about)
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a run."""
-    add_modulus(parser, "results/NAME")
-    parser.add_argument("--fresh", action="store_true", help="compute everything anew")
-    parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
@@ -115,23 +102,6 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
             say(f"{len(store.up_to_date)} of the stages were up to date")
         say(f"next: {command_to_paste('report', folder)}")
     return 0
-
-
-def add_page(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a report to a parser, in place.
-
-    They are `folder`, a list of one or more, the files and folders `out`, `csv` and `tables`, which
-    are None by default, `json` and `quiet`.
-    """
-    parser.add_argument(
-        "folder", metavar="FOLDER", nargs="+", help="results of a run; of two to compare them"
-    )
-    parser.add_argument(
-        "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"
-    )
-    parser.add_argument("--csv", metavar="FOLDER", help="folder for every table as a CSV file")
-    parser.add_argument("--tables", metavar="FOLDER", help="folder for every table in LaTeX")
-    add_quiet(parser)
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
@@ -301,16 +271,3 @@ def identify(options: argparse.Namespace, out: TextIO) -> int:
     learned, _ = identify_inputs(content.identify, structure, alpha)
     write_answer(options, to_document(learned), out, run_text(Parts(update=learned)))
     return 0
-
-
-COMMANDS = {
-    "microstructure": Command(
-        "from particles, packed or measured, to the random radius and its fuzzy map",
-        add_run,
-        microstructure,
-    ),
-    "modulus": Command("fuzzy effective modulus of the cell or of the image", add_modulus, modulus),
-    "identify": Command("inputs of a frame from its measured natural modes", add_common, identify),
-    "run": Command("run every stage of a case: files, figures, summary", add_options, run),
-    "report": Command("one self-contained HTML page of a run's results", add_page, report),
-}

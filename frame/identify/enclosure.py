@@ -18,13 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array, hstack
 
 from alphacut.base.arrays import Array
 from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
 from alphacut.frame.structures.storey import chain_matrix
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def enclosure(
@@ -183,6 +186,8 @@ class LinearRelaxation:
 
     def bounds(self, expression: Array) -> tuple[float, float]:
         """Return a proved lower and upper bound of an expression over the linear program."""
+        from scipy.sparse import csr_array  # takes time to import
+
         rows = csr_array(np.reshape(self.rows, (-1, len(self.one))))
         low = proved_minimum(expression, rows, self.lower, self.upper)
         high = -proved_minimum(-expression, rows, self.lower, self.upper)
@@ -207,6 +212,7 @@ def proved_minimum(objective: Array, rows: csr_array, lower: Array, upper: Array
         The bound; +∞ if it is proved that no x exists.
     """
     from scipy.optimize import linprog  # takes time to import
+    from scipy.sparse import csr_array, hstack
 
     no_multipliers = np.zeros(rows.shape[0])
     ends = np.column_stack([lower, upper])

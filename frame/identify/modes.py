@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import chdtri
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
@@ -361,6 +360,8 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> FuzzyN
             return Crisp(float(values.mean()))
         return from_data(values, "mean", law="normal")
     checked_number(f"{what}: {key}", deviation, positive=True)
+    from scipy.special import chdtri  # takes time to import
+
     # Chi-squared test: the scatter would be this large with a probability of 1e-6 at most.
     scatter = 0.0
     if count > 1:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.frame.boxes import Boxes
@@ -56,6 +55,8 @@ class DampedStructure:
             UnprovedError: The mass at the midpoint, or a quantity that must be positive, is not so,
                 or the structure can drift.
         """
+        from scipy.linalg import eigh  # takes time to import
+
         d = len(boxes.names)
         inputs = TaylorModel.variables(boxes.centre, boxes.radius, order)
         parameters = {x: TaylorModel.constant(v, d, order) for x, v in system.parameters.items()}

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
@@ -63,6 +62,8 @@ class StiffnessBounds:
         """Largest ratio of the upper to the lower energy over all strains, minus one."""
         if not (self.has_lower and self.has_upper):
             return float("inf")
+        from scipy.linalg import eigh  # takes time to import
+
         return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
 
     @property

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import FailedError, checked_number, require
@@ -158,6 +157,8 @@ class _Obstacles:
     """
 
     def __init__(self, centres: Array, radii: Array, box: Array) -> None:
+        from scipy.spatial import KDTree  # takes time to import
+
         classes = list(size_classes(radii)) if len(radii) else []
         self.box = box
         self.size_classes = [

@@ -5,12 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +122,8 @@ def close_pairs(particles: Particles, gap: float) -> tuple[Ints, Ints]:
     Returns:
         First and second index of each pair, shape (m,) each; each pair once, in no certain order.
     """
+    from scipy.spatial import KDTree  # takes time to import
+
     box = particles.size if particles.periodic else None
     classes = list(size_classes(particles.radii))
     trees = [KDTree(particles.centres[members], boxsize=box) for members in classes]
@@ -214,6 +219,8 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Ints, Pairs]]
         The indices i of a portion, and its pairs, grouped by i, with the vectors between the
         centres.
     """
+    from scipy.spatial import KDTree  # takes time to import
+
     # Each image is a point of the tree. A periodic tree would find only the nearest image of each
     # disc, but cells of few large discs have walls towards several images of one disc.
     disc_of_image, shift = _periodic_images(discs, float(reach.max()))

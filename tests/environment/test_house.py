@@ -36,7 +36,8 @@ def test_no_public_signature_has_any():
 
 
 def test_help_fits_on_one_screen():
-    from alphacut.entry import COMMANDS, build_parsers
+    from alphacut.commands.table import COMMANDS
+    from alphacut.entry import build_parsers
 
     os.environ["COLUMNS"] = "80"
     whole, each = build_parsers("alphacut", COMMANDS)

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from alphacut import main
-from alphacut.commands import check
-from alphacut.frame import propagation
+from alphacut.commands import check, verify
+from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.io.results import Listed, ResultsFolder
@@ -258,15 +258,15 @@ def test_what_a_run_stored_is_verified_and_a_narrower_envelope_contradicted(
     files = sorted(folder.iterdir())
     assert main(["verify", str(folder)]) == 0
     assert "exact motions agree with what is guaranteed (guaranteed)" in capfd.readouterr().out
-    stored = check.envelope_of
-    monkeypatch.setattr(check, "envelope_of", lambda data: narrower(stored(data)))
+    stored = verify.envelope_of
+    monkeypatch.setattr(verify, "envelope_of", lambda data: narrower(stored(data)))
     assert main(["verify", str(folder)]) == 1
     assert "the proof is wrong: q1 at t = " in capfd.readouterr().err
     assert sorted(folder.iterdir()) == files
 
 
 def test_a_contradiction_ends_a_run(tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(propagation, "with_motions_tested", planted)
+    monkeypatch.setattr(self_test, "with_motions_tested", planted)
     assert proved(written(tmp_path), tmp_path / "out") == 1
     err = capfd.readouterr().err
     assert "the proof is wrong: q1" in err

@@ -1,6 +1,7 @@
-"""What `check` foresees: pieces that a run is counted to do, and times from parts of the work."""
+"""Pieces that a run is counted to do by `check`, and their times from parts of the work."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from alphacut import main
 from alphacut.case.content import load
 from alphacut.commands import foresee as module
 from alphacut.commands.foresee import begun_seconds, foresee, whole_seconds
+from alphacut.commands.pieces import pieces_of
 from alphacut.frame.analyses import tolerances
 from alphacut.stages.store import Stage, StageResult
 from tests.alphacut.small import CELL, FRAME, TWO_FLOORS, summary_of, written
@@ -42,8 +44,11 @@ alpha = [0, 0.5, 1]
 
 
 def foreseen(case):
-    """Number of pieces by the name of their stage."""
-    return {stage.stage: stage for stage in foresee(load(case).content, {})}
+    """Pieces by the name of their stage, counted alike with and without their times."""
+    content = load(case).content
+    timed = list(foresee(content, {}))
+    assert [stage._replace(seconds=None) for stage in timed] == list(pieces_of(content, {}))
+    return {stage.stage: stage for stage in timed}
 
 
 @pytest.fixture
@@ -103,13 +108,35 @@ def test_as_many_records_are_foreseen_as_a_run_takes(tmp_path, ran, rng):
     assert number == sum(name.startswith("record_") for name in ran) == 3
 
 
+def told_by(folder, words):
+    """The only stage in the JSON document of a check."""
+    assert main(words) == 0
+    (stage,) = json.loads((folder / "check.json").read_text())["foreseen"]
+    return stage
+
+
+def test_check_counts_at_once_and_says_which_option_times(tmp_path, capfd, monkeypatch):
+    case = written(tmp_path, CELL)
+    with monkeypatch.context() as patch:
+        patch.setattr(Stage, "__init__", lambda *_, **__: pytest.fail("work is begun"))
+        assert main(["check", str(case)]) == 0
+    counted = capfd.readouterr().out
+    assert "with --time: how long a run will take\n" in counted
+    assert main(["check", str(case), "--time"]) == 0
+    timed = capfd.readouterr().out
+    assert "a run takes about" in timed
+    assert re.search(r"^modulus +\d+ samples$", counted, re.MULTILINE)
+    assert re.search(r"^modulus +\d+ samples +\S+ m?s$", timed, re.MULTILINE)
+
+
 def test_levels_of_an_image_are_foreseen_and_told_as_json(tmp_path):
     labels = np.zeros((16, 16))
     labels[4:10, 4:10] = 1
     np.save(tmp_path / "image.npy", labels)
     case = written(tmp_path, IMAGE)
-    assert main(["check", str(case), "--quiet", f"--json={tmp_path}/check.json"]) == 0
-    (stage,) = json.loads((tmp_path / "check.json").read_text())["foreseen"]
+    words = ["check", str(case), "--quiet", f"--json={tmp_path}/check.json"]
+    (counted, stage) = (told_by(tmp_path, [*words, *option]) for option in ([], ["--time"]))
+    assert counted == stage | {"seconds": None}
     assert (stage["stage"], stage["pieces"]) == ("image", "levels")
     assert stage["number"] == len(run_of(case)["image"]["E_GPa"]["lower"]) == 3
     assert stage["seconds"] > 0

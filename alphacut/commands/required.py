@@ -1,0 +1,171 @@
+"""The case of a command, and what its stages need: read and built before any of their work."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from alphacut.base.errors import FailedError, RefusedError, require
+from alphacut.base.number_text import percent_text
+from alphacut.case.content import Case, Content, load
+from alphacut.case.material import ThetaSection
+from alphacut.case.motion import EnvelopeSection
+from alphacut.case.structure import Structure
+from alphacut.commands.options import require_petsc
+from alphacut.frame import require_envelope
+from alphacut.frame.structures.linear import histories
+from alphacut.stages.answers import Response, require_tolerances
+from alphacut.stages.cell import CellProblem
+from alphacut.stages.envelope import tasks
+from alphacut.stages.foreseen import possible_materials, structure_as_computed
+from alphacut.stages.identify import require_learnable
+from alphacut.stages.modulus import require_levels
+from alphacut.stages.suite import moved_by, suite_records
+
+if TYPE_CHECKING:
+    from alphacut.rve.image.study import ImageStudy
+
+
+def read_case(options: argparse.Namespace) -> Case:
+    """Return the case file that the options name, with the changes of ``--set``."""
+    # Whether options of PETSc have a use is known when the case says how its cell is solved.
+    case = load(options.case, options.set)
+    require_petsc(options.petsc, case.content)
+    return case
+
+
+def require_runnable(content: Content) -> ImageStudy | None:
+    """Read and build all that the stages of a case need, so that `check` refuses it too.
+
+    Returns:
+        The study of the image that stage modulus takes; None where it takes none.
+
+    Raises:
+        RefusedError: A file is not read, or what a stage needs does not fit.
+        FailedError: What a stage needs cannot be built.
+    """
+    study_of_image = None
+    if "microstructure" in content.stages and content.microstructure is not None:
+        content.microstructure.require_readable(spheres=content.has_spheres)
+    if "modulus" in content.stages:
+        study_of_image = _require_material(content)
+    if "envelope" in content.stages:
+        _require_motion(content)
+    return study_of_image
+
+
+def _require_material(content: Content) -> ImageStudy | None:
+    """Refuse a cell, mesh or image that stage modulus cannot take.
+
+    Returns:
+        The study of the image, which was read for that; None for another cell.
+
+    Raises:
+        RefusedError: The cell, its mesh or its image does not fit the method; the α-levels make no
+            fuzzy modulus for a structure; or a structure would get its modulus from an image with
+            pores or rigid phases, of which one bound may be missing.
+    """
+    has_motion = "envelope" in content.stages
+    if has_motion and not content.has_stated_modulus:
+        require_levels(content.modulus.alpha, "modulus.alpha")
+    if content.image_cell is not None:
+        fits = all(content.image_cell.is_solid) or not has_motion
+        cure = "give a pore a small modulus, a rigid phase a large one, or take stage modulus alone"
+        require(fits, "cell.modulus", "0 or rigid", "both bounds of E, for a frame", cure)
+        from alphacut.stages.image import study_of  # whose solvers take time to import
+
+        study = study_of(content.image_cell)
+        study.require_solid(content.modulus.alpha)
+        return study
+    if "microstructure" not in content.stages:
+        problem = CellProblem.of(content)
+        problem.require_mesh()
+        problem.model()
+    elif (particle := content.particle_cell) is not None:
+        # Its radius is not known yet. The model does not depend on it: building it shows whether
+        # its library is there and its resolution allowed.
+        CellProblem(ThetaSection(), particle, content.mesh, content.modulus).model()
+    return None
+
+
+def _require_motion(content: Content) -> None:
+    """Refuse a case whose identification, envelopes or questions cannot be computed.
+
+    If the material is not known before a stage has run, two extremes of what it may be are tried,
+    and the case is refused only if neither works.
+
+    Raises:
+        RefusedError: All materials are refused; it is the error of the first one.
+        FailedError: The same, if the computation cannot be built with the first one.
+    """
+    if content.structure is None or content.envelope is None:
+        return
+    # A wrong stand-in must not refuse a right case: one extreme that works is enough.
+    errors: list[RefusedError | FailedError] = []
+    for material in possible_materials(content):
+        try:
+            structure = structure_as_computed(content, material)
+            _require_motion_of(content, content.envelope, structure)
+            return
+        except (RefusedError, FailedError) as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _require_motion_of(content: Content, section: EnvelopeSection, structure: Structure) -> None:
+    """Refuse identification, envelopes or tolerances that cannot be computed for a structure.
+
+    Args:
+        content: The case.
+        section: Its section [envelope].
+        structure: The structure, with the numbers fuzzy that will be so in the run. Of a suite the
+            first record alone moves it here.
+
+    Raises:
+        RefusedError: An input, output, record, method or tolerance does not fit the structure.
+        FailedError: The method cannot be set up for it.
+    """
+    if content.identify is not None:
+        require_learnable(content.identify, structure, section.alpha)
+    if content.records is not None:
+        records = suite_records(content.records, section, structure)
+        structure = moved_by(structure, records[0])  # which stands for all
+    for task in tasks(section, content.study):
+        require_envelope(**task.arguments(structure))
+    if content.tolerances is not None:
+        (own_task,) = tasks(section, ())  # of [envelope], as questions are
+        require_tolerances(content.tolerances, Response(structure, own_task))
+
+
+def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
+    """Yield a warning of each load that does not end as the responses do.
+
+    Warned of are an accelerogram that goes on after all responses have ended, and a force that is
+    not zero where its file ends, before the longest response does: it jumps to zero there. There
+    are no warnings without [envelope], or if the structure is not linear.
+
+    Args:
+        content: The case, for the durations of [envelope] and its studies.
+        structure: Its structure.
+    """
+    linear = structure.linear
+    if linear is None or content.envelope is None:
+        return
+    longest = max(task.duration for task in tasks(content.envelope, content.study))
+    for name, history in histories(linear).items():
+        end = history.start + history.step * (len(history.samples) - 1)
+        largest, _ = history.extremes
+        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned). The
+        # last value of a history that `is_held` stays on, so that it does not jump either.
+        jumps = abs(history.samples[-1]) > 0.01 * largest and not history.is_held
+        if history is linear.ground:
+            if end > longest * (1 + 1e-9):
+                yield f"the record lasts {end:g} s, and the motion is computed for {longest:g} s"
+        elif jumps and end < longest * (1 - 1e-9):
+            fraction = percent_text(float(abs(history.samples[-1])) / largest)
+            yield (
+                f"{name} ends at {end:g} s with {fraction} of its largest value, and is 0 from"
+                f" then on, while the motion is computed for {longest:g} s: let its file last as"
+                " long, or end with 0"
+            )
