@@ -7,30 +7,39 @@ import pytest
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import Cell, Ellipse, Phase, SeriesModel, VoigtPhase
-from alphacut.rve.cell.outline import circle
-from alphacut.rve.result.moduli import axial_moduli, square_moduli
-from alphacut.rve.series.model import square_stiffness
 from alphacut.stochastic import HermiteMap, gauss_rule
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.rve import SlicesModel
 from alphacut.rve.mesh.curved import plane_mesh
-from alphacut.rve.slices.model import PlaneCell, solve_slice, theta_error
+from alphacut.rve.slices.model import PlaneCell, theta_error
+from tests.rve.series.test_series import crisp_cell
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9)
 ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 40e9, 0.0), (5e9, 0.0, 25e9)))
 INDEPENDENT = ([0, 0, 2], [0, 1, 2])
 
 
-def stiffness_of(radius, order, *, size, matrix=MATRIX, inclusion=INCLUSION, outline=circle):
-    cell = PlaneCell(plane_mesh(radius, size=size, outline=outline), order)
+def stiffness_of(radius, order, *, size, matrix=MATRIX, inclusion=INCLUSION):
+    cell = PlaneCell(plane_mesh(radius, size=size, outline=Ellipse(1.0)), order)
     return cell.solve((matrix, inclusion))[0]
 
 
-def largest_error(stiffness, radius, matrix=MATRIX, inclusion=INCLUSION):
-    exact = square_stiffness(np.array([radius]), matrix, [inclusion]).matrix[0, 0]
-    return np.abs(stiffness[INDEPENDENT] / exact[INDEPENDENT] - 1).max()
+def slice_of(radius, matrix, inclusion, **options):
+    """Result of the slice of one radius."""
+    radius_map = HermiteMap(radius, 0, radius, 0)
+    return SlicesModel(points=2, **options).solve(radius_map, matrix, [inclusion])[0]
+
+
+def along_axes(stiffness):
+    """C11 + C12, C11 − C12 and C33, and those with C22 in place of C11."""
+    return np.array(
+        [
+            [c + stiffness[0, 1], c - stiffness[0, 1], stiffness[2, 2]]
+            for c in np.diag(stiffness)[:2]
+        ]
+    )
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -45,7 +54,10 @@ def test_affine_field_is_reproduced_on_curved_elements(order, phase):
 )
 def test_rate_of_the_stiffness(order, low, high):
     """Energies converge twice as fast as strains: order 2p."""
-    errors = [largest_error(stiffness_of(0.5, order, size=h), 0.5) for h in (0.2, 0.1)]
+    exact = crisp_cell(0.5, MATRIX, INCLUSION).stiffness[INDEPENDENT]
+    errors = [
+        abs(stiffness_of(0.5, order, size=h)[INDEPENDENT] / exact - 1).max() for h in (0.2, 0.1)
+    ]
     assert low < np.log2(errors[0] / errors[1]) < high
     assert errors[1] > 1e-13
 
@@ -72,18 +84,17 @@ def test_a_cell_on_its_turned_mesh_has_the_turned_stiffness(motion, turn, inclus
     assert abs(stiffness[0, 0] - stiffness[1, 1]) > 1e-2 * scale
 
 
-def true_errors(solved, radius, matrix, inclusion):
-    exact = square_stiffness(np.array([radius]), matrix, [inclusion]).matrix[0, 0]
-    return abs(square_moduli(exact) / square_moduli(solved.stiffness) - 1)
+def true_errors(solved, *cell):
+    return abs(crisp_cell(*cell).moduli / solved.moduli - 1)
 
 
-@pytest.mark.parametrize("radius", [0.001, 0.3, 0.85, 0.98])
+@pytest.mark.parametrize("radius", [0.001, 0.3, 0.98])
 @pytest.mark.parametrize("contrast", [1e-6, 1e6])
 def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
     inclusion = Phase(20e9 * contrast, 0.2)
-    [solved] = solve_slice(radius, MATRIX, [inclusion], mesh_size=0.5)
+    solved = slice_of(radius, MATRIX, inclusion, mesh_size=0.5)
     true = true_errors(solved, radius, MATRIX, inclusion)[[0, 2]].max()
-    assert true < solved.errors[[0, 2]].max() < 10 * true
+    assert true < solved.modulus_errors[[0, 2]].max() < 10 * true
 
 
 @pytest.mark.parametrize(
@@ -102,38 +113,38 @@ def test_error_of_a_slice_is_declared_at_the_edges(radius, contrast):
 )
 def test_coarse_meshes_hide_no_small_particle_from_both_orders(radius, size, matrix, inclusion):
     """The last two are off by 1.05 times what orders 4 and 5 on one mesh tell, or more."""
-    [solved] = solve_slice(radius, matrix, [inclusion], mesh_size=size)
+    solved = slice_of(radius, matrix, inclusion, mesh_size=size)
     true = true_errors(solved, radius, matrix, inclusion)[[0, 2]]
-    assert (true <= solved.errors[[0, 2]]).all()
+    assert (true <= solved.modulus_errors[[0, 2]]).all()
 
 
 @pytest.mark.parametrize(
     ("radius", "modulus", "size"), [(0.68, 4e8, 0.69), (0.88, 7e8, 0.56), (0.67, 1e9, 0.99)]
 )
 def test_the_estimate_of_a_slice_is_tight(radius, modulus, size):
-    [solved] = solve_slice(radius, MATRIX, [Phase(modulus)], mesh_size=size)
-    ratio = solved.errors / true_errors(solved, radius, MATRIX, Phase(modulus))
+    solved = slice_of(radius, MATRIX, Phase(modulus), mesh_size=size)
+    ratio = solved.modulus_errors / true_errors(solved, radius, MATRIX, Phase(modulus))
     assert 1.0 < ratio.min() < 1.8
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_error_counts_what_cancels_about_a_stiff_particle(seed):
     """Contrasts from 1e7 to 1e10: two orders agree by chance, and both are off."""
     rng = np.random.default_rng(seed)
     radius, contrast, size = rng.uniform(0.1, 0.9), 10 ** rng.uniform(7, 10), rng.uniform(0.1, 0.3)
     stiff = Phase(20e9 * contrast)
-    [solved] = solve_slice(radius, MATRIX, [stiff], mesh_size=size)
-    assert (true_errors(solved, radius, MATRIX, stiff) <= solved.errors).all()
+    solved = slice_of(radius, MATRIX, stiff, mesh_size=size)
+    assert (true_errors(solved, radius, MATRIX, stiff) <= solved.modulus_errors).all()
 
 
 def test_an_ellipse_of_an_orthotropic_material_has_its_own_error_declared():
     cell = HermiteMap(0.2, 0.1, 0.5, 0.1), MATRIX, [ORTHOTROPIC]
-    coarse = SlicesModel(mesh_size=1.0, points=6, outline=Ellipse(2.0)).solve(*cell)[0]
-    fine = SlicesModel(0.25, 7, Ellipse(2.0)).solve(*cell)[0]
-    moduli, exact = (axial_moduli(one.stiffness, square=False) for one in (coarse, fine))
+    coarse = SlicesModel(mesh_size=1.0, points=4, outline=Ellipse(2.0)).solve(*cell)[0]
+    fine = SlicesModel(0.35, 5, Ellipse(2.0)).solve(*cell)[0]
+    moduli, exact = (along_axes(one.stiffness) for one in (coarse, fine))
     true = abs(moduli / exact - 1).max(axis=0)
     assert 1 < (coarse.modulus_errors / true).min() < 1.8
-    assert fine.largest_error < 1e-5
+    assert fine.largest_error < 1e-4
     assert fine.checks["reuss"] == fine.checks["voigt"] == 0
 
 
@@ -152,13 +163,12 @@ def star(angle):
 )
 def test_two_orders_and_two_meshes_tell_the_error_of_any_outline(radius, modulus, outline, size):
     phase = Phase(modulus)
-    [solved] = solve_slice(radius, MATRIX, [phase], mesh_size=size, outline=outline)
-    fine = PlaneCell(plane_mesh(radius, size=0.3, outline=outline), 8)
-    exact = axial_moduli(fine.solve((MATRIX, phase))[0], square=False)
-    own = axial_moduli(solved.stiffness, square=False)
-    true = abs(exact / own - 1).max(axis=0)
-    assert (true <= solved.errors).all()
-    assert (solved.errors <= 3 * true).all()
+    solved = slice_of(radius, MATRIX, phase, mesh_size=size, outline=outline)
+    fine = PlaneCell(plane_mesh(radius, size=0.4, outline=outline), 8)
+    exact = along_axes(fine.solve((MATRIX, phase))[0])
+    true = abs(exact / along_axes(solved.stiffness) - 1).max(axis=0)
+    assert (true <= solved.modulus_errors).all()
+    assert (solved.modulus_errors <= 3 * true).all()
 
 
 def test_the_series_refuses_what_it_has_no_formula_for():
@@ -186,7 +196,7 @@ def estimated_and_true(points, *, seed, decades):
     stresses, so the series stands in for slices.
     """
     rng, pairs = np.random.default_rng(seed), []
-    while len(pairs) < 30:
+    while len(pairs) < 20:
         a1, a2, a3, a4 = rng.uniform([0.05, -0.5, 0.1, -0.5], [0.6, 1, 0.95, 1])
         try:
             radius_map = HermiteMap(a1, a2, a3, a4)
@@ -195,25 +205,26 @@ def estimated_and_true(points, *, seed, decades):
         matrix = Phase(20e9, rng.choice([rng.uniform(0, 0.45), 0.499]))
         inclusion = Phase(20e9 * 10 ** rng.uniform(-decades, decades), 0.2)
         rule = gauss_rule(radius_map.distribution, points=points(rng))
-        radii = np.unique(
-            np.round(np.concatenate([radius_map(rule.nodes), radius_map.extremes()]), 12)
+        cell, extremes = Cell(matrix, inclusion, radius_map), radius_map.extremes()
+        own, fine = (
+            SeriesModel(points=n).solve(radius_map, matrix, [inclusion])[0]
+            for n in (len(rule.nodes), 48)
         )
-        cells = square_stiffness(radii, matrix, [inclusion])
-        moduli = square_moduli(cells.matrix[:, 0])
-        cell = Cell(matrix, inclusion, radius_map)
+        ends = [crisp_cell(radius, matrix, inclusion).moduli for radius in extremes]
+        at_nodes = np.stack([along_axes(one)[0] for one in own.curve.stiffness])
+        radii, first = np.unique(
+            np.round(np.concatenate([radius_map(rule.nodes), extremes]), 12), return_index=True
+        )
+        moduli = np.concatenate([at_nodes, ends])[first]
         estimate = theta_error(cell, rule, radii=radii, moduli=moduli)
-        fine = gauss_rule(radius_map.distribution, points=200)
-        exact = square_moduli(square_stiffness(radius_map(fine.nodes), matrix, [inclusion]).matrix)
-        own = moduli[np.searchsorted(radii, np.round(radius_map(rule.nodes), 12))]
-        means = rule.weights @ own, fine.weights @ exact[:, 0]
-        pairs.append((estimate, abs(means[0] / means[1] - 1)))
+        pairs.append((estimate, abs(own.moduli / fine.moduli - 1)))
     return np.array(pairs).reshape(-1, 2, 3).swapaxes(0, 1).reshape(2, -1)
 
 
 def test_estimate_of_the_rule_bounds_its_error():
     estimate, true = estimated_and_true(lambda rng: int(rng.integers(4, 10)), seed=7, decades=2)
-    assert np.quantile(estimate / true, 0.05) > 1
-    assert np.median(estimate / true) < 30
+    assert np.mean(estimate > true) > 0.95
+    assert np.median(estimate / np.maximum(true, 1e-16)) < 30
 
 
 def test_estimate_of_the_rule_falls_with_its_error():
