@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import FailedError, Interval, RefusedError
 from alphacut.rve import (
     Ellipse,
     Phase,
@@ -13,16 +13,11 @@ from alphacut.rve import (
     SeriesModel,
     SlicesModel,
     VoigtPhase,
+    constants,
     fuzzy_stiffness,
     loss_factors,
 )
-from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.wedge import slice_weights
-from alphacut.rve.prism.modulus_basis import ModulusBasis
-from alphacut.rve.prism.problem import FoldedMeshError
-from alphacut.rve.prism.slices import slice_mesh
-from alphacut.rve.result.engineering_constants import PLANE_STRAIN, engineering_constants
-from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.stochastic import HermiteMap
 from tests.rve.series.test_series import EXACT
 from tests.stochastic.test_laws import Own
@@ -42,7 +37,7 @@ def crisp_errors(radius, size):
     return np.array(mean) / np.array(EXACT[radius]) / 1e9 - 1
 
 
-@pytest.mark.parametrize("radius", EXACT)
+@pytest.mark.parametrize("radius", [0.2, 0.8])
 def test_shear_stress_converges_with_order_three_to_four_and_a_half(radius):
     coarse, fine = crisp_errors(radius, 0.08), crisp_errors(radius, 0.04)
     assert (fine > 0).all()  # a Galerkin stiffness is too stiff
@@ -78,7 +73,7 @@ def test_phases_that_differ_in_what_no_load_sees_pass_the_patch_test():
 
 
 def test_samples_of_one_set_up_are_those_solved_alone_bit_for_bit():
-    particles = [Phase(e) for e in (75e9, 80e9, 85e9, 20e9 * 40)]
+    particles = [Phase(e) for e in (75e9, 85e9, 20e9 * 40)]
     together = PrismModel(mesh_size=0.3, layers=4).solve(PAPER, MATRIX, particles)
     solve(HermiteMap(0.4, 0, 0.6, 0), mesh_size=0.3, layers=4)  # another map in between
     alone = [solve(particle=p, mesh_size=0.3, layers=4) for p in particles]
@@ -92,7 +87,8 @@ def test_samples_on_coarse_meshes_are_those_solved_alone(size, layers):
     particles = [Phase(e * 1e9) for e in (80, 81, 82, 85, 75)]
     model = PrismModel(size, layers, estimate=False)
     together = model.solve(PAPER, MATRIX, particles)
-    slice_mesh.cache_clear()
+    for other in (0.6, 0.7):  # two other meshes, after which nothing of the first is kept
+        solve(mesh_size=other, layers=1, estimate=False)
     alone = model.solve(PAPER, MATRIX, particles[-1:])
     assert together[-1].modulus == alone[0].modulus
     assert together[0].modulus < together[1].modulus < together[2].modulus < together[3].modulus
@@ -107,7 +103,7 @@ def test_projected_samples_are_those_solved_whatever_their_company():
         assert one.modulus == pytest.approx(other.modulus, rel=2e-10)
         assert len(one.iterations) == 2 * len(other.iterations)
         error = abs(one.curve.s11 / other.curve.s11 - 1).max()
-        assert 1e-9 < error <= one.curve.error == ModulusBasis.curve_error
+        assert 1e-9 < error <= one.curve.error < 1e-4
         assert other.curve.error == 0
     assert model.solve(PAPER, MATRIX, [Phase(77e9)])[0].modulus == projected[1].modulus
     assert len(model.solve(PAPER, MATRIX, [Phase(90e9)])[0].iterations) == 2
@@ -153,10 +149,10 @@ def test_the_form_over_slices_gives_what_it_gives_over_prisms(petsc):
 @pytest.fixture(scope="module")
 def turned_ellipse():
     """An ellipse of an orthotropic material, both turned, by prisms and by slices."""
-    outline = Ellipse(2.0, 30.0)
-    slices = SlicesModel(0.4, 5, outline)
-    models = PrismModel(0.4, 3, outline=outline), slices
-    return [model.solve(SMALL, MATRIX, [ORTHOTROPIC])[0] for model in models]
+    outline, bump = Ellipse(2.0, 30.0), HermiteMap(0.3, 0.8, 0.3, -0.8)  # radii in pairs
+    slices = SlicesModel(0.6, 4, outline)
+    models = PrismModel(0.5, 3, outline=outline), slices
+    return [model.solve(bump, MATRIX, [ORTHOTROPIC])[0] for model in models]
 
 
 def test_any_stiffness_and_outline_agree_with_slices_within_declared_errors(turned_ellipse):
@@ -165,8 +161,8 @@ def test_any_stiffness_and_outline_agree_with_slices_within_declared_errors(turn
     assert (error <= prism.stiffness_errors + slices.stiffness_errors).all()
     assert abs(prism.stiffness[:2, 2]).min() > 1e-3 * prism.stiffness[0, 0]
     assert abs(prism.modulus / slices.modulus - 1) <= prism.estimated_error < 1e-2
-    assert slices.largest_error < 1e-4
-    assert list(engineering_constants(prism)) == [PLANE_STRAIN]  # no isotropic phases
+    assert slices.largest_error < 1e-3
+    assert not [name for name in constants(prism).values if name.endswith("_free")]
 
 
 def test_losses_of_any_stiffness_and_outline_agree_within_declared_errors(turned_ellipse):
@@ -204,15 +200,14 @@ def test_wedges_about_a_sharp_outline_are_sound_at_all_radii():
     problem = model.problem(HermiteMap(0.078, 0, 0.405, 0))
     determinants = problem.areas / slice_weights()
     assert (determinants > 0.2 * determinants.mean(axis=(1, 2), keepdims=True)).all()
-    first = extrude(
-        size=0.6, radius=problem.grid.plane.radius, outline=model.outline, layers=1
-    ).plane
-    assert len(problem.grid.plane.triangles) > len(first.triangles)
+    plane, radius = problem.grid.plane, problem.grid.plane.radius
+    first = model.problem(HermiteMap(radius, 0, radius, 0)).grid.plane
+    assert len(plane.triangles) > len(first.triangles)
 
 
 def test_a_mesh_that_folds_over_is_refused_with_its_cure():
     bent = HermiteMap(0.235, 0.0138, 0.1165, 0.932)  # down to 0.004 and up again at the end
-    with pytest.raises(FoldedMeshError, match=r"folds over .* 2 layers in θ; take more layers"):
+    with pytest.raises(FailedError, match=r"folds over .* 2 layers in θ; take more layers"):
         solve(bent, mesh_size=0.4, layers=2)
     assert solve(bent, mesh_size=0.4, layers=8).modulus > 20e9
 
@@ -220,7 +215,7 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
 @pytest.mark.parametrize(
     ("petsc", "error", "message"),
     [
-        ({"ksp_max_it": "2"}, ConvergenceError, "stopped after 2 iterations .* raise -rve_ksp_max"),
+        ({"ksp_max_it": "2"}, FailedError, "stopped after 2 iterations .* raise -rve_ksp_max"),
         ({"ksp_type": "nonsense"}, RefusedError, "-rve_ksp_type nonsense; allowed: what PETSc"),
         ({"ksp_rtol": "soft"}, RefusedError, "ksp_rtol soft"),
         ({"ksp_tipe": "cg"}, RefusedError, "-rve_ksp_tipe is cg; .* check its spelling"),
@@ -276,5 +271,5 @@ def test_curves_of_a_campaign_declare_the_error_at_a_single_theta():
     model = PrismModel(0.6, 3, estimate=False)
     inputs = {"inclusion_modulus": Interval(79e9, 81e9)}
     found = fuzzy_stiffness(model, PAPER, (MATRIX, PARTICLE), inputs, alpha=[0.0], progress=False)
-    assert found.curve_error == ModulusBasis.curve_error > 0
+    assert found.curve_error > 0
     assert found.to_dataset()["curve11"].attrs["relative_error"] == found.curve_error
