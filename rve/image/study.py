@@ -116,12 +116,12 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
 
 
 def _dimension_of(file: Path) -> int:
-    """Return 2 for a picture and 3 for a volume, or for .npy the number of axes of the array.
+    """Return 3 for a volume, also in a .npy of three axes, and 2 for all other files.
 
     It is 2 for a file that does not exist. RefusedError for a damaged .npy.
     """
     if file.suffix.lower() == ".npy" and file.is_file():
-        return int(np.ndim(read_npy(file, kinds="buifc")))
+        return 3 if np.ndim(read_npy(file, kinds="buifc")) == 3 else 2
     return 3 if file.is_dir() or file.suffix.lower() in HEADS else 2
 
 
