@@ -1,27 +1,332 @@
-"""Bounds of crisp images: exact cases, fields that are not solved for, convergence."""
+"""Proved bounds of images and volumes: exact cases, symmetries, an independent solver, losses.
+
+The last part takes the bounds from the energies one by one: inverses, averages, losses. Their
+margins for rounding are tight within a factor of two somewhere, so that halving one, or leaving it
+out, turns its test red.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import splu
 
-from alphacut.fuzzy import FailedError
-from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
-from alphacut.rve.image.fields.element import element_of
-from alphacut.rve.image.fields.energy import (
-    coefficients_of,
-    energies,
-    minimum_energy,
-    solve_side,
-    solved_loads,
-)
-from alphacut.rve.image.fields.grid import Operator
-from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
-from alphacut.rve.image.model import solve_image
+from alphacut.fuzzy import FailedError, RefusedError
+from alphacut.rve import Phase, SpheresModel
+from alphacut.rve.image.bounds import StiffnessBounds, hill_mean, inverse_below, residual_above
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.losses import energy_fractions, mean_loss
+from alphacut.rve.image.model import ImageModel, solve_image
+from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.engineering_constants import EngineeringConstants
-from tests.rve.image.test_voxels import isotropic, laminate
+from alphacut.stochastic import HermiteMap
 
-TIGHT = ConjugateGradient(accuracy=1e-11)
-SIDES = pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
+TIGHT = ConjugateGradient(accuracy=1e-12)
+UNIT = 2.0**-53
+LOST = UNIT * (1 - 2.0**-20)  # just too little to change 1
+
+
+def voxels(rng, shape, *, contrast, count=2):
+    """Phase of each voxel, smooth at random, and moduli (K, G) of the phases."""
+    noise = rng.normal(size=shape)
+    for axis in range(3):
+        noise = noise + np.roll(noise, 1, axis)
+    edges = np.quantile(noise, np.sort(rng.uniform(0.2, 0.8, count - 1)))
+    young = contrast ** np.linspace(0, 1, count)
+    nu = rng.uniform(0.0, 0.4, count)
+    moduli = np.array([young / (3 * (1 - 2 * nu)), young / (2 * (1 + nu))])
+    return np.searchsorted(edges, noise), rng.permuted(moduli, axis=1)
+
+
+def isotropic(bulk, shear):
+    stiffness = np.zeros((6, 6))
+    stiffness[:3, :3] = bulk - 2 / 3 * shear
+    return stiffness + shear * np.diag([2, 2, 2, 1, 1, 1])
+
+
+def laminate(axis, fractions, moduli):
+    """Exact stiffness of layers across an axis: stress across and strain along them are uniform."""
+    across = [k for k in range(6) if k in (axis, *({3, 4, 5} - {3 + axis}))]
+    along = [k for k in range(6) if k not in across]
+    parts = [np.zeros(shape) for shape in ((3, 3), (3, 3), (3, 3))]
+    for fraction, pair in zip(fractions, moduli.T, strict=True):
+        c = isotropic(*pair)
+        inverse = np.linalg.inv(c[np.ix_(across, across)])
+        coupling = inverse @ c[np.ix_(across, along)]
+        free = c[np.ix_(along, along)] - c[np.ix_(along, across)] @ coupling
+        for part, value in zip(parts, (inverse, coupling, free), strict=True):
+            part += fraction * value
+    stiffness = np.zeros((6, 6))
+    stiff = np.linalg.inv(parts[0])
+    stiffness[np.ix_(across, across)] = stiff
+    stiffness[np.ix_(across, along)] = stiff @ parts[1]
+    stiffness[np.ix_(along, across)] = parts[1].T @ stiff
+    stiffness[np.ix_(along, along)] = parts[2] + parts[1].T @ stiff @ parts[1]
+    return stiffness
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("contrast", [1e-3, 10.0, 1e6])
+def test_bounds_of_laminates_meet_at_their_exact_stiffness(axis, contrast, rng):
+    shape = np.full(3, 2)
+    shape[2 - axis] = 6
+    layers = np.array([0, 1, *rng.integers(0, 2, 4)])
+    phase = np.moveaxis(np.broadcast_to(layers, (2, 2, 6)), 2, 2 - axis)
+    moduli = np.array([[1.0, 1.7 * contrast], [0.6, 0.5 * contrast]])
+    fractions = np.bincount(layers) / 6
+    sides = (*rng.uniform(0.7, 1.4, 2), 1.0)
+    bounds = solve_image(*moduli[:, phase], sides=sides, solver=TIGHT).bounds
+    assert bounds.width < 1e-9
+    assert bounds.contains(laminate(axis, fractions, moduli))
+
+
+def test_mixtures_of_one_shear_modulus_have_hills_bulk_modulus(rng):
+    for _ in range(4):
+        phase, (bulk, shear) = voxels(rng, rng.integers(4, 9, 3), contrast=20.0, count=3)
+        shear = np.full(3, shear[0])
+        fractions = np.bincount(phase.ravel(), minlength=3) / phase.size
+        exact = 1 / (fractions @ (1 / (bulk + 4 / 3 * shear))) - 4 / 3 * shear[0]
+        bounds = solve_image(bulk[phase], shear[phase]).bounds
+        assert bounds.contains(isotropic(exact, shear[0]))
+
+
+def turned(axes, signs):
+    """Matrix of Voigt strains when axes are exchanged and mirrored."""
+    turn = np.eye(3)[list(axes)] * np.array(signs)[:, None]
+    pairs = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+    matrix = np.zeros((6, 6))
+    for column, (a, b) in enumerate(pairs):
+        strain = np.zeros((3, 3))
+        strain[a, b] = strain[b, a] = 1 if a == b else 0.5
+        new = turn @ strain @ turn.T
+        matrix[:, column] = [new[i, j] * (1 if i == j else 2) for i, j in pairs]
+    return matrix
+
+
+def test_exchanged_mirrored_and_shifted_axes_give_the_same_bounds(rng):
+    phase, moduli = voxels(rng, (5, 6, 7), contrast=5.0)
+    sides = {"x": 1.0, "y": 0.8, "z": 1.3}
+    first = solve_image(*moduli[:, phase], sides=(1.3, 0.8, 1.0), solver=TIGHT).bounds
+    moved = np.roll(phase, (2, -1, 3), (0, 1, 2)).transpose(1, 2, 0)[:, ::-1]  # axes y, −x, z
+    new_sides = sides["y"], sides["x"], sides["z"]
+    second = solve_image(*moduli[:, moved], sides=new_sides, solver=TIGHT).bounds
+    turn = turned((2, 0, 1), (1, -1, 1))  # new x, y, z are z, −x, y
+    for old, new in ((first.lower, second.lower), (first.upper, second.upper)):
+        inverse = np.linalg.inv(turn)
+        assert inverse.T @ old @ inverse == pytest.approx(new, abs=1e-10 * np.abs(new).max())
+
+
+def finite_elements(bulk, shear, sides, parts):
+    """Stiffness, (6, 6), by trilinear elements, assembled at Gauss points and factorised."""
+    bulk, shear = (np.kron(x, np.ones((parts,) * 3)) for x in (bulk, shear))
+    shape, h = bulk.shape, np.array(sides[::-1])
+    corners = np.array([(a, b, c) for a in (0, 1) for b in (0, 1) for c in (0, 1)])  # z, y, x
+    local, means = np.zeros((2, 24, 24)), np.zeros((2, 6, 24))
+    trace = np.outer([1, 1, 1, 0, 0, 0], [1, 1, 1, 0, 0, 0])
+    deviator = np.diag([2, 2, 2, 1, 1, 1]) - 2 / 3 * trace
+    points = (1 + np.array([-1, 1]) / np.sqrt(3)) / 2
+    for point in np.array(np.meshgrid(points, points, points)).reshape(3, -1).T:
+        value = np.where(corners, point, 1 - point)
+        slope = np.stack([np.prod(np.where(np.arange(3) == k, np.where(corners, 1, -1), value), axis=1)
+                          for k in (2, 1, 0)]) / h[:, None]  # fmt: skip
+        strain = np.zeros((6, 24))
+        for k in range(3):
+            strain[k, k::3] = slope[k]
+        for row, (i, j) in zip((3, 4, 5), ((1, 2), (0, 2), (0, 1)), strict=True):
+            strain[row, i::3], strain[row, j::3] = slope[j], slope[i]
+        for k, law in enumerate((trace, deviator)):
+            local[k] += strain.T @ law @ strain / 8
+            means[k] += law @ strain / 8
+    number = np.arange(bulk.size).reshape(shape)
+    nodes = np.stack([np.roll(number, -corner, (0, 1, 2)).ravel() for corner in corners], axis=1)
+    rows = (3 * nodes[:, :, None] + np.arange(3)).reshape(-1, 24)
+    moduli = np.stack([bulk.ravel(), shear.ravel()])
+    entries = np.einsum("ke,kab->eab", moduli, local)
+    matrix = coo_array(
+        (entries.ravel(), (np.repeat(rows, 24, 1).ravel(), np.tile(rows, 24).ravel()))
+    )
+    load = np.zeros((3 * bulk.size, 6))
+    np.add.at(load, rows, np.einsum("ke,kca->eac", moduli, means))
+    free = np.arange(3, 3 * bulk.size)
+    fluctuation = splu(matrix.tocsc()[3:, 3:]).solve(load[free])
+    mean = np.einsum("ke,kab->ab", moduli, [trace, deviator]) / bulk.size
+    return mean - load[free].T @ fluctuation / bulk.size
+
+
+@pytest.mark.parametrize("contrast", [0.02, 30.0])
+def test_an_independent_solver_is_never_below_and_its_limit_never_above(contrast, rng):
+    phase, moduli = voxels(rng, (4, 3, 5), contrast=contrast, count=int(rng.integers(2, 5)))
+    sides = (*rng.uniform(0.6, 1.6, 2), 1.0)
+    bounds = solve_image(*moduli[:, phase], sides=sides).bounds
+    once, twice = (finite_elements(*moduli[:, phase], sides, parts) for parts in (1, 2))
+    scale = np.abs(bounds.upper).max()
+    # one element a voxel is the space of the upper bound; the next is between the bounds
+    assert once == pytest.approx(bounds.upper, abs=1e-4 * scale)
+    assert np.linalg.eigvalsh(bounds.upper - twice)[0] > 0
+    assert np.linalg.eigvalsh(twice - bounds.lower)[0] > 0
+    limit = twice - (once - twice) / 3  # for errors of order 2; edges make them fall more slowly
+    assert np.linalg.eigvalsh(limit - bounds.lower)[0] > 0
+
+
+@pytest.mark.parametrize("contrast", [0.1, 10.0])
+def test_the_series_of_spheres_is_between_the_voxels_inside_and_those_touched(contrast):
+    radius = np.cbrt(1.2 / np.pi)  # of fraction 0.2, over half the cell's side
+    matrix, sphere = Phase(20e9, 0.2), Phase(contrast * 20e9, 0.3)
+    radius_map = HermiteMap(radius, 0, radius, 0)
+    exact = SpheresModel(points=2).solve(radius_map, matrix, [sphere])[0].stiffness
+    widths = []
+    for size in (6, 12):
+        far = 2 * np.arange(1, size // 2 + 1) / size  # faces of voxels on one side of the middle
+        masks = []
+        for squares in (far**2, (far - far[0]) ** 2):
+            along = np.concatenate([squares[::-1], squares])
+            masks.append(along[:, None, None] + along[:, None] + along < radius**2)
+        pairs = [
+            np.sort([np.where(mask, inside, outside) for mask in masks], axis=0)
+            for outside, inside in zip(matrix.bulk_and_shear, sphere.bulk_and_shear, strict=True)
+        ]
+        bounds = ImageModel((1.0, 1.0, 1.0)).solve(ModuliImages(*np.swapaxes(pairs, 0, 1))).bounds
+        assert bounds.contains(exact)
+        widths.append(bounds.width)
+    assert widths[1] < 0.65 * widths[0]  # of order 1 in the voxel's side
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pores_are_bounded_from_above_and_rigid_phases_from_below(dimension, rng):
+    (_, moduli), phase = voxels(rng, (3, 4, 4), contrast=3.0), np.ones((3, 4, 4), int)
+    phase[1, 1:3, 1:3] = 0
+    phase = phase if dimension == 3 else phase[1:2]
+    soft, hard = (finite_elements(*(moduli * [r, 1])[:, phase], (1.0,) * 3, 2) for r in (1e-9, 1e9))
+    plane = np.ix_([0, 1, 5], [0, 1, 5])
+    if dimension == 2:
+        phase, soft, hard = phase[0], soft[plane], hard[plane]
+        moduli = np.array([moduli[0] + moduli[1] / 3, moduli[1]])
+    pore, limit, rigid, near = (
+        solve_image(*(moduli * [r, 1])[:, phase]).bounds for r in (0, 1e-4, np.inf, 1e3)
+    )
+    if dimension == 3:  # elements of the plane are not nested in finer ones of degree 1
+        assert eigh(soft, pore.upper, eigvals_only=True)[-1] <= 1
+    between = eigh(pore.upper, limit.upper, eigvals_only=True)
+    assert 0.97 < between[0] <= between[-1] <= 1 + 1e-5
+    assert eigh(rigid.lower, hard, eigvals_only=True)[-1] <= 1
+    assert eigh(rigid.lower, near.lower, eigvals_only=True)[0] >= 1 - 1e-5
+    assert eigh(pore.lower, soft, eigvals_only=True)[-1] <= 1
+    phase[:, 1] = 0  # pores that meet their own image
+    percolating = solve_image(*(moduli * [0, 1])[:, phase]).bounds
+    assert not percolating.lower.any()
+    for bounds, side, end in ((percolating, 0, 0.0), (rigid, 1, np.inf)):
+        constants = bounds.constants()
+        ends = np.array([bounds.bulk, bounds.shear(), *constants[:dimension], constants[-1]])
+        assert np.isfinite(ends[:, 1 - side]).all()
+        assert (ends[:, side] == end).all()
+        assert np.array_equal(constants[dimension], [-np.inf, np.inf])  # ν
+    assert percolating.young()[0] <= 0
+
+
+def test_a_homogeneous_volume_is_exact_and_its_constants_are_its_own():
+    bulk, shear = np.full((2, 3, 4), 3.0), np.full((2, 3, 4), 2.0)
+    bounds = solve_image(bulk, shear).bounds
+    assert bounds.contains(isotropic(3.0, 2.0))
+    young, poisson = 9 * 3.0 * 2.0 / 11.0, 5 / 22
+    expected = [young] * 3 + [poisson] * 3 + [2.0] * 3
+    for (low, high), value in zip(bounds.constants(), expected, strict=True):
+        assert low <= value <= high < low + 5e-12
+    for (low, high), value in (
+        (bounds.bulk, 3.0),
+        (bounds.shear(), 2.0),
+        (bounds.young(), young),
+        (bounds.poisson(), poisson),
+    ):
+        assert low <= value <= high < low + 5e-12
+
+
+def test_losses_of_laminates_and_equal_losses_are_exact(rng):
+    phase = np.moveaxis(np.broadcast_to([0, 1, 1, 0, 1, 1], (2, 2, 6)), 2, 2)
+    moduli = np.array([[1.0, 9.0], [0.6, 4.0]])
+    images = ModuliImages.crisp(*moduli[:, phase])
+    model = ImageModel((1.0, 1.0, 1.0), solver=TIGHT)
+    shares = energy_fractions(model, model.solve(images), images, phase, 2)
+    step = 1e-6
+    for name, index in (("E_x", 0), ("E_y", 1), ("E_z", 2)):
+
+        def young(change, index=index):
+            changed = moduli * [1 + change, 1]
+            return 1 / np.linalg.inv(laminate(0, (1 / 3, 2 / 3), changed))[index, index]
+
+        exact = (young(step) - young(-step)) / (2 * step * young(0))
+        low, high = shares[name][0]
+        assert low <= exact + 1e-9
+        assert exact - 1e-9 <= high < low + 2e-5
+        loss = mean_loss(shares[name], [0.01, 0.03], [0.01, 0.03])
+        assert loss[0] - 1e-9 <= 0.01 * exact + 0.03 * (1 - exact) <= loss[1] + 1e-9
+        assert loss[1] - loss[0] < 1e-6
+    low, high = mean_loss(np.array([[0.1, 0.5], [0.2, 0.9]]), [0.02, 0.02], [0.02, 0.02])
+    assert low <= 0.02 <= high < low + 1e-15
+
+
+def test_shares_of_energy_hold_where_bounds_are_wide():
+    """Along layers of moduli 1 and 4 the soft third has (1/3)/(1/3 + 8/3) of the energy."""
+    phase = np.repeat([[0], [1], [1], [0], [1], [1]], 2, axis=1)
+    moduli = np.array([1.0, 4.0])[phase]
+    images = ModuliImages.crisp(moduli, 0.5 * moduli)
+    model = ImageModel(solver=TIGHT)
+    solution = model.solve(images)
+    sharp = solution.bounds
+    for lower, upper in ((0.5, 1.0), (1.0, 2.0), (0.7, 1.4)):
+        wide = StiffnessBounds(lower * sharp.lower, upper * sharp.upper)
+        shares = energy_fractions(model, replace(solution, bounds=wide), images, phase, 2)
+        for (low, high), share in zip(shares["E_x"], (1 / 9, 8 / 9), strict=True):
+            assert low <= share + 1e-12
+            assert share - 1e-12 <= high
+
+
+def test_first_order_losses_of_an_independent_solver_are_inside(rng):
+    phase, moduli = voxels(rng, (3, 4, 4), contrast=8.0)
+    images = ModuliImages.crisp(*moduli[:, phase])
+    model = ImageModel((1.0, 1.0, 1.0))
+    shares = energy_fractions(model, model.solve(images), images, phase, 2)
+    step, sides = 1e-4, (1.0, 1.0, 1.0)
+
+    def moduli_at(change):
+        changed = moduli * [1 + change, 1]
+        stiffness = finite_elements(*changed[:, phase], sides, 2)
+        return 1 / np.diagonal(np.linalg.inv(stiffness))[:3]
+
+    slopes = (moduli_at(step) - moduli_at(-step)) / (2 * step * moduli_at(0))
+    for name, slope in zip(("E_x", "E_y", "E_z"), slopes, strict=True):
+        low, high = shares[name][0]
+        assert low < slope < high
+        assert 0 <= low < high <= 1
+
+
+@pytest.mark.parametrize(
+    ("bulk", "shear", "settings", "what"),
+    [
+        (np.ones((2, 2, 2)), np.ones((2, 2, 3)), {}, "shapes"),
+        (np.ones(3), np.ones(3), {}, "shape"),
+        (np.zeros((2, 2, 2)), np.ones((2, 2, 2)), {}, "throughout"),
+        (np.full((2, 2), np.nan), np.ones((2, 2)), {}, "negative or nan"),
+        (np.ones((2, 2, 2)), np.ones((2, 2, 2)), {"sides": (1.0, 1.0)}, "sides"),
+        (np.ones((2, 2)), np.ones((2, 2)), {"division": 0}, "division"),
+    ],
+)
+def test_arrays_that_are_no_moduli_of_a_grid_are_refused(bulk, shear, settings, what):
+    with pytest.raises(RefusedError, match=what):
+        solve_image(bulk, shear, **settings)
+
+
+def test_moduli_in_single_precision_are_proved_as_doubles(rng):
+    phase, moduli = voxels(rng, (3, 4, 5), contrast=20.0)
+    single = moduli[:, phase].astype(np.float32)
+    bounds, exact = solve_image(*single).bounds, solve_image(*single.astype(float)).bounds
+    assert np.array_equal(bounds.lower, exact.lower)
+    assert np.array_equal(bounds.upper, exact.upper)
+
+
+# the plane
 
 
 PLANE = np.ix_([0, 1, 5], [0, 1, 5])  # Voigt's 11, 22 and 12 of space
@@ -49,7 +354,7 @@ def random_phases(rng):
     return tuple(tuple(np.exp(rng.uniform(0, np.log(100), 2))) for _ in range(2))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_laminates_are_inside_and_the_bounds_meet_on_them(seed):
     rng = np.random.default_rng(seed)
     columns, rows = rng.integers(2, 40, 2)
@@ -67,7 +372,7 @@ def test_laminates_are_inside_and_the_bounds_meet_on_them(seed):
     assert turned.contains(exact[np.ix_([1, 0, 2], [1, 0, 2])])
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_mixtures_of_equal_shear_moduli_are_inside(seed):
     rng = np.random.default_rng(seed)
     (first, shear), (second, _) = random_phases(rng)
@@ -78,27 +383,7 @@ def test_mixtures_of_equal_shear_moduli_are_inside(seed):
     assert result.contains(stiffness(bulk, shear))
 
 
-@SIDES
-@pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 10.0])
-def test_a_perturbed_field_still_bounds(stress, size):
-    rng, element = np.random.default_rng(3), element_of((1.0, 1.0), stress=stress)
-    bulk, shear = image_of(discs(24, rng), ((40.0, 25.0), (7.0, 3.0)))
-    best = solve_side(element, bulk, shear, solver=TIGHT)
-    noise = size * rng.normal(size=best.fields.shape)
-    trial = energies_of(element, bulk, shear, best.fields + noise)
-    least = best.energy.value.sum(axis=0)
-    gap = np.linalg.eigvalsh(trial.upper - least + 1e-11 * np.eye(3))
-    assert gap[0] >= 0
-    assert size < 1e-3 or gap[0] > 1e-4 * np.abs(least).max()
-
-
-def energies_of(element, bulk, shear, fields):
-    """Energies of fields under the unit loads."""
-    weights = coefficients_of(element, bulk, shear)
-    return energies(element, fields, element.mean_modes(np.eye(3)), weights)
-
-
-@pytest.mark.parametrize("shape", [(24, 20), (4, 5, 6)])
+@pytest.mark.parametrize("shape", [(24, 20), (3, 4, 5)])
 def test_divided_elements_narrow_the_bounds_of_the_same_image(shape, rng):
     moduli, sides = random_moduli(rng, shape, span=10.0), (0.8, *(1.0,) * (len(shape) - 1))
     whole, parts = (
@@ -124,7 +409,7 @@ def test_the_modulus_is_inside_its_bounds_where_it_falls_with_the_shear_modulus(
     assert inside.max() <= high <= inside.max() + 1e-4 * (shear[1] + shear[1] ** 2 / bulk[0])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_intervals_of_constants_hold_all_stiffnesses_between_the_bounds_and_meet(seed):
     rng = np.random.default_rng(seed)
     roots = rng.normal(size=(2, 3, 3))
@@ -141,9 +426,6 @@ def test_intervals_of_constants_hold_all_stiffnesses_between_the_bounds_and_meet
         assert ends[[0, 1, 3], 1 - place] == pytest.approx(values[[0, 1, 3]], rel=1e-9)
 
 
-# when the solver stops: the energy that is left, and the bound of it
-
-
 def random_moduli(rng, shape, span=1e3):
     """Two phases whose moduli differ by up to `span`, each on a random share of the pixels."""
     phases = np.exp(rng.uniform(0, np.log(span), (2, 2)))
@@ -152,7 +434,7 @@ def random_moduli(rng, shape, span=1e3):
     return tuple(np.where(mask, *pair) for pair in phases)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-5])
 def test_bounds_are_as_close_to_those_of_solved_fields_as_the_accuracy(seed, accuracy):
     rng = np.random.default_rng([seed, 1])
@@ -163,52 +445,6 @@ def test_bounds_are_as_close_to_those_of_solved_fields_as_the_accuracy(seed, acc
     ratios = np.array([np.linalg.eigvals(np.linalg.solve(b, a)).real for a, b in pairs])
     assert ratios.min() > 1 - 1e-9
     assert ratios.max() < 1 + 3 * accuracy + 1e-9
-
-
-@SIDES
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("load", range(3))
-def test_no_system_lacks_more_energy_than_its_accuracy(stress, seed, load):
-    """With bulk moduli nearly equal the first steps gain nearly nothing: a pause, not the end."""
-    rng = np.random.default_rng([seed, 517])
-    mask = np.kron(rng.random((5, 5)) < 0.2, np.ones((4, 4))) > 0
-    mask[:4, :4] = True
-    element = element_of((0.7, 1.0), stress=stress)
-    system = system_of(element, np.where(mask, 1.4785, 1.4780), np.where(mask, 92.2, 1.78), load)
-    solved = ConjugateGradient(1e-14).solve(system)
-    shares = []
-    for accuracy in 10.0 ** np.arange(-8, 0):
-        wrong = ConjugateGradient(accuracy).solve(system) - solved
-        lacking = inner(wrong, system.operator(wrong))
-        shares.append(lacking / system.scale / accuracy)
-    assert max(shares) <= 1 + 1e-5
-    assert max(shares) > 0.02  # so no work is wasted
-
-
-def system_of(element, trace, deviator, load=0):
-    """The system of one of three loads on periodic fields."""
-    constant = Reference.of_grid(element, trace, deviator)
-    inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
-    operator, modes = Operator(element, trace, deviator), element.mean_modes(solved_loads(2))
-    scale = minimum_energy(element, trace, deviator, modes)[load]
-    ratio = constant.min_energy_ratio(trace, deviator)
-    right_hand_side = operator.load(modes[:, load : load + 1])
-    return System(operator.apply, inverse.apply, right_hand_side, scale, ratio)
-
-
-@SIDES
-@pytest.mark.parametrize("seed", range(3))
-def test_no_field_has_less_energy_than_the_constant_material_says(stress, seed):
-    """All ratios of a small image, as eigenvalues; uniform fields have none."""
-    element = element_of((0.7, 1.0), stress=stress)
-    trace, deviator = random_moduli(np.random.default_rng(seed), (5, 6), span=100)
-    system = system_of(element, trace, deviator)
-    size = element.unknowns * trace.size
-    units = np.eye(size).reshape(size, -1, 5, 6)
-    maps = (m(units).reshape(size, size) for m in (system.preconditioner, system.operator))
-    ratios = np.linalg.eigvals(np.linalg.multi_dot([x.T for x in maps])).real
-    ratios = ratios[np.abs(ratios) > 1e-6 * system.min_energy_ratio]
-    assert system.min_energy_ratio <= ratios.min() < 3 * system.min_energy_ratio
 
 
 def test_what_a_watch_raises_ends_both_sides_at_once():
@@ -225,20 +461,129 @@ def test_what_a_watch_raises_ends_both_sides_at_once():
     assert 6 <= len(calls) < 20
 
 
-@SIDES
-def test_the_preconditioner_inverts_waves_of_any_length(stress, rng):
-    """The longest ones of a slope have 1e-8 of the energy of the shortest."""
-    element, shape = element_of((0.7, 1.0), stress=stress), (300, 2)
-    constant = Reference.of_grid(element, np.full(shape, 2.0), np.full(shape, 0.7))
-    inverse = FourierPreconditioner.of_material(element, constant, shape)
-    operator = Operator(element, np.full(shape, constant.trace), np.full(shape, constant.deviator))
-    fields = inverse.apply(rng.normal(size=(1, element.unknowns, *shape)))
-    again = inverse.apply(operator.apply(fields))
-    assert np.abs(again - fields).max() < 1e-5 * np.abs(fields).max()
-
-
 @pytest.mark.parametrize("matrix", [np.ones((3, 3)), np.diag([1.0, 0.0, 1.0])])
 def test_a_singular_matrix_has_no_bounds_of_its_inverse(matrix):
     singular = pytest.raises(FailedError, match="singular to rounding")
     with np.errstate(divide="ignore", invalid="ignore"), singular:
         inverse_below(matrix)
+
+
+# from energies to bounds, averages and losses
+
+
+def in_order(terms):
+    """Their sum from the first to the last, and by what it is off."""
+    total = 0.0
+    for term in terms:
+        total += term
+    return abs(Fraction(total) - sum(map(Fraction, terms)))
+
+
+def tight(bound, error):
+    """Whether a bound holds and half of it does not."""
+    return error <= bound < 2 * error
+
+
+HILL_SUMS = {  # of a stiffness (Voigt) and of a compliance (Reuss): factors and a divisor
+    0: ((1, 2, 0, 9), (1, 2, 0, 1)),
+    1: ((1, -1, 3, 15), (4, -4, 3, 15)),
+}
+
+
+@pytest.mark.parametrize("modulus", [0, 1], ids=["K", "G"])
+def test_the_sums_of_hill_s_average(modulus, rng):
+    """Against exact sums: K and G of Voigt's average, and those of Reuss's by the compliance."""
+    for _ in range(50):
+        stiffness = random_stiffness(rng)
+        compliance = np.linalg.inv(stiffness)
+        sums = []
+        for matrix, factors in zip((stiffness, compliance), HILL_SUMS[modulus], strict=True):
+            normal, mixed, shear, divisor = factors
+            entries = [[Fraction(float(x)) for x in row] for row in matrix]
+            diagonal = sum(entries[k][k] for k in range(3))
+            off_diagonal = sum(entries[i][j] for i, j in ((0, 1), (0, 2), (1, 2)))
+            of_shears = sum(entries[k][k] for k in range(3, 6))
+            total = normal * diagonal + mixed * off_diagonal + shear * of_shears
+            sums.append(total / divisor)
+        exact = (sums[0] + 1 / sums[1]) / 2
+        low, high = (Fraction(hill_mean(stiffness, compliance, modulus, side=s)) for s in (-1, 1))
+        assert low <= exact <= high
+        assert high - low < 2000 * Fraction(UNIT) * exact
+
+
+def random_stiffness(rng):
+    """A positive definite stiffness of space, (6, 6)."""
+    factor = rng.normal(size=(6, 6))
+    return factor @ factor.T + 3 * np.eye(6)
+
+
+def test_the_mean_of_losses_by_known_fractions_of_energy(rng):
+    """Against exact sums: dyadic fractions have the sum 1 without rounding."""
+    for _ in range(50):
+        fractions = np.diff(np.sort([0, *rng.choice(1023, 4, replace=False) + 1, 1024])) / 1024
+        losses = rng.uniform(0, 0.1, len(fractions))
+        ends = np.stack([fractions, fractions], axis=1)
+        low, high = (Fraction(x) for x in mean_loss(ends, losses, losses))
+        exact = sum(Fraction(f) * Fraction(x) for f, x in zip(fractions, losses, strict=True))
+        assert low <= exact <= high
+        assert high - low < 200 * Fraction(UNIT) * Fraction(losses.max())
+
+
+def test_the_residual_of_an_inverse():
+    inverse, matrix = np.zeros((3, 3)), np.zeros((3, 3))
+    inverse[0], matrix[:, 0] = 1.0, [1.0, LOST, LOST]
+    assert residual_above(inverse, matrix)[0, 0] >= 2 * LOST
+    bound = residual_above(inverse, matrix)[0, 0] - abs(1 - (inverse @ matrix)[0, 0])
+    assert tight(Fraction(bound), in_order([1.0, LOST, LOST]))
+
+
+def test_the_inverse_is_below_and_near():
+    """Also where the computed one is off by a small matrix of the worst sign."""
+    rng, above = np.random.default_rng(0), 0
+    for _ in range(200):
+        root = rng.normal(size=(3, 3)) @ np.diag([1, 10.0 ** rng.uniform(-3, 0), 1])
+        matrix = root @ root.T
+        matrix = (matrix + matrix.T) / 2
+        product = matrix.astype(np.longdouble) @ inverse_below(matrix).astype(np.longdouble)
+        assert np.linalg.eigvals(product.astype(float)).real.max() <= 1 + 1e-15
+        plain = matrix.astype(np.longdouble) @ np.linalg.inv(matrix).astype(np.longdouble)
+        above += np.linalg.eigvals(plain.astype(float)).real.max() > 1 + 1e-15
+    assert above > 50  # so that an inverse without the margin would not pass
+
+
+def test_an_inverse_that_is_off_all_over(monkeypatch):
+    """The error of a wrong inverse of a multiple of the unit matrix is its bound."""
+    exact, off = np.eye(3) / 2, 1e-3
+    monkeypatch.setattr(np.linalg, "inv", lambda matrix: exact + off * np.eye(3))
+    below = inverse_below(2 * np.eye(3))
+    assert np.linalg.eigvalsh(exact - below)[0] >= 0
+    assert np.linalg.eigvalsh(exact - (exact + off * np.eye(3) + below) / 2)[0] < 0
+
+
+def rational(stiffness, average):
+    """K, G, E and ν of an average, exactly."""
+    c = [[Fraction(x) for x in row] for row in stiffness.tolist()]
+    axial, shear = (c[0][0] + c[1][1]) / 2, c[2][2]
+    bulk, diagonal = (axial + c[0][1]) / 2, (axial - c[0][1]) / 2
+    if average != "axes":
+        shear = ((shear + diagonal) / 2 + 2 / (1 / shear + 1 / diagonal)) / 2
+    return bulk, shear, 3 * shear - shear**2 / bulk, (1 - shear / bulk) / 2
+
+
+@pytest.mark.parametrize("average", ["axes", "isotropic"])
+def test_the_constants_of_one_stiffness(average):
+    rng, used = np.random.default_rng(1), np.zeros(4)
+    for _ in range(1200):
+        bulk = np.exp(rng.uniform(0, 3))
+        shear = bulk * 10.0 ** rng.choice([rng.uniform(-1, 0), rng.uniform(0.3, 4)])
+        c11, c22 = bulk + shear * np.exp(0.1 * rng.normal(size=2))
+        c12 = bulk - shear
+        one = np.array([[c11, c12, 0], [c12, c22, 0], [0, 0, shear * np.exp(0.1 * rng.normal())]])
+        bounds = StiffnessBounds(one, one)
+        ends = bounds.bulk, bounds.shear(average), bounds.young(average), bounds.poisson(average)
+        for k, ((low, high), exact) in enumerate(zip(ends, rational(one, average), strict=True)):
+            assert low <= exact <= high
+            if high > low:
+                off = abs(exact - (Fraction(low) + Fraction(high)) / 2)
+                used[k] = max(used[k], off / ((Fraction(high) - Fraction(low)) / 2))
+    assert (used[:2] > 0.5).all() if average != "axes" else used[0] > 0.5

@@ -1,16 +1,11 @@
-"""Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order; reading of images."""
+"""Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from alphacut.fuzzy import FailedError, RefusedError
-from alphacut.rve.image.bounds import Enclosure
-from alphacut.rve.image.files import read_grid
-from alphacut.rve.image.memory import needed_memory
 from alphacut.rve.image.model import ImageModel, solve_image, usual_division
 from alphacut.rve.image.phases import (
     ModuliImages,
@@ -104,7 +99,7 @@ def test_cuts_that_leave_out_an_image_inside_them_are_refused():
     model.require_consistent(pairs, cuts)
     for level in (0, 2):
         high = cuts[level].modulus[1]
-        moved = Enclosure(high + 1e-3 * high, 1.1 * high)
+        moved = cuts[level].modulus._replace(lower=high + 1e-3 * high, upper=1.1 * high)
         wrong = [replace(cut, modulus=moved) if k == level else cut for k, cut in enumerate(cuts)]
         with pytest.raises(FailedError, match="the proof is wrong: E of an image inside a cut"):
             model.require_consistent(pairs, wrong)
@@ -115,67 +110,6 @@ def test_pixels_are_divided_where_that_is_cheap(contrast, rows, parts):
     image = np.ones((rows, 4))
     image[0] = contrast
     assert usual_division(ModuliImages.crisp(image, image)) == parts
-
-
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.npy"])
-def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
-    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (5, 7)).astype(kind)
-    path = tmp_path / name
-    if name.endswith("npy"):
-        np.save(path, values)
-    else:
-        pytest.importorskip("PIL.Image").fromarray(values).save(path)
-    assert np.array_equal(read_grid(path, (1, 1)), values[::-1])
-
-
-def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
-    """Readers of such a TIFF disagree on which of both values is bright: tifffile writes masks so."""
-    image = pytest.importorskip("PIL.Image")
-    mask = image.fromarray(np.arange(32 * 32).reshape(32, 32) < 256)
-    for photometric in (1, 0):
-        mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
-        if photometric:
-            assert read_grid(tmp_path / "mask.tif", (1, 1)).mean() == 0.25
-            continue
-        with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
-            read_grid(tmp_path / "mask.tif", (1, 1))
-
-
-BROKEN = {
-    "colour.png": np.arange(48, dtype=np.uint8).reshape(4, 4, 3),
-    "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
-    "line.npy": np.arange(5.0),
-    "text.png": b"no image",
-    "text.npy": b"no array",
-    "header.npy": b"\x93NUMPY\x01\x00\x08\x00{'descr\n",  # NumPy's reader raises a TokenError
-}
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
-    path, content = tmp_path / name, BROKEN[name]
-    if isinstance(content, bytes):
-        path.write_bytes(content)
-    elif name.endswith("npy"):
-        np.save(path, content)
-    else:
-        pytest.importorskip("PIL.Image").fromarray(content).save(path)
-    with pytest.raises(RefusedError) as error:
-        read_grid(path, (1, 1))
-    assert error.value.key == name
-
-
-def test_memory_is_foreseen_within_a_third():
-    program = """
-import re, numpy as np
-from alphacut.rve.image.model import solve_image
-bulk = np.where(np.random.default_rng(1).random((256, 256)) < 0.5, 1e9, 5e9)
-solve_image(bulk, bulk / 2)
-print(1024 * int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1]))
-"""
-    found = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
-    assert 1 / 1.3 < needed_memory((256, 256)) / int(found.stdout) < 1.3
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,9 @@
-"""Volumes from files: the same voxels along (z, y, x) from every format, or one line."""
+"""Images and volumes from files: the same values from every format, or one line; their memory."""
 
 import gzip
 import itertools
+import subprocess
+import sys
 import zlib
 
 import numpy as np
@@ -10,13 +12,22 @@ from PIL import Image
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
-from alphacut.rve.image.files import files_of, read_grid
-from alphacut.rve.image.memory import require_memory
+from alphacut.rve.image.files import files_of
+from alphacut.rve.image.memory import needed_memory, require_memory
 
 tifffile = pytest.importorskip("tifffile")
-SHAPE, CUBE = (12, 5, 7), (1, 1, 1)
+SHAPE = 12, 5, 7
 HEAD = "ObjectType = Image\nNDims = 3\nDimSize = 7 5 12\n"
 NRRD = "NRRD0004\n# comment\ntype: {}\ndimension: 3\nsizes: 7 5 12\nencoding: {}\n"
+
+
+def voxels_of(path, sides=(1, 1, 1)):
+    """Values of a volume whose voxels have sides along (z, y, x)."""
+    return read_image(path, spacing=sides[::-1]).values
+
+
+def pixels_of(path):
+    return read_image(path, spacing=1.0).values
 
 
 def stack(path, values, **options):
@@ -80,7 +91,7 @@ def test_every_format_gives_the_same_voxels(tmp_path, kind, rng):
         slices(tmp_path / "slices", values)
     for path in tmp_path.iterdir():
         if path.suffix != ".raw":
-            assert np.array_equal(read_grid(path, CUBE), values), path.name
+            assert np.array_equal(voxels_of(path), values), path.name
 
 
 def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
@@ -96,7 +107,7 @@ def test_endings_in_capitals_are_those_in_small_letters(tmp_path, rng):
         file.rename(file.with_suffix(".PNG"))
     for path in tmp_path.iterdir():
         if path.suffix != ".raw":
-            assert np.array_equal(read_grid(path, CUBE), values), path.name
+            assert np.array_equal(voxels_of(path), values), path.name
     head, data = files_of(tmp_path / "HEAD.MHD")
     assert (head.name, data.name) == ("HEAD.MHD", "HEAD.raw")
 
@@ -145,7 +156,7 @@ def test_what_is_no_volume_of_numbers_is_one_line(tmp_path, name, write, message
     path = tmp_path / name
     write(path)
     with pytest.raises(RefusedError) as told:
-        read_grid(path, CUBE)
+        voxels_of(path)
     assert message in str(told.value)
     assert "\n" not in str(told.value)
 
@@ -154,9 +165,9 @@ def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
     slices(tmp_path / "slices", np.zeros((3, 5, 6), np.uint8))
     Image.fromarray(np.zeros((5, 7), np.uint8)).save(tmp_path / "slices/slice4.png")
     with pytest.raises(RefusedError, match=r"slice4\.png"):
-        read_grid(tmp_path / "slices", CUBE)
+        voxels_of(tmp_path / "slices")
     meta_image(tmp_path / "c.mhd", np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n")
-    assert read_grid(tmp_path / "c.mhd", (2, 1, 1)).shape == SHAPE
+    assert voxels_of(tmp_path / "c.mhd", (2, 1, 1)).shape == SHAPE
     assert [file.name for file in files_of(tmp_path / "c.mhd")] == ["c.mhd", "c.raw"]
 
 
@@ -169,6 +180,67 @@ def test_a_grid_too_large_is_told_what_fits(shape, what):
         require_memory(shape)
 
 
+def test_memory_is_foreseen_within_a_third():
+    program = """
+import re, numpy as np
+from alphacut.rve.image.model import solve_image
+bulk = np.where(np.random.default_rng(1).random((128, 128)) < 0.5, 1e9, 5e9)
+solve_image(bulk, bulk / 2)
+print(1024 * int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1]))
+"""
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    assert 1 / 1.3 < needed_memory((128, 128)) / int(found.stdout) < 1.3
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.npy"])
+def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
+    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (5, 7)).astype(kind)
+    path = tmp_path / name
+    if name.endswith("npy"):
+        np.save(path, values)
+    else:
+        pytest.importorskip("PIL.Image").fromarray(values).save(path)
+    assert np.array_equal(pixels_of(path), values[::-1])
+
+
+def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
+    """Readers of such a TIFF disagree on which of both values is bright: tifffile writes masks so."""
+    image = pytest.importorskip("PIL.Image")
+    mask = image.fromarray(np.arange(32 * 32).reshape(32, 32) < 256)
+    for photometric in (1, 0):
+        mask.save(tmp_path / "mask.tif", tiffinfo={262: photometric})
+        if photometric:
+            assert pixels_of(tmp_path / "mask.tif").mean() == 0.25
+            continue
+        with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
+            pixels_of(tmp_path / "mask.tif")
+
+
+BROKEN = {
+    "colour.png": np.arange(48, dtype=np.uint8).reshape(4, 4, 3),
+    "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
+    "line.npy": np.arange(5.0),
+    "text.png": b"no image",
+    "text.npy": b"no array",
+    "header.npy": b"\x93NUMPY\x01\x00\x08\x00{'descr\n",  # NumPy's reader raises a TokenError
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
+    path, content = tmp_path / name, BROKEN[name]
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif name.endswith("npy"):
+        np.save(path, content)
+    else:
+        pytest.importorskip("PIL.Image").fromarray(content).save(path)
+    with pytest.raises(RefusedError) as error:
+        pixels_of(path)
+    assert error.value.key == name
+
+
 @pytest.mark.parametrize("word", ["True", "true", "T", "1", "t"])
 def test_every_word_for_big_endian_is_read_so(tmp_path, rng, word):
     values = rng.integers(0, 60000, SHAPE).astype("u2")
@@ -177,29 +249,29 @@ def test_every_word_for_big_endian_is_read_so(tmp_path, rng, word):
         text = (tmp_path / "a.mhd").read_text()
         text = text.replace("BinaryDataByteOrderMSB = True", f"{key} = {word}")
         (tmp_path / "a.mhd").write_text(text)
-        assert np.array_equal(read_grid(tmp_path / "a.mhd", CUBE), values)
+        assert np.array_equal(voxels_of(tmp_path / "a.mhd"), values)
 
 
 def test_compressed_volumes_and_those_at_the_end_of_a_file_are_read(tmp_path, rng):
     values = rng.integers(0, 250, SHAPE).astype("u1")
     meta_image(tmp_path / "end.mhd", values, head="HeaderSize = -1\n")
     (tmp_path / "end.raw").write_bytes(b"a head of another program" + values.tobytes())
-    assert np.array_equal(read_grid(tmp_path / "end.mhd", CUBE), values)
+    assert np.array_equal(voxels_of(tmp_path / "end.mhd"), values)
     for skip in ("byte skip: -1", "byteskip: 17", "byte skip: 17"):
         head = NRRD.format("uchar", "raw") + f"{skip}\ndata file: skip.raw\n"
         (tmp_path / "skip.nhdr").write_text(head)
         (tmp_path / "skip.raw").write_bytes(bytes(17) + values.tobytes())
-        assert np.array_equal(read_grid(tmp_path / "skip.nhdr", CUBE), values)
+        assert np.array_equal(voxels_of(tmp_path / "skip.nhdr"), values)
     meta_image(tmp_path / "zlib.mhd", values, head="CompressedData = True\n")
     (tmp_path / "zlib.raw").write_bytes(zlib.compress(values.tobytes()))
-    assert np.array_equal(read_grid(tmp_path / "zlib.mhd", CUBE), values)
+    assert np.array_equal(voxels_of(tmp_path / "zlib.mhd"), values)
     head = NRRD.format("uchar", "gzip").encode() + b"\n"
     (tmp_path / "gzip.nrrd").write_bytes(head + gzip.compress(values.tobytes()))
-    assert np.array_equal(read_grid(tmp_path / "gzip.nrrd", CUBE), values)
+    assert np.array_equal(voxels_of(tmp_path / "gzip.nrrd"), values)
     for packed in (gzip.compress(bytes(10**7)), gzip.compress(b"few")):
         (tmp_path / "gzip.nrrd").write_bytes(head + packed)
         with pytest.raises(RefusedError, match="bytes unpacked; allowed: 420 for"):
-            read_grid(tmp_path / "gzip.nrrd", CUBE)
+            voxels_of(tmp_path / "gzip.nrrd")
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
@@ -215,7 +287,7 @@ def test_axes_in_any_order_and_direction_are_those_of_the_world(tmp_path, rng, o
     vectors = [row * sides[2 - axis] for row, axis in zip(rows, order, strict=True)]
     directions = " ".join(f"({x:g},{y:g},{z:g})" for x, y, z in vectors)
     nrrd_with(tmp_path / "a.nrrd", f"space directions: {directions}", stored)
-    assert np.array_equal(read_grid(tmp_path / "a.nrrd", sides), world)
+    assert np.array_equal(voxels_of(tmp_path / "a.nrrd", sides), world)
     spacing = " ".join(f"{sides[2 - axis]:g}" for axis in order)
     matrix = " ".join(f"{x}" for row in rows for x in row)
     head = f"TransformMatrix = {matrix}\nElementSpacing = {spacing}\n"
@@ -223,7 +295,7 @@ def test_axes_in_any_order_and_direction_are_those_of_the_world(tmp_path, rng, o
     text = (tmp_path / "a.mhd").read_text()
     sizes = " ".join(map(str, stored.shape[::-1]))
     (tmp_path / "a.mhd").write_text(text.replace("7 5 12", sizes))
-    assert np.array_equal(read_grid(tmp_path / "a.mhd", sides=(2.0, 1.5, 1.0)), world)
+    assert np.array_equal(voxels_of(tmp_path / "a.mhd", (2.0, 1.5, 1.0)), world)
 
 
 SPACED = {
@@ -245,9 +317,9 @@ def test_spacing_in_heads_of_tiff_is_that_of_the_case(tmp_path, rng, name):
     file, options = SPACED[name]
     stack(tmp_path / file, values, **options)
     right = RIGHT.get(name, (5, 1, 1))
-    assert np.array_equal(read_grid(tmp_path / file, right), values)
+    assert np.array_equal(voxels_of(tmp_path / file, right), values)
     with pytest.raises(RefusedError, match=r"voxels of .* along x, y, z"):
-        read_grid(tmp_path / file, CUBE)
+        voxels_of(tmp_path / file)
 
 
 @pytest.mark.parametrize("kind", ["u1", "u2"])
@@ -258,9 +330,9 @@ def test_white_as_zero_means_the_same_in_a_stack_a_folder_and_a_picture(tmp_path
     (tmp_path / "folder").mkdir()
     for k, page in enumerate(values):
         stack(tmp_path / f"folder/page{k}.tif", page, photometric="miniswhite")
-    assert np.array_equal(read_grid(tmp_path / "stack.tif", CUBE), shown)
-    assert np.array_equal(read_grid(tmp_path / "folder", CUBE), shown)
-    assert np.array_equal(read_grid(tmp_path / "folder/page0.tif", (1, 1)), shown[0, ::-1])
+    assert np.array_equal(voxels_of(tmp_path / "stack.tif"), shown)
+    assert np.array_equal(voxels_of(tmp_path / "folder"), shown)
+    assert np.array_equal(pixels_of(tmp_path / "folder/page0.tif"), shown[0, ::-1])
 
 
 def test_a_stack_that_promises_more_than_its_file_holds_is_refused(tmp_path):
@@ -272,7 +344,7 @@ def test_a_stack_that_promises_more_than_its_file_holds_is_refused(tmp_path):
         content = content[:place] + (4000).to_bytes(4, "little") + content[place + 4 :]
     (tmp_path / "a.tif").write_bytes(content)
     with pytest.raises(RefusedError, match=r"3 × 4000 × 50; allowed: what \d+ bytes can hold"):
-        read_grid(tmp_path / "a.tif", CUBE)
+        voxels_of(tmp_path / "a.tif")
 
 
 def test_pages_of_pillow_are_a_stack_whatever_their_compression(tmp_path, rng):
@@ -282,31 +354,31 @@ def test_pages_of_pillow_are_a_stack_whatever_their_compression(tmp_path, rng):
         for compression in ("tiff_lzw", "tiff_deflate", "raw"):
             path = tmp_path / f"{kind}-{compression}.tif"
             pages[0].save(path, save_all=True, append_images=pages[1:], compression=compression)
-            assert np.array_equal(read_grid(path, CUBE), values)
+            assert np.array_equal(voxels_of(path), values)
         with tifffile.TiffWriter(tmp_path / "pages.tif") as file:
             for page in values:
                 file.write(page, contiguous=False)
-        assert np.array_equal(read_grid(tmp_path / "pages.tif", CUBE), values)
+        assert np.array_equal(voxels_of(tmp_path / "pages.tif"), values)
         with tifffile.TiffWriter(tmp_path / "unlike.tif") as file:
             for page in (values[0], values[1, 1:]):
                 file.write(page, contiguous=False)
         with pytest.raises(RefusedError, match="2 series"):
-            read_grid(tmp_path / "unlike.tif", CUBE)
+            voxels_of(tmp_path / "unlike.tif")
 
 
 def test_colours_that_are_equal_are_grey_values(tmp_path, rng):
     values = rng.integers(0, 250, SHAPE).astype("u1")
     stack(tmp_path / "rgb.tif", np.repeat(values[..., None], 3, axis=3), photometric="rgb")
-    assert np.array_equal(read_grid(tmp_path / "rgb.tif", CUBE), values)
+    assert np.array_equal(voxels_of(tmp_path / "rgb.tif"), values)
     grey = Image.fromarray(values[0])
     for mode in ("RGB", "RGBA", "LA", "P"):
         grey.convert(mode).save(tmp_path / f"{mode}.png")
-        assert np.array_equal(read_grid(tmp_path / f"{mode}.png", (1, 1)), values[0, ::-1])
+        assert np.array_equal(pixels_of(tmp_path / f"{mode}.png"), values[0, ::-1])
     clear = grey.convert("RGBA")
     clear.putpixel((0, 0), (7, 7, 7, 100))
     clear.save(tmp_path / "clear.png")
     with pytest.raises(RefusedError, match="transparent in places"):
-        read_grid(tmp_path / "clear.png", (1, 1))
+        pixels_of(tmp_path / "clear.png")
 
 
 @pytest.mark.parametrize("name", ["rec_{:04d}_8bit", "scan_{:03d}_5um", "2024-01-02_s{}_x3", "{}"])
@@ -314,7 +386,7 @@ def test_the_number_that_changes_in_names_is_that_of_the_slice(tmp_path, rng, na
     values = rng.integers(0, 250, SHAPE).astype("u1")
     for k, page in enumerate(values):
         Image.fromarray(page).save(tmp_path / f"{name.format(k)}.png")
-    assert np.array_equal(read_grid(tmp_path, CUBE), values)
+    assert np.array_equal(voxels_of(tmp_path), values)
 
 
 @pytest.mark.parametrize("spacing", [0, np.inf, "1", (), (1e-3, np.nan), (1e-3, "1")])

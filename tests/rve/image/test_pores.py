@@ -1,29 +1,27 @@
 """Lower bounds of cells with pores: stresses that vanish in them, against bounds by hand and limits."""
 
-from fractions import Fraction
-from itertools import product
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 from alphacut.fuzzy import Interval, RefusedError, Triangular, from_data
 from alphacut.rve import GreyImage, fuzzy_image_stiffness
-from alphacut.rve.image.fields.element import element_of, stress_derivatives
-from alphacut.rve.image.fields.energy import modes_of
-from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
-from alphacut.rve.image.model import ImageModel, solve_image
-from alphacut.rve.image.phases import ModuliImages
+from tests.rve.image.test_fields import closed_pores
 
-E, NU = 1.0, 0.25
-K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)
+E, NU = 1e9, 0.25
 
 
-def with_pores(is_pore, ratio=0.0, **settings):
-    """Bounds of E = 1 with pores of a fraction of its moduli."""
-    bulk = K if is_pore.ndim == 3 else K + G / 3
-    moduli = (np.where(is_pore, ratio * x, x) for x in (bulk, G))
-    return solve_image(*moduli, **settings).bounds
+def crisp_cut(is_pore, ratio=0.0, sides=None):
+    """Proved cut of E = 1 GPa with pores of a fraction of its moduli."""
+    image = GreyImage(is_pore.astype(float), sides or (1.0,) * is_pore.ndim)
+    phases = [{"modulus": modulus, "poisson": NU} for modulus in (E, ratio * E)]
+    found = fuzzy_image_stiffness(image, phases, labels=(0, 1), alpha=(1.0,), progress=False)
+    return found.cuts[0]
+
+
+def with_pores(*cell, **options):
+    """Bounds of `crisp_cut`."""
+    return crisp_cut(*cell, **options).bounds
 
 
 def cube(n=8):
@@ -33,12 +31,13 @@ def cube(n=8):
     return inside
 
 
-@pytest.mark.parametrize("shift", [(0, 0, 0), (3, 5, 0)])
-@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
+@pytest.mark.parametrize(
+    ("shift", "sides"), [((0, 0, 0), (1.0, 1.0, 1.0)), ((3, 5, 0), (1.3, 0.7, 1.0))]
+)
 def test_columns_beside_a_cube_carry_three_quarters(shift, sides):
     """Uniaxial stress in the columns that meet no pore: E_x, E_y, E_z ≥ 3/4 E, whatever the sides."""
     bounds = with_pores(np.roll(cube(), shift, (0, 1, 2)), sides=sides)
-    low, high = bounds.constants()[:3].T
+    low, high = bounds.constants()[:3].T / E
     assert (low >= 0.75).all()
     assert (high < 0.84).all()
     if len(set(sides)) == 1:  # .7689 is what 1e-6 and 1e-8 in the pore tend to
@@ -52,26 +51,16 @@ def test_columns_beside_a_square_carry_half():
     assert 0.5 * E / (1 - NU**2) <= low < high
 
 
+@pytest.mark.slow
 def test_the_bulk_modulus_of_a_spherical_pore_is_that_of_vanishing_moduli():
     squares = (np.indices((14,) * 3) - 6.5) ** 2
     sphere = squares.sum(0) < (14 * (0.157 * 3 / 4 / np.pi) ** (1 / 3)) ** 2
     assert sphere.mean() == pytest.approx(0.157, abs=1e-3)
-    low, high = with_pores(sphere).bulk
+    low, high = np.array(with_pores(sphere).bulk) / E
     assert 0.417 < low < 0.4174 < high
 
 
-def closed_pores(rng, shape):
-    """Single cells and pairs of them, far enough apart to be pores of their own."""
-    is_pore = np.zeros(shape, bool)
-    for corner in product(*(range(0, n - 3, 5) for n in shape)):
-        is_pore[corner] = True
-        beside = list(corner)
-        beside[rng.integers(len(shape))] += 1
-        is_pore[tuple(beside)] = rng.random() < 0.5
-    return np.roll(is_pore, rng.integers(0, 8, len(shape)), range(len(shape)))
-
-
-@pytest.mark.parametrize("shape", [(15, 20), (5, 10, 10)])
+@pytest.mark.parametrize("shape", [(15, 20), (5, 5, 10)])
 def test_pores_tend_to_phases_of_vanishing_moduli(shape, rng):
     is_pore = closed_pores(rng, shape)
     pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-7)
@@ -87,62 +76,6 @@ def test_pores_carry_forces_from_one_to_the_next_in_the_plane():
     is_pore[2:7, 2:14] = is_pore[10:14, 4:9] = True
     pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-8)
     assert eigh(pores.lower, soft.lower, eigvals_only=True)[0] > 1 - 1e-4
-
-
-@pytest.mark.parametrize("sides", [(1.0, 1.0), (0.7, 1.0), (1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
-def test_the_stress_in_pores_is_zero_but_for_the_declared_rounding(sides, rng):
-    n = len(sides)
-    is_pore = closed_pores(rng, (10, 15)[:n] if n == 2 else (5, 10, 10))
-    element = element_of(sides, stress=True)
-    potentials = PorePotentials.of_nodes(element, PoreNodes.of_mask(is_pore, element.reach))
-    count = len(element.of_voigt.T)
-    fields = rng.normal(size=(count, element.unknowns, *is_pore.shape))
-    errors = potentials.impose(fields)
-    n_wrong = 0
-    for cell in np.argwhere(is_pore)[:4]:
-        for load, (found, bound) in enumerate(exact_stress(element, fields, errors, cell)):
-            stress = [x + (component == load) for component, x in enumerate(found)]
-            assert all(abs(x) <= y for x, y in zip(stress, bound, strict=True))
-            n_wrong += any(stress)
-    assert (n_wrong > 0) or set(sides) == {1.0}  # rounding there is
-    assert errors.max() < 1e-12 * abs(fields).max()
-    mean_modes = element.mean_modes(np.eye(count))
-    for slab, modes, *_ in modes_of(element, fields, mean_modes):
-        inside = is_pore[slab].ravel()
-        assert abs(modes[..., inside]).max(initial=0.0) < 1e-11
-
-
-def exact_stress(element, fields, errors, cell):
-    """Mean stress in a cell without rounding, by load, and what errors of the fields add to it."""
-    # integrals over a cell of the derivatives of order 0, 1, 2 of its functions of one coordinate
-    functions = {
-        2: [
-            [Fraction(1, 2), -1, 0],
-            [Fraction(1, 12), 0, -1],
-            [Fraction(1, 2), 1, 0],
-            [Fraction(-1, 12), 0, 1],
-        ],
-        3: [[Fraction(1, 3), -1, 2], [Fraction(4, 3), 0, -4], [Fraction(1, 3), 1, 2]],
-    }[element.dimension]
-    n, derivatives = element.dimension, stress_derivatives(element.dimension)
-    potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
-    numbers = list(product(range(len(functions)), repeat=n))
-    for field, error in zip(fields, errors, strict=True):
-        stress, bound = [], []
-        for terms in derivatives:
-            total = added = Fraction(0)
-            for factor, potential, orders in terms:
-                for k, number in enumerate(numbers):
-                    unknown, offset = element.local[potentials.index(potential) * len(numbers) + k]
-                    weight = Fraction(factor)
-                    for f, order, side in zip(number, orders[::-1], element.sides, strict=True):
-                        weight *= functions[f][order] / Fraction(side) ** order
-                    at = (unknown, *(cell + offset) % field.shape[1:])
-                    total += weight * Fraction(field[at])
-                    added += abs(weight) * Fraction(error[at])
-            stress.append(total)
-            bound.append(added)
-        yield stress, bound
 
 
 def column(shape=(4, 7, 7)):
@@ -174,27 +107,26 @@ def test_a_pore_that_is_connected_through_the_sides_alone_is_closed():
     is_pore[3:9, 3:9] = True
     is_pore[5:7, 5:7] = False
     whole, parted = with_pores(is_pore), with_pores(np.roll(is_pore, (6, 6), (0, 1)))
-    assert parted.lower == pytest.approx(whole.lower, rel=1e-4, abs=1e-6)
+    assert parted.lower == pytest.approx(whole.lower, rel=1e-4, abs=1e-6 * E)
     assert whole.has_lower
 
 
-def test_cuts_of_pores_of_a_fuzzy_extent_are_nested_and_consistent():
+def test_cuts_of_pores_of_a_fuzzy_extent_are_nested():
     """Of a threshold that leaves the rim of a pore open, and a fuzzy modulus."""
     extent = np.maximum.reduce(abs(np.indices((16, 16)) - 7.5))
-    images = []
-    for rim, spread in ((1.0, 0.1), (0.0, 0.0)):
-        surely_solid, maybe_solid = extent > 3 + rim, extent > 3
-        moduli = [
-            tuple(np.where(solid, x * scale, 0.0) for solid, scale in ends)
-            for x in (K + G / 3, G)
-            for ends in [((surely_solid, 1 - spread), (maybe_solid, 1 + spread))]
-        ]
-        images.append(ModuliImages(*np.swapaxes(moduli, 0, 1)))
-    model = ImageModel()
-    cuts = model.cuts(images, (images[-1], model.solve(images[-1])))
-    wide, narrow = (cut.modulus for cut in cuts)
+    grey = np.select([extent < 3, extent < 4], [0.0, 100.0], 200.0)
+    phases = [
+        {"modulus": modulus, "poisson": NU} for modulus in (0.0, Triangular(0.9 * E, E, 1.1 * E))
+    ]
+    found = fuzzy_image_stiffness(
+        GreyImage(grey, (1e-3, 1e-3)),
+        phases,
+        thresholds=[Triangular(50, 50, 150)],
+        alpha=(0.0, 1.0),
+        progress=False,
+    )
+    wide, narrow = (cut.modulus for cut in found.cuts)
     assert 0 < wide[0] < narrow[0] < narrow[1] < wide[1]
-    model.require_consistent(images, cuts)
 
 
 def test_an_image_that_may_be_void_throughout_is_refused():

@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import GreyImage, image_fields
-from alphacut.rve.image.vti import write_vti
 
 PHASES = [{"modulus": 20e9, "poisson": 0.3}, {"modulus": 60e9, "poisson": 0.2}]
 
@@ -61,11 +60,11 @@ def test_a_file_is_read_back_by_pyvista(tmp_path):
 
 def test_a_picture_is_one_voxel_thick(tmp_path):
     pyvista = pytest.importorskip("pyvista")
-    values = np.arange(6.0).reshape(2, 3)
-    write_vti(tmp_path / "a.vti", {"<a>": values}, lengths=(2.0, 1.0))
+    labels = discs(5, 6)
+    fields_of(labels, (2e-6, 1e-6)).write(tmp_path / "a.vti")
     grid = pyvista.read(tmp_path / "a.vti")
-    assert grid.dimensions == (4, 3, 2)
-    assert np.array_equal(grid.cell_data["<a>"], values.ravel())
+    assert grid.dimensions == (7, 6, 2)
+    assert np.array_equal(grid.cell_data["phase"], labels.ravel())
 
 
 def test_bounds_that_are_missing_have_no_field(tmp_path):
