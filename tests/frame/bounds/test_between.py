@@ -7,35 +7,36 @@ from alphacut.frame import Accelerogram, DualProof, Force, History, Proof, Store
 from alphacut.fuzzy import Triangular
 from tests.frame.motions import exact_motions, random_points
 
-FLOORS, PARTS = 4, 20
+FLOORS, PARTS = 3, 20
 NOISE = np.random.default_rng(800900).normal(size=300)
 LOADS = {
     "ground": {"ground": Accelerogram(0.01, np.convolve(NOISE, np.ones(4) / 2, "same"))},
-    "start": {"v0": (0.0, 0.0, 0.0, 0.5)},
-    "sine": {"loads": [Force(4, 1e3, History.harmonic(3.0, 0.3))]},
-    "wind": {"loads": [Force(4, 1e3, History(0.35, NOISE[:9], 0.1))]},
+    "start": {"v0": (0.0, 0.0, 0.5)},
+    "sine": {"loads": [Force(3, 1e3, History.harmonic(3.0, 0.3))]},
+    "wind": {"loads": [Force(3, 1e3, History(0.35, NOISE[:9], 0.1))]},
 }
-CENTRE = {"k1": 4e7, "m4": 2e4}
+CENTRE = {"k1": 4e7, "m3": 2e4}
 STIFFNESS = 2e3 * (2 * np.eye(FLOORS) - np.eye(FLOORS, k=1) - np.eye(FLOORS, k=-1))
 STIFFNESS[-1, -1] = 2e3
 SHORTEST_PERIOD = 2 * np.pi / np.sqrt(np.linalg.eigvalsh(STIFFNESS)[-1])
+PROOFS = [DualProof(slabs=2, steps=4, peaks=1.0, workers=1), Proof(tolerance=5e-2, workers=1)]
 
 
-@pytest.mark.parametrize("periods", [0.1, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("periods", [0.1, 1.0, 1.5])
 @pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("proof", [DualProof(slabs=2, steps=4, peaks=1.0), Proof(tolerance=5e-2)])
+@pytest.mark.parametrize("proof", PROOFS)
 def test_between_is_at_most_three_times_the_true_deviation(proof, load, periods):
     frame = StoreyFrame(
         [2e4] * FLOORS,
         stiffness=[4e7] * FLOORS,
         damping_ratio=0.03,
-        outputs=("q4", "a4"),
+        outputs=("q3", "a3"),
         **LOADS[load],
     )
     step = periods * SHORTEST_PERIOD
-    steps = int(1.5 / step)
+    steps = min(int(1.5 / step), 24)
     inputs = {name: Triangular(0.97 * value, value, 1.03 * value) for name, value in CENTRE.items()}
-    points = random_points(inputs, 24, np.random.default_rng(1))
+    points = random_points(inputs, 16, np.random.default_rng(1))
     values = exact_motions(frame, points, inputs, steps * step, step / PARTS)
     nodes, x = values[:, ::PARTS, None], np.arange(PARTS)[:, None] / PARTS
     chord = (1 - x) * nodes[:, :-1] + x * nodes[:, 1:]

@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.frame import DualProof, Force, History, StoreyFrame, envelope
 from alphacut.fuzzy import Interval
-from alphacut.fuzzy.sets.boxes import quasi_random_points
 
 NOMINAL = {
     "m1": 2e4,
@@ -57,10 +56,10 @@ def test_one_floor_with_a_dashpot_and_its_overturning_moment_is_proved(gravity, 
     )
     fuzzy = [*NOMINAL]
     inputs = {x: Interval(NOMINAL[x] * (1 - width), NOMINAL[x] * (1 + width)) for x in fuzzy}
-    found = envelope(frame, inputs, DualProof(), duration=2.0, step=0.02, alpha=(0,))
+    found = envelope(frame, inputs, DualProof(), duration=1.0, step=0.02, alpha=(0,))
     assert found.nature == "guaranteed"
-    unit = 2 * quasi_random_points(len(fuzzy), 2000) - 1
-    unit = np.vstack([unit, np.sign(rng.normal(size=(2000, len(fuzzy))))])
+    unit = rng.uniform(-1, 1, (2000, len(fuzzy)))
+    unit[::2] = np.sign(unit[::2])
     points = {x: NOMINAL[x] * (1 + width * unit[:, [k]]) for k, x in enumerate(fuzzy)}
     values = exact_outputs(points, gravity, found.time)
     reached = np.stack([-values, values]).max(1)

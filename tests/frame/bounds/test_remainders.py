@@ -7,14 +7,12 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
-from alphacut.frame.bounds import dual_function
 from alphacut.frame.bounds.box import over_box
-from alphacut.frame.bounds.level import LevelModels, OutputBounds, _dual_function_data
+from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import Excitation
 from alphacut.frame.modes.structure import classical_structure
-from alphacut.frame.modes.truncated_modes import inverse_form
 from alphacut.frame.response.oscillators import Grid, Oscillators
 
 TIGHT = 0.5
@@ -119,7 +117,7 @@ def masses_on_springs(stiffness):
 
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     """Two of three masses on springs have the same frequency."""
-    centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 44.01, 0.25), 4
+    centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 22.01, 0.25), 4
     p = TaylorModel.variables(centre, 1e-3 * centre).widened(0.03 * centre)
     springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
     both = springs.initial_state.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
@@ -143,25 +141,6 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     assert (off > TIGHT * stray).any()
 
 
-def test_half_of_the_cubic_part_would_not_do():
-    own, names, centre, radius, _ = frame(1, 0.1)
-    structure = along(own, names, centre, radius, 1)
-    data = OutputBounds.initial(
-        LevelModels.from_structure(structure, Excitation({}, np.array([0.0, 0.1]), ("velocity",))),
-        0,
-        1,
-        1.0,
-    ).data
-    whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
-    bound = dual_function.dual_value(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
-    bound += dual_function.remainder_bound(mu, data)
-    e = data.participation[0, 0] * data.table[0, 0, 1, 0] + abs(
-        data.participation_radius[0, 0] * data.table[0, 0, 1, 0]
-    )
-    exact = (0.9**-0.5 - 1) * data.midpoint[0, 0] / data.radius[0, 0]
-    assert exact <= bound - e <= exact + data.expected_cubic[0]
-
-
 RECORD = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200) * 0.47))
 
 
@@ -169,9 +148,9 @@ RECORD = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
     time = np.arange(0, 3, 0.05)
-    fine = Grid(np.linspace(9, 11, 81), np.linspace(0.02, 0.05, 81))
-    for omega, quotient in ((16, 80), (80, 8), (16, 8)):
-        coarse = Grid(fine.omega[:: 80 // omega], fine.quotient[:: 80 // quotient])
+    fine = Grid(np.linspace(9.5, 10.5, 41), np.linspace(0.02, 0.035, 41))
+    for omega, quotient in ((5, 1), (1, 10), (5, 10)):  # points of the fine grid in a cell
+        coarse = Grid(fine.omega[::omega], fine.quotient[::quotient])
         table = Oscillators(coarse, {"load": RECORD}, time, {order}).responses(source, order)
         exact = Oscillators(fine, {"load": RECORD}, time, {order}).responses(source, order).value
         at = table.value
@@ -182,7 +161,7 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
             at = np.moveaxis(np.tensordot(at, weights, (axis, 0)), -1, axis)
         off = np.abs(at - exact).max((1, 2))
         assert (off <= table.error + 1e-14).all()
-        if (omega, quotient) != (16, 8):
+        if (omega, quotient) != (5, 10):
             assert (off[1:] / table.error[1:]).max() > TIGHT
 
 
@@ -212,53 +191,3 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
             assert (off <= wide.line_deviation[1:] + 1e-13).all()
             assert (off > TIGHT * wide.line_deviation[1:]).any()
-
-
-@pytest.mark.parametrize("order", [3, 4])
-def test_forms_of_inverses_stay_within_their_rests(order):
-    rng, d, n, shares = np.random.default_rng(order), 3, 4, []
-    matrices = rng.normal(size=(d, n, n))
-    A = TaylorModel(
-        (np.diag([1.0, 2, 3, 5])[None], 0.03 * (matrices + matrices.swapaxes(1, 2))),
-        np.zeros((n, n)),
-        d,
-        order,
-    )
-    left, right = (
-        TaylorModel(
-            (rng.normal(size=(1, m, n)), 0.1 * rng.normal(size=(d, m, n))),
-            np.zeros((m, n)),
-            d,
-            order,
-        )
-        for m in (2, 3)
-    )
-    found = inverse_form(A, left, right, 0.5)
-    for u in rng.uniform(-1, 1, (300, d)):
-        (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
-        off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
-        shares.append((off / found.remainder).max())
-    assert 3e-3 <= max(shares) <= 1
-
-
-def test_tables_of_the_dual_have_the_rounding_of_all_sums_they_enter(monkeypatch):
-    _, _, _, _, structure = frame(2, ground=RECORD)
-    time, sources = np.arange(0, 2, 0.1), ("load", "velocity")
-    level = LevelModels.from_structure(structure, Excitation({"load": RECORD}, time, sources))
-    unit, d = np.finfo(float).eps / 2, 4
-    # a term enters sums over all variables, over pairs and single inputs, and over sources
-    count = 2 * len(level.models.oscillators) * (len(sources) + 2)
-    count += 2 * d**2 + 4 * d + 4 * len(sources) + 32
-    for k, grid in enumerate(level.grids):
-        alone = Oscillators(grid, {"load": RECORD}, time, {0})
-        for s, source in enumerate(sources):
-            response = alone.responses(source, 0)
-            added = level.tables[0].error[k, s] - response.error
-            size = np.abs(response.value).max((1, 2))
-            assert (added >= 1.9 * count * unit * size - 1e-18).all()
-            assert (added <= 2.1 * count * unit * size + 1e-18).all()
-    # and variables, which multipliers enter too
-    with_rounding = _dual_function_data(level, 0, 1.0)[0].remainder
-    monkeypatch.setattr("alphacut.frame.bounds.level.gamma", lambda _: 0.0)
-    added = with_rounding - _dual_function_data(level, 0, 1.0)[0].remainder
-    assert (added >= 7.9 * count * unit).all()

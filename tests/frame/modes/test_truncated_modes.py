@@ -164,3 +164,30 @@ def test_the_slope_of_a_slow_mode_within_a_step_is_bounded(order, rng):
         if order:
             exact += order * (1j * omega) ** (order - 1) * np.trapezoid(waves, s)
         assert slopes[1] >= abs(exact) * (1 - 1e-6)
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_forms_of_inverses_stay_within_their_rests(order):
+    rng, d, n, shares = np.random.default_rng(order), 3, 4, []
+    matrices = rng.normal(size=(d, n, n))
+    A = TaylorModel(
+        (np.diag([1.0, 2, 3, 5])[None], 0.03 * (matrices + matrices.swapaxes(1, 2))),
+        np.zeros((n, n)),
+        d,
+        order,
+    )
+    left, right = (
+        TaylorModel(
+            (rng.normal(size=(1, m, n)), 0.1 * rng.normal(size=(d, m, n))),
+            np.zeros((m, n)),
+            d,
+            order,
+        )
+        for m in (2, 3)
+    )
+    found = inverse_form(A, left, right, 0.5)
+    for u in rng.uniform(-1, 1, (300, d)):
+        (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
+        off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
+        shares.append((off / found.remainder).max())
+    assert 3e-3 <= max(shares) <= 1
