@@ -1,52 +1,50 @@
 """Vibration of structures with fuzzy parameters.
 
 Example:
+    >>> from alphacut.frame import INTEGRATORS, METHODS
     >>> sorted(INTEGRATORS), len(METHODS)  # by the words of a case file
     (['exact', 'midpoint'], 6)
 """
 
-from alphacut.frame.analyses.decision import Decision, decide
-from alphacut.frame.analyses.fragility import Fragility, fragility
-from alphacut.frame.analyses.incremental import ScaledPeaks, incremental
-from alphacut.frame.analyses.limits import Limit
-from alphacut.frame.analyses.peaks import Peak, peaks
-from alphacut.frame.analyses.probability import Probability, probability
-from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
-from alphacut.frame.analyses.spectral import spectral_acceleration
-from alphacut.frame.analyses.suites import SuitePeaks, over_records
-from alphacut.frame.analyses.tolerances import Tolerances, tolerances
-from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-from alphacut.frame.envelope import Envelope
-from alphacut.frame.identify import (
-    Identified,
-    LearnedInputs,
-    MeasuredMode,
-    Prediction,
-    Predictions,
-    RefutedError,
-    identify,
-    measured_mode,
-    read_modes,
-)
-from alphacut.frame.methods.auto import Auto
-from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.graph_follower import GraphFollower
-from alphacut.frame.methods.improved_follower import ImprovedFollower
-from alphacut.frame.methods.proof import Proof
-from alphacut.frame.methods.sampled import Sampled
-from alphacut.frame.propagation import METHODS, envelope, require_envelope
-from alphacut.frame.records.history import Accelerogram, History
-from alphacut.frame.records.suite import read_record, read_suite
-from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
-from alphacut.frame.structures.loads import Force
-from alphacut.frame.structures.material_damping import damping_from_loss
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.quantities import Output, Parameter
-from alphacut.frame.structures.read_matrix import read_matrix
-from alphacut.frame.structures.storey import StoreyFrame
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from alphacut.frame.analyses.decision import Decision, decide
+    from alphacut.frame.analyses.fragility import Fragility, fragility
+    from alphacut.frame.analyses.incremental import ScaledPeaks, incremental
+    from alphacut.frame.analyses.limits import Limit
+    from alphacut.frame.analyses.peaks import Peak, peaks
+    from alphacut.frame.analyses.probability import Probability, probability
+    from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
+    from alphacut.frame.analyses.spectral import spectral_acceleration
+    from alphacut.frame.analyses.suites import SuitePeaks, over_records
+    from alphacut.frame.analyses.tolerances import Tolerances, tolerances
+    from alphacut.frame.calculus.unproved import UnprovedError
+    from alphacut.frame.dynamics.flow import LinearFlow
+    from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
+    from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+    from alphacut.frame.identification.identify import Identified, RefutedError, identify
+    from alphacut.frame.identification.learned import LearnedInputs, Prediction, Predictions
+    from alphacut.frame.identification.modes import MeasuredMode, measured_mode
+    from alphacut.frame.identification.read_modes import read_modes
+    from alphacut.frame.methods.auto import Auto
+    from alphacut.frame.methods.dual import DualProof
+    from alphacut.frame.methods.graph_follower import GraphFollower
+    from alphacut.frame.methods.improved_follower import ImprovedFollower
+    from alphacut.frame.methods.proof import Proof
+    from alphacut.frame.methods.sampled import Sampled
+    from alphacut.frame.propagation import METHODS, envelope, require_envelope
+    from alphacut.frame.records.history import Accelerogram, History
+    from alphacut.frame.records.suite import read_record, read_suite
+    from alphacut.frame.result import Envelope
+    from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+    from alphacut.frame.structures.loads import Force
+    from alphacut.frame.structures.material_damping import damping_from_loss
+    from alphacut.frame.structures.matrix import MatrixStructure
+    from alphacut.frame.structures.quantities import Output, Parameter
+    from alphacut.frame.structures.read_matrix import read_matrix
+    from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Decision", "DualProof", "Envelope",
@@ -60,3 +58,69 @@ __all__ = [
     "read_modes", "read_record", "read_suite", "require_envelope", "sensitivity",
     "spectral_acceleration", "tolerances",
 ]  # fmt: skip
+AT_FIRST_USE = {
+    "INTEGRATORS": "dynamics.integrators",
+    "METHODS": "propagation",
+    "Accelerogram": "records.history",
+    "Auto": "methods.auto",
+    "Decision": "analyses.decision",
+    "DualProof": "methods.dual",
+    "Envelope": "result",
+    "Exact": "dynamics.integrators",
+    "Force": "structures.loads",
+    "Fragility": "analyses.fragility",
+    "GraphFollower": "methods.graph_follower",
+    "History": "records.history",
+    "Identified": "identification.identify",
+    "ImprovedFollower": "methods.improved_follower",
+    "LagrangianFlow": "dynamics.nonlinear",
+    "LagrangianSystem": "structures.lagrangian",
+    "LearnedInputs": "identification.learned",
+    "Limit": "analyses.limits",
+    "LinearFlow": "dynamics.flow",
+    "MatrixStructure": "structures.matrix",
+    "MeasuredMode": "identification.modes",
+    "Midpoint": "dynamics.integrators",
+    "Output": "structures.quantities",
+    "Parameter": "structures.quantities",
+    "Peak": "analyses.peaks",
+    "Prediction": "identification.learned",
+    "Predictions": "identification.learned",
+    "Probability": "analyses.probability",
+    "Proof": "methods.proof",
+    "RefutedError": "identification.identify",
+    "Sampled": "methods.sampled",
+    "ScaledPeaks": "analyses.incremental",
+    "Sensitivity": "analyses.sensitivity",
+    "StoreyFrame": "structures.storey",
+    "SuitePeaks": "analyses.suites",
+    "Tolerances": "analyses.tolerances",
+    "UnprovedError": "calculus.unproved",
+    "damping_from_loss": "structures.material_damping",
+    "decide": "analyses.decision",
+    "envelope": "propagation",
+    "fragility": "analyses.fragility",
+    "identify": "identification.identify",
+    "incremental": "analyses.incremental",
+    "measured_mode": "identification.modes",
+    "over_records": "analyses.suites",
+    "peaks": "analyses.peaks",
+    "pendulum": "structures.lagrangian",
+    "probability": "analyses.probability",
+    "read_matrix": "structures.read_matrix",
+    "read_modes": "identification.read_modes",
+    "read_record": "records.suite",
+    "read_suite": "records.suite",
+    "require_envelope": "propagation",
+    "sensitivity": "analyses.sensitivity",
+    "spectral_acceleration": "analyses.spectral",
+    "tolerances": "analyses.tolerances",
+}
+"""Module of each exported name, which is imported at its first use: all of them take .1 s."""
+
+
+def __getattr__(name: str) -> Any:
+    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
+    if name in AT_FIRST_USE:
+        return getattr(import_module(f"alphacut.frame.{AT_FIRST_USE[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -14,7 +14,7 @@ from alphacut.base.errors import require_numbers
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.result import Envelope
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.knowledge.joint import joined_inputs

@@ -18,13 +18,13 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
+from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import evaluate, has_matrices, require_modal_order
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import yields

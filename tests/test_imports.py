@@ -170,6 +170,18 @@ for option in ("--help", "--version"):
     assert "alphacut.commands.check" not in modules
 
 
+def test_a_case_that_is_refused_imports_no_stages_and_a_missing_file_no_sections():
+    known = {}
+    for words in (["cases/building.toml", "--set=frame.masses=3"], ["no.toml"]):
+        program = f"from alphacut.entry import main; assert main(['check', *{words}]) == 2"
+        known[words[0]] = modules_after(program)
+    assert not {name for name in known["no.toml"] if name.startswith(("alphacut.case", "pydantic"))}
+    refused = known["cases/building.toml"]
+    assert "alphacut.case.content" in refused
+    slow = ("scipy", "numba", "alphacut.stages", "alphacut.frame.methods", "alphacut.commands.case")
+    assert not {name for name in refused if name.startswith(slow)}
+
+
 def test_a_case_is_checked_without_what_takes_longer_to_import_than_to_use():
     """Two motions of a building, and records of a suite with their spectral accelerations."""
     slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy", "alphacut.rve.image.study"}

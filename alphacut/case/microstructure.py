@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from alphacut.base.errors import require
 from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
-from alphacut.stochastic import (
-    LogNormalRadii,
-    MeasuredRadii,
-    Packings,
-    Particles,
-    pack,
-    read_particles,
-)
-from alphacut.stochastic.particles.radius_distributions import RadiusDistribution
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES
+
+if TYPE_CHECKING:
+    from alphacut.stochastic import Packings, Particles
+    from alphacut.stochastic.particles.radius_distributions import RadiusDistribution
 
 Progress = Callable[[float], None]
 
@@ -45,6 +40,8 @@ class PackingSection(Section):
     @property
     def radii(self) -> RadiusDistribution:
         """Distribution of the radii."""
+        from alphacut.stochastic import LogNormalRadii, MeasuredRadii  # few cases need them
+
         if self.file is not None:
             return MeasuredRadii.read(self.file)
         assert self.smallest_radius is not None
@@ -87,6 +84,8 @@ class PackingSection(Section):
             RefusedError: As `require_readable`: the fraction is too dense, or there are no radii.
             FailedError: Particles still overlap after all steps of the packing.
         """
+        from alphacut.stochastic import pack  # takes time to import
+
         self.require_readable(spheres=spheres)
         shape = DISCS
         if spheres:
@@ -149,6 +148,8 @@ class MicrostructureSection(Section):
     @property
     def measured(self) -> Particles | None:
         """The circles that were measured or seen; None of packings."""
+        from alphacut.stochastic import read_particles  # takes time to import
+
         if self.circles is not None:
             return read_particles(self.circles.file, size=self.circles.size)
         if self.image is not None:

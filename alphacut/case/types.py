@@ -43,7 +43,9 @@ class Section(BaseModel):
 
     # An unknown key is refused, since it is a misspelt one, whose default would act in silence.
     # Sections are frozen because stages are kept by the digest of what they were made from.
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True
+    )
 
     @classmethod
     def described_fields(cls) -> dict[str, FieldInfo]:

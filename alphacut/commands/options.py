@@ -6,6 +6,7 @@ import argparse
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
@@ -13,9 +14,11 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
 from alphacut.io.files import as_json, suggestion
 from alphacut.rve.interruption import uninterrupted
+from alphacut.stochastic.particles.csv_columns import text_of
 
 if TYPE_CHECKING:
     from alphacut.case.cell import CellContent
+    from alphacut.case.content import Case
 
 PETSC_PREFIX = "-rve_"
 
@@ -39,6 +42,8 @@ class Command:
         # An exception raised amid imports could be swallowed by the code that they run: a signal
         # waits. Help and wrong options need no command, whose imports take a second.
         with uninterrupted():
+            if "case" in options:  # a file that is not there is refused before that
+                text_of(Path(options.case))
             function = resolve_name(f"alphacut.commands.{self.place}")
         status: int = function(options, out)
         return status
@@ -132,6 +137,16 @@ def require_petsc(petsc: Mapping[str, str], content: CellContent | None = None) 
     )
     option = PETSC_PREFIX + next(iter(petsc), "")
     require(has_prisms or not petsc, option, "PETSc's", "options of a cell with method prism")
+
+
+def read_case(options: argparse.Namespace) -> Case:
+    """Return the case file that the options name, with the changes of ``--set``."""
+    from alphacut.case.content import load  # Pydantic takes .1 s to import
+
+    # Whether options of PETSc have a use is known when the case says how its cell is solved.
+    case = load(options.case, options.set)
+    require_petsc(options.petsc, case.content)
+    return case
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:

@@ -1,18 +1,16 @@
-"""The case of a command, and what its stages need: read and built before any of their work."""
+"""What the stages of a case need: read and built before any of their work."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.base.number_text import percent_text
-from alphacut.case.content import Case, Content, load
+from alphacut.case.content import Content
 from alphacut.case.material import ThetaSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.commands.options import require_petsc
 from alphacut.frame import require_envelope
 from alphacut.frame.structures.linear import histories
 from alphacut.stages.answers import Response, require_tolerances
@@ -25,14 +23,6 @@ from alphacut.stages.suite import moved_by, suite_records
 
 if TYPE_CHECKING:
     from alphacut.rve.image.study import ImageStudy
-
-
-def read_case(options: argparse.Namespace) -> Case:
-    """Return the case file that the options name, with the changes of ``--set``."""
-    # Whether options of PETSc have a use is known when the case says how its cell is solved.
-    case = load(options.case, options.set)
-    require_petsc(options.petsc, case.content)
-    return case
 
 
 def require_runnable(content: Content) -> ImageStudy | None:

@@ -15,9 +15,8 @@ import pandas as pd
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked, write_text
 from alphacut.base.number_text import text_table
-from alphacut.commands.options import write_answer
+from alphacut.commands.options import read_case, write_answer
 from alphacut.commands.pipeline import Pipeline, open_results
-from alphacut.commands.required import read_case
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import say
 from alphacut.io.provenance import FORMAT, command_line, command_to_paste, versions

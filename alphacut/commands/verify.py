@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.base.errors import require
 from alphacut.commands.options import write_answer
-from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.verification.self_test import Trial, stored_motions
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.result import Nature

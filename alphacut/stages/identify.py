@@ -9,7 +9,7 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame import LearnedInputs, identify, read_modes
-from alphacut.frame.identify.identify import Evidence
+from alphacut.frame.identification.identify import Evidence
 
 
 def identify_inputs(

@@ -22,7 +22,7 @@ from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit, limits_by_name
 from alphacut.frame.analyses.peaks import Peak, Peaks, peaks
 from alphacut.frame.analyses.suites import SuitePeaks
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.result import Envelope
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Ends, Nature, rounded
 

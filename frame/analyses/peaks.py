@@ -17,9 +17,9 @@ from alphacut.base.arrays import Array
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.yielding import AT_NODES
-from alphacut.frame.envelope import Envelope, within_steps
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope
+from alphacut.frame.result import Envelope, within_steps
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy import FuzzyNumber

@@ -26,7 +26,7 @@ from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit,
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.envelope import within_steps
+from alphacut.frame.result import within_steps
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber

@@ -12,7 +12,6 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.level import LevelModels
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.envelope import within_steps
 from alphacut.frame.modes.intervening import Excitation
 from alphacut.frame.modes.structure import ClassicalStructure, classical_structure
 from alphacut.frame.modes.superposition import (
@@ -24,6 +23,7 @@ from alphacut.frame.modes.superposition import (
 )
 from alphacut.frame.records.history import History
 from alphacut.frame.response.oscillators import Grid, Oscillators
+from alphacut.frame.result import within_steps
 from alphacut.frame.structures.linear import LinearSystem, histories
 
 

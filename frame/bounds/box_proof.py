@@ -19,7 +19,7 @@ from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Ends, Envelope, within_steps
+from alphacut.frame.result import Ends, Envelope, within_steps
 from alphacut.fuzzy.result import Nature
 
 

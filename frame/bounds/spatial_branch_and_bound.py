@@ -33,7 +33,7 @@ from alphacut.frame.bounds.box_proof import (
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import exact_flow
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.result import Envelope
 
 LOG = logging.getLogger(__name__)
 

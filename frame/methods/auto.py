@@ -29,12 +29,12 @@ from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
+from alphacut.frame.result import Ends, Envelope
 
 LOG = logging.getLogger(__name__)
 

@@ -31,8 +31,8 @@ from alphacut.frame.bounds.spatial_branch_and_bound import halvings, prove
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.response.duhamel import call_with_load
+from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
 
 Problems = dict[tuple[int, int], OutputBounds]

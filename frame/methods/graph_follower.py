@@ -22,8 +22,8 @@ from alphacut.base.errors import checked_number, require
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, local_maximum
-from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess
+from alphacut.frame.result import Envelope
 from alphacut.fuzzy.result import Nature
 
 Places = tuple[Ints, ...]

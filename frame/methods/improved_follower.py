@@ -24,9 +24,9 @@ from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_follower import Places, Storage, estimated_envelope
 from alphacut.frame.methods.sampled import SAFETY, independent_excess, largest_values, spread_points
+from alphacut.frame.result import Envelope
 from alphacut.frame.structures.linear import frequencies
 
 BATCH = 32

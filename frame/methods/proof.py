@@ -41,12 +41,12 @@ from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.chord_deviation import Response, narrowed_at_jumps, narrowed_deviation
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
+from alphacut.frame.result import Envelope
 
 LOG = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.result import Envelope
 from alphacut.fuzzy.campaign.call import Call, SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.design import bounds_of_samples

@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import Boxes, boxes
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.result import Envelope
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.loads import distinct_histories
 from alphacut.frame.structures.quantities import Output

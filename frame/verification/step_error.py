@@ -13,9 +13,9 @@ from alphacut.base.errors import FailedError
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import Flow, StepError
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-from alphacut.frame.envelope import Envelope
 from alphacut.frame.records.history import History
 from alphacut.frame.response.chord_deviation import load_deviation, load_excess
+from alphacut.frame.result import Envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import evaluate, has_matrices
 from alphacut.frame.structures.loads import distinct_histories

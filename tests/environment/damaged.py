@@ -241,7 +241,7 @@ def _records() -> list[Format]:
 
 
 def _modes() -> list[Format]:
-    from alphacut.frame.identify.uff_modes import uff_mode_rows
+    from alphacut.frame.identification.uff_modes import uff_mode_rows
 
     floors = {"11.x": 1, "12.x": 2}
     text = "".join(samples.uff55(k, (1.0, 0.5, 0.2, 0.1), frequency=k) for k in (1, 2))

@@ -8,7 +8,7 @@ import pytest
 from alphacut.base import memory
 from alphacut.base.memory import free_memory, require_free_memory
 from alphacut.frame import read_matrix
-from alphacut.frame.identify.uff_modes import uff_mode_rows
+from alphacut.frame.identification.uff_modes import uff_mode_rows
 from alphacut.frame.records.read import read_recording
 from alphacut.fuzzy import RefusedError
 from alphacut.stochastic import read_particles

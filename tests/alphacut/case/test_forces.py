@@ -6,7 +6,7 @@ import pytest
 from alphacut import main
 from alphacut.case.content import load
 from alphacut.frame import envelope
-from alphacut.frame.envelope import within_steps
+from alphacut.frame.result import within_steps
 from alphacut.io.files import BadInput
 from tests.alphacut.small import written
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from alphacut import main
-from alphacut.commands import check, verify
+from alphacut.commands import case_text, required, verify
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FailedError, RefusedError
@@ -114,8 +114,8 @@ def test_a_material_that_is_not_found_hides_neither_doubts_nor_what_is_refused(
     def failed(content):
         raise FailedError("the series does not converge")
 
-    monkeypatch.setattr(check, "require_runnable", refused)
-    monkeypatch.setattr(check, "foreseen_structure", failed)
+    monkeypatch.setattr(required, "require_runnable", refused)
+    monkeypatch.setattr(case_text, "foreseen_structure", failed)
     tiny = "--set=frame.modulus=[22, 24, 26] Pa"
     status, _, err = spoken(capfd, "check", written(tmp_path), tiny)
     assert status == 2

@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
-from alphacut.frame.identify.mode_rows import ModeRows
+from alphacut.frame.identification.mode_rows import ModeRows
 from alphacut.frame.records.text_file import read_bytes
 from alphacut.frame.records.uff import COMPLEX, DIRECTIONS, data_sets, floats
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.frame.identify.uff_modes import phase_collinearity, uff_mode_rows
+from alphacut.frame.identification.uff_modes import phase_collinearity, uff_mode_rows
 from alphacut.fuzzy import RefusedError
 from tests.frame.records.samples import uff55
 

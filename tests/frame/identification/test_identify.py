@@ -14,7 +14,7 @@ from alphacut.frame import (
     identify,
     measured_mode,
 )
-from alphacut.frame.identify.modes import Chain, chain_modes
+from alphacut.frame.identification.modes import Chain, chain_modes
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, RefusedError, Triangular, from_data
 

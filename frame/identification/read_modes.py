@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from alphacut.base.errors import checked_number, path_of, require
-from alphacut.frame.identify.mode_rows import mode_rows
-from alphacut.frame.identify.modes import MeasuredMode, measured_mode
-from alphacut.frame.identify.uff_modes import uff_mode_rows
+from alphacut.frame.identification.mode_rows import mode_rows
+from alphacut.frame.identification.modes import MeasuredMode, measured_mode
+from alphacut.frame.identification.uff_modes import uff_mode_rows
 
 
 def read_modes(

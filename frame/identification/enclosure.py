@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.identify.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
+from alphacut.frame.identification.modes import Chain, ModeCut, chain_modes, eigenvalue_ranges
 from alphacut.frame.structures.storey import chain_matrix
 
 if TYPE_CHECKING:

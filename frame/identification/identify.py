@@ -18,9 +18,9 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
-from alphacut.frame.identify.enclosure import enclosure
-from alphacut.frame.identify.learned import LearnedInputs, Predictions
-from alphacut.frame.identify.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
+from alphacut.frame.identification.enclosure import enclosure
+from alphacut.frame.identification.learned import LearnedInputs, Predictions
+from alphacut.frame.identification.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame

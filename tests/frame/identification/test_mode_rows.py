@@ -2,7 +2,7 @@
 
 import pytest
 
-from alphacut.frame.identify.mode_rows import mode_rows
+from alphacut.frame.identification.mode_rows import mode_rows
 from alphacut.fuzzy import RefusedError
 
 MODES = "mode,frequency [Hz],q1,q2\n1,1.5,0.5,1\n1,1.6,0.52,1\n2,4,-1,0.5\n"

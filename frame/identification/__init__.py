@@ -1,0 +1,1 @@
+"""Stiffnesses from measured modes: boxes, coverage and predictions."""
