@@ -6,6 +6,7 @@ from alphacut.case.content import Content
 from alphacut.case.parse import allowed_values, keys_of
 from alphacut.case.structures import with_structures
 from alphacut.case.types import Section
+from alphacut.frame import METHODS
 
 CASE = with_structures(Content, built=True)
 ROOT = Path(__file__).parents[3]
@@ -33,4 +34,5 @@ def test_allowed_values_of_a_key_are_told_in_words():
     keys = keys_of(CASE)
     assert allowed_values(keys["mesh.layers"]).startswith("whole number from 1")
     assert "midpoint" in allowed_values(keys["envelope.integrator"])
+    assert allowed_values(keys["envelope.method"]).split(", ") == list(METHODS)
     assert allowed_values(keys["title"]) == ""

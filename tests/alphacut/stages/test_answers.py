@@ -1,10 +1,12 @@
 """Questions of a case: their answers, and what a further one touches."""
 
 import re
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
+from alphacut.case.cell import CellCase
 from alphacut.case.content import Content, load
 from alphacut.case.limits import CaseLimit, parse_limit
 from alphacut.figures.answers import DRAWINGS
@@ -14,6 +16,7 @@ from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import Interval, RefusedError
 from alphacut.io.typed_json import from_document
 from alphacut.stages.answers import ANSWERS
+from alphacut.stages.summary import Parts
 from tests.alphacut.small import summary_of, summary_of_run, written
 
 
@@ -89,6 +92,8 @@ def test_every_question_is_complete():
     keys = [kind.key for kind in ANSWERS]
     assert len(set(keys)) == len(keys)
     assert set(DRAWINGS) == set(keys) <= set(Content.model_fields)
+    assert set(keys) <= set(CellCase.model_fields)
+    assert set(keys) <= {field.name for field in fields(Parts)}
 
 
 LIMITS = """
