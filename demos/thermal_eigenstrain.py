@@ -25,7 +25,7 @@ radius = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 resin = Phase(4e9, 0.35)
 fibre = VoigtPhase(((60e9, 8e9, 3e9), (8e9, 18e9, 2e9), (3e9, 2e9, 7e9)))
 expansion = np.array([60e-6, 60e-6, 0.0]), np.array([-1e-6, 12e-6, 5e-6])  # ε of each, 1/K
-model = PrismModel(mesh_size=0.3, layers=6, petsc={"ksp_rtol": "1e-11"}, stiffness=True)
+model = PrismModel(0.3, 6, petsc={"ksp_rtol": "1e-11"}, stiffness=True, estimate=False)
 cell = ProductSpace(model, radius)
 
 # %% [markdown]

@@ -74,13 +74,18 @@ most = 3
 """
 
 
-def written(folder, text=FRAME, **changes):
-    """A case file with texts replaced, each of which must be there."""
+def replaced(text, changes):
+    """A text with others in place of some of its parts, each of which must be there."""
     for old, new in changes.items():
         assert old in text
         text = text.replace(old, new)
+    return text
+
+
+def written(folder, text=FRAME, **changes):
+    """A case file with texts replaced, each of which must be there."""
     path = folder / "case.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(replaced(text, changes), encoding="utf-8")
     return path
 
 

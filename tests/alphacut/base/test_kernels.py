@@ -84,27 +84,33 @@ def test_a_changed_helper_or_constant_changes_the_result(tmp_path: Path, is_shar
     assert results(cache, *calls) == expected
 
 
-@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
-@pytest.mark.parametrize("damage", ["emptied", "halved", "end", "byte"])
-def test_a_damaged_file_of_the_cache_is_removed_and_made_anew(
-    tmp_path: Path, damage: str, ending: str
-) -> None:
-    """Neither this run nor the next one ends with an error; the next finds the code again."""
-    checkout = tmp_path / "checkout"
-    assert results(tmp_path / "cache", (checkout, {}), (checkout, {})) == [(7, 0), (7, 1)]
-    (file,) = tmp_path.glob(f"cache/kernels/alphacut.fuzzy.caller-*/*{ending}")
-    content = file.read_bytes()
+def damages(content: bytes) -> list[bytes]:
+    """What may be left of a file: nothing, its first half, all but its end, one byte changed."""
     middle = len(content) // 2
     flipped = bytes([content[middle] ^ 0xFF])
-    damaged = {
-        "emptied": b"",
-        "halved": content[:middle],
-        "end": content[:-1],
-        "byte": content[:middle] + flipped + content[middle + 1 :],
-    }
-    file.write_bytes(damaged[damage])
-    assert results(tmp_path / "cache", (checkout, {}), (checkout, {})) == [(7, 0), (7, 1)]
-    assert damaged[damage] not in [x.read_bytes() for x in file.parent.iterdir()]
+    return [b"", content[:middle], content[:-1], content[:middle] + flipped + content[middle + 1 :]]
+
+
+def test_damaged_files_of_the_cache_are_removed_and_made_anew(tmp_path: Path) -> None:
+    """Neither this run nor the next one ends with an error; the next finds the code again.
+
+    Kernels with several constants have files of their own, of which each is damaged in one way.
+    """
+    checkout, endings = tmp_path / "checkout", (".nbi", ".nbc")
+    factors = range(len(endings) * len(damages(b"content")))
+    kernels_of = [(checkout, {"fuzzy/units.py": f"FACTOR = {k}.0\n"}) for k in factors]
+    calls = [call for call in kernels_of for _ in ("first", "again")]
+    expected = [(3 * k + 1, is_found) for k in factors for is_found in (False, True)]
+    assert results(tmp_path / "cache", *calls) == expected
+    folders = sorted(tmp_path.glob("cache/kernels/alphacut.fuzzy.caller-*"))
+    damaged = {}
+    for k, folder in zip(factors, folders, strict=True):
+        (file,) = folder.glob(f"*{endings[k % 2]}")
+        damaged[file] = damages(file.read_bytes())[k // 2]
+        file.write_bytes(damaged[file])
+    assert results(tmp_path / "cache", *calls) == expected
+    for file, content in damaged.items():
+        assert content not in [x.read_bytes() for x in file.parent.iterdir()]
 
 
 def test_code_is_neither_taken_from_other_users_nor_kept_for_ever(tmp_path: Path) -> None:
