@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from alphacut.stochastic import Particles
-from alphacut.stochastic.tessellation.apollonius import apollonius
+from alphacut.stochastic import Particles, pack
+from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
 
 
 def quadrature_area(discs: Particles, i: int) -> float:
@@ -93,7 +93,7 @@ def test_three_discs_against_adaptive_quadrature(radii, periodic):
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(50), pytest.param(range(50, 1000), marks=pytest.mark.slow)],
+    [range(30), pytest.param(range(30, 1000), marks=pytest.mark.slow)],
     ids=["few", "thousand"],
 )
 def test_configurations_tile_their_rectangle_and_match_a_raster(seeds):
@@ -107,7 +107,7 @@ def test_configurations_tile_their_rectangle_and_match_a_raster(seeds):
         assert (diagram.areas >= 0).all()
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-0.01, 0.2), st.floats(0.01, 1e6))
 def test_areas_do_not_change_with_a_common_growth_and_scale_with_the_length(seed, growth, scale):
     rng = np.random.default_rng(seed)
@@ -120,3 +120,41 @@ def test_areas_do_not_change_with_a_common_growth_and_scale_with_the_length(seed
         assert apollonius(other).areas == pytest.approx(areas, rel=1e-9, abs=1e-12)
     scaled = apollonius(Particles(scale * centres, scale * radii, (scale, scale)))
     assert scaled.areas == pytest.approx(areas * scale**2, rel=1e-9)
+
+
+@pytest.mark.parametrize("discs", [12, 1500])
+def test_neighbours_on_the_torus_are_those_of_the_cells(discs):
+    (packing,) = pack(discs, packings=1, fraction=0.3, radii=(1e-3, 1e-3), seed=discs)
+    direct = neighbours(packing)
+    assert direct.number.sum() == len(direct.first) == 6 * discs  # Euler: six on average
+    assert direct.distances.min() >= 2e-3
+    walls = np.bincount(apollonius(packing).cell, minlength=discs)
+    assert direct.number.tolist() == walls.tolist()
+
+
+def windows(number: int):
+    """Windows on a section of 2000 discs, with the true areas of the cells inside."""
+    (large,) = pack(2000, packings=1, fraction=0.25, radii=(1e-3, 1e-2), seed=4)
+    areas = apollonius(large).areas
+    for origin in np.random.default_rng(5).random((number, 2)) * large.size:
+        centres, size = np.mod(large.centres - origin, large.size), 0.3 * large.size
+        inside = (centres < size).all(axis=1)
+        yield Particles(centres[inside], large.radii[inside], size, False), areas[inside]
+
+
+def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bias():
+    plain, weighted, truth, estimates, counts = [], [], [], [], []
+    for window, areas in windows(25):
+        diagram = apollonius(window)
+        whole, weight = counted_cells(diagram)
+        area = diagram.areas[whole]
+        assert area == pytest.approx(areas[whole], rel=1e-10)
+        assert len(whole) > 0.4 * len(window)
+        plain.append(area.mean())
+        weighted.append((area @ weight) / weight.sum())
+        truth.extend(areas)
+        estimates.append(weight.sum())  # of the number of cells in the window
+        counts.append(len(window))
+    assert abs(np.mean(weighted) / np.mean(truth) - 1) < 0.03
+    assert np.mean(plain) / np.mean(truth) - 1 < -0.03
+    assert abs(np.mean(estimates) / np.mean(counts) - 1) < 0.05

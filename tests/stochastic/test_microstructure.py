@@ -12,11 +12,9 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from alphacut import main
 from alphacut.fuzzy import RefusedError
-from alphacut.stages.microstructure import fragment
 from alphacut.stochastic import (
-    HermiteMap,
-    LogNormalRadii,
     MeasuredRadii,
     Particles,
     fit_radius_map,
@@ -24,16 +22,8 @@ from alphacut.stochastic import (
     pack,
     read_particles,
 )
-from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.microstructure import RadiusLimits, fit_map
-from alphacut.stochastic.particles.measured import circles_in
-from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.shapes import DISCS, SPHERES
-from alphacut.stochastic.sections import reduced_radii, with_cells
-from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells, neighbours
 from benchmarks.stochastic import packing_figures, paper_data
 
-EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 ROOT = Path(__file__).parents[2]
 needs_voro = pytest.mark.skipif(not shutil.which("voro++"), reason="needs Voro++")
 
@@ -43,67 +33,6 @@ def few_resamples():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(microstructure, "RESAMPLES", 100)
         yield
-
-
-@pytest.mark.parametrize("discs", [12, 200, 3000])
-def test_neighbours_on_the_torus_are_those_of_the_cells(discs):
-    packing = Packing(discs, 0.3, EQUAL).make(np.random.default_rng(discs))
-    direct = neighbours(packing)
-    assert direct.number.sum() == len(direct.first) == 6 * discs  # Euler: six on average
-    assert direct.distances.min() >= 2e-3
-    walls = np.bincount(apollonius(packing).cell, minlength=discs)
-    assert direct.number.tolist() == walls.tolist()
-
-
-def test_few_data_leave_the_slopes_as_fuzzy_as_their_bootstrap_band(rng):
-    """Samples of 60 r_n of a map: the fuzzy slopes contain the map's own, of which they know."""
-    truth, count = HermiteMap(0.15, 0.3, 0.85, 0.4), 0
-    for seed in range(20):
-        values = truth(truth.distribution.quantile(rng.random(60)))
-        sample = AreaWeighted.from_values(values, np.ones(60), np.arange(60) % 6)
-        pbox = fit_map(RadiusLimits(DISCS, (0.15, 0.85)), sample, seed=seed).pbox
-        count += pbox.a2[0] <= truth.a2 <= pbox.a2[2] and pbox.a4[0] <= truth.a4 <= pbox.a4[2]
-    assert count >= 17  # the band's confidence is 99 %
-
-
-def test_discs_tighter_than_their_cells_count_as_touching_them():
-    """A tenth of the area lies in cells of r_n = 1.05: it is taken at 0.99."""
-    radii = np.r_[np.linspace(0.4, 0.9, 90), np.full(10, 1.05)]
-    sample = AreaWeighted.from_values(radii, np.ones(100), np.arange(100) % 5)
-    rule = RadiusLimits(DISCS)
-    capped = rule.capped(sample)
-    assert capped.values.max() == DISCS.reach == 0.99
-    assert capped.mean == pytest.approx(0.9 * 0.65 + 0.1 * 0.99, rel=1e-12)
-    assert capped.fraction_within(0.95, 0.99) == pytest.approx(0.1, rel=1e-12)
-    assert RadiusLimits(DISCS, (0.2, 0.9)).capped(sample) is sample
-
-
-def windows(number: int):
-    """Windows on a section of 3000 discs, with the true areas of the cells inside."""
-    large = Packing(3000, 0.25, TENFOLD).make(np.random.default_rng(4))
-    areas = apollonius(large).areas
-    for origin in np.random.default_rng(5).random((number, 2)) * large.size:
-        centres, size = np.mod(large.centres - origin, large.size), 0.3 * large.size
-        inside = (centres < size).all(axis=1)
-        yield Particles(centres[inside], large.radii[inside], size, False), areas[inside]
-
-
-def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bias():
-    plain, weighted, truth, estimates, counts = [], [], [], [], []
-    for window, areas in windows(25):
-        diagram = apollonius(window)
-        whole, weight = counted_cells(diagram)
-        area = diagram.areas[whole]
-        assert area == pytest.approx(areas[whole], rel=1e-10)
-        assert len(whole) > 0.4 * len(window)
-        plain.append(area.mean())
-        weighted.append((area @ weight) / weight.sum())
-        truth.extend(areas)
-        estimates.append(weight.sum())  # of the number of cells in the window
-        counts.append(len(window))
-    assert abs(np.mean(weighted) / np.mean(truth) - 1) < 0.03
-    assert np.mean(plain) / np.mean(truth) - 1 < -0.03
-    assert abs(np.mean(estimates) / np.mean(counts) - 1) < 0.05
 
 
 GOOD = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n20,30,3\n"
@@ -156,7 +85,7 @@ def test_rows_without_meaning_are_refused(tmp_path, text, key, allowed):
 def picture(seed: int, *, noise: float, fraction: float = 0.3):
     """Image of a packing (gaps of 3 pixels, radii from 8) and the circles that it shows whole."""
     rng = np.random.default_rng(seed)
-    packing = Packing(90, fraction, LogNormalRadii(9.5, 31.5)).make(rng)
+    (packing,) = pack(40, packings=1, fraction=fraction, radii=(9.5, 31.5), seed=seed)
     packing = replace(packing, radii=packing.radii - 1.5)
     side, fine = int(np.ceil(packing.size[0])), 3
     edge = np.minimum(packing.centres, side - packing.centres).min(axis=1) - packing.radii
@@ -207,9 +136,10 @@ def labyrinth() -> np.ndarray:
         (under_light(), "values up to 0.2"),
     ],
 )
-def test_images_that_hide_their_particles_are_refused(image, allowed):
+def test_images_that_hide_their_particles_are_refused(tmp_path, image, allowed):
+    Image.fromarray(image.astype(np.float32)).save(tmp_path / "image.tif")
     with pytest.raises(RefusedError) as refused:
-        circles_in(image, 1.0, name="image.png")
+        read_particles(tmp_path / "image.tif", pixel=1.0)
     assert allowed in refused.value.allowed
 
 
@@ -232,7 +162,7 @@ def test_what_is_no_image_is_refused(tmp_path, options, message):
 
 @pytest.fixture(scope="module")
 def result():
-    sections = pack(300, packings=12, fraction=0.2, radii=(1e-3, 1e-2), seed=3)
+    sections = pack(300, packings=8, fraction=0.2, radii=(1e-3, 1e-2), seed=3)
     return fit_radius_map(sections, limits=(0.15, 0.85), seed=3)
 
 
@@ -244,9 +174,8 @@ def test_a_fit_takes_a_list_of_sections(sections):
 
 @pytest.mark.parametrize("limits", [(0.5,), (0.8, 0.2), (0.1, 1.2), "0.1 to 0.8"])
 def test_limits_that_are_no_range_are_refused(limits):
-    section = Packing(20, 0.2, TENFOLD).make(np.random.default_rng(1))
     with pytest.raises(RefusedError, match="limits is"):
-        fit_radius_map([section], limits=limits)
+        fit_radius_map(pack(20, packings=1, fraction=0.2, radii=(1e-3, 1e-2)), limits=limits)
 
 
 def test_study_of_packings(result):
@@ -259,18 +188,14 @@ def test_study_of_packings(result):
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-10)
     assert numbers["mean_area_fraction_of_map"] == pytest.approx(0.2, abs=0.005)
     assert result.pbox.excess(result.truncated) <= result.band + 1e-6
-    text = fragment(numbers)  # TOML that gives the map
-    radius = tomllib.loads(text)["radius"]
-    assert f"of the particles: {numbers['area_fraction']:.4f}" in text
-    assert (radius["a1"], radius["a3"], radius["theta"]) == (0.15, 0.85, [-3, 3])
-    assert radius["a2"] == pytest.approx(result.pbox.a2, rel=1e-7)
 
 
 def test_study_of_measured_circles(tmp_path):
-    packing = Packing(600, 0.2, TENFOLD).make(np.random.default_rng(8))
+    drawn = {"fraction": 0.2, "radii": (1e-3, 1e-2)}
+    (packing,) = pack(600, packings=1, seed=8, **drawn)
     table = 1e3 * np.column_stack([packing.centres, packing.radii])
     rows = "".join(f"{x!r},{y!r},{r!r}\n" for x, y, r in table.tolist())
-    truth = fit_radius_map(pack(600, packings=6, fraction=0.2, radii=(1e-3, 1e-2)))
+    truth = fit_radius_map(pack(600, packings=5, **drawn))
     text, size = "x [mm],y [mm],r [mm]\n" + rows, tuple(packing.size)
     measured = fit_radius_map([circles_of(tmp_path, text, size)])
     assert measured.sample.mean == pytest.approx(truth.sample.mean, abs=0.03)
@@ -286,36 +211,38 @@ def test_cells_as_tight_as_no_square_are_counted_or_refused():
     assert 0 < dense.rule.capped_fraction(dense.sample) < 0.05
     assert dense.fraction_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
-        fit_radius_map(pack(200, packings=5, fraction=0.75, radii=EQUAL))
-
-
-def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
-    rule = RadiusLimits(SPHERES, packed_fraction=0.4)
-    groups = np.arange(100) % 5
-    for tight, allowed in ((15, True), (16, False)):
-        radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
-        sample = AreaWeighted.from_values(radii, np.ones(100), groups)
-        if allowed:
-            assert rule.capped(sample) is sample
-        else:
-            with pytest.raises(RefusedError, match=r"16.* of the volume.*set cell.fraction = 0.4"):
-                rule.capped(sample)
+        fit_radius_map(pack(200, packings=5, fraction=0.75, radii=(1e-3, 1e-3)))
 
 
 def test_equal_cells_leave_nothing_to_fit():
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) + 0.5
-    section = with_cells(Particles(grid, np.full(36, 0.3), (6, 6)))
-    assert reduced_radii([section]).values == pytest.approx(np.full(36, 0.6), rel=1e-14)
     with pytest.raises(RefusedError, match=r"0\.6 in all cells"):
-        fit_map(RadiusLimits(DISCS), reduced_radii([section]), seed=3)
+        fit_radius_map([Particles(grid, np.full(36, 0.3), (6, 6))], seed=3)
 
 
-def test_the_papers_figures_are_drawn(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(packing_figures, "N_EQUAL", 400)
+@pytest.fixture(scope="module")
+def few_packings(tmp_path_factory):
+    """Path of the shipped case of packings, of five small ones."""
+    path = tmp_path_factory.mktemp("few") / "few.toml"
     case = (ROOT / "cases/concrete.toml").read_text(encoding="utf-8")
-    few = case.replace("particles = 2000", "particles = 200").replace("= 20  ", "= 5  ")
-    (tmp_path / "few.toml").write_text(few, encoding="utf-8")
-    packing_figures.main([str(tmp_path / "few.toml"), "--out", str(tmp_path)])
+    few = case.replace("particles = 2000", "particles = 120").replace("= 20  ", "= 5  ")
+    path.write_text(few, encoding="utf-8")
+    return path
+
+
+def test_the_command_prints_a_section_that_gives_the_map(few_packings, capfd):
+    assert main(["microstructure", str(few_packings), "--json", "-"]) == 0
+    numbers = json.loads(capfd.readouterr().out)
+    assert f"of the particles: {numbers['area_fraction']:.4f}" in numbers["fragment"]
+    radius = tomllib.loads(numbers["fragment"])["radius"]
+    assert (radius["a1"], radius["a3"], radius["theta"]) == (0.13, 0.87, [-3, 3])
+    for name in ("a2", "a4"):
+        assert radius[name] == pytest.approx(numbers[name], rel=1e-7)
+
+
+def test_the_papers_figures_are_drawn(few_packings, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(packing_figures, "N_EQUAL", 200)
+    packing_figures.main([str(few_packings), "--out", str(tmp_path)])
     files = list(map(Path, capsys.readouterr().out.splitlines()))
     numbers = ["03-04", "05-08", "06-07", "09", "10", "11", "12"]
     assert [re.search(r"fig([\d-]+)-", file.name)[1] for file in files[::2]] == numbers
@@ -326,7 +253,7 @@ def test_the_papers_figures_are_drawn(tmp_path, monkeypatch, capsys):
 @needs_voro
 def test_spheres_take_the_same_way_and_keep_their_fraction():
     law = MeasuredRadii(tuple(np.linspace(1e-3, 2e-3, 20)))
-    spheres = pack(150, packings=6, fraction=0.2, radii=law, shape="spheres", seed=2)
+    spheres = pack(150, packings=5, fraction=0.2, radii=law, shape="spheres", seed=2)
     result = fit_radius_map(spheres, seed=2)
     numbers = result.numbers()
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)

@@ -1,18 +1,22 @@
 """Packings of discs and spheres: what comes out meets the specification."""
 
-from concurrent.futures import ProcessPoolExecutor
 from itertools import product
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from alphacut.fuzzy import FailedError, RefusedError
-from alphacut.stochastic import LogNormalRadii, MeasuredRadii, Packings, Particles, gauss_rule, pack
-from alphacut.stochastic.particles.packing import Packing, random_sequential, relax_random_centres
-from alphacut.stochastic.particles.shapes import DISCS, SPHERES
-from alphacut.stochastic.sections import with_cells
+from alphacut.stochastic import (
+    LogNormalRadii,
+    MeasuredRadii,
+    Particles,
+    fit_radius_map,
+    gauss_rule,
+    microstructure,
+    pack,
+)
+from alphacut.stochastic.particles.packing import random_sequential, relax_random_centres
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 
@@ -32,17 +36,17 @@ def brute_gap(particles: Particles) -> float:
 @pytest.mark.parametrize(
     ("law", "fraction", "shape"),
     [
-        (EQUAL, 0.4, DISCS),
-        (TENFOLD, 0.4, DISCS),
-        (LogNormalRadii(1e-4, 1e-2), 0.3, DISCS),
-        (LogNormalRadii(1e-3, 2e-3), 0.2, SPHERES),
-        (EQUAL, 0.72, DISCS),
-        (TENFOLD, 0.76, DISCS),
-        (LogNormalRadii(1, 2), 0.5, SPHERES),
+        (EQUAL, 0.4, "discs"),
+        (TENFOLD, 0.4, "discs"),
+        (LogNormalRadii(1e-4, 1e-2), 0.3, "discs"),
+        (LogNormalRadii(1e-3, 2e-3), 0.2, "spheres"),
+        (EQUAL, 0.72, "discs"),
+        (TENFOLD, 0.76, "discs"),
+        (LogNormalRadii(1, 2), 0.5, "spheres"),
     ],
 )
 def test_a_packing_meets_its_specification(law, fraction, shape):
-    packing = Packing(300, fraction, law, shape).make(np.random.default_rng(1))
+    (packing,) = pack(300, packings=1, fraction=fraction, radii=law, shape=shape, seed=1)
     assert len(packing) % 300 == 0
     assert packing.fraction == pytest.approx(fraction, abs=1e-12)
     assert brute_gap(packing) >= -1e-15
@@ -50,20 +54,25 @@ def test_a_packing_meets_its_specification(law, fraction, shape):
         assert stats.kstest(packing.radii, law.cdf).pvalue > 1e-4
 
 
-@pytest.mark.parametrize("shape", [DISCS, SPHERES], ids=lambda shape: shape.particles)
+@pytest.mark.parametrize("shape", ["discs", "spheres"])
 def test_one_seed_gives_one_packing_in_any_process(shape):
-    packing = Packing(60, 0.2, TENFOLD, shape)
-    alone, more = (Packings.make(packing, count, seed=5) for count in (3, 4))
-    for start in ("spawn", "fork"):
-        with ProcessPoolExecutor(2, get_context(start)) as pool:
-            shared = Packings.make(packing, 3, seed=5, executor=pool)
-            cells = list(pool.map(with_cells, alone))
-        for a, b, c in zip(alone, shared, more[:3], strict=True):
-            assert (a.centres == b.centres).all()
-            assert (a.centres == c.centres).all()
-        for particles, of_process in zip(alone, cells, strict=True):
-            assert (with_cells(particles).cells == of_process.cells).all()
+    options = {"fraction": 0.2, "radii": (1e-3, 1e-2), "shape": shape, "seed": 5}
+    alone, shared, more = (
+        pack(60, packings=count, workers=workers, **options)
+        for count, workers in ((2, 1), (2, 2), (3, 1))
+    )
+    for a, b, c in zip(alone, shared, more[:2], strict=True):
+        assert (a.centres == b.centres).all()
+        assert (a.centres == c.centres).all()
     assert not np.isclose(alone[0].centres, alone[1].centres).any()
+
+
+def test_cells_are_the_same_in_any_process(monkeypatch):
+    monkeypatch.setattr(microstructure, "RESAMPLES", 20)
+    packings = pack(60, packings=5, fraction=0.2, radii=(1e-3, 1e-2))
+    alone, shared = (fit_radius_map(packings, workers=workers) for workers in (1, 2))
+    for one, other in zip(alone.sections, shared.sections, strict=True):
+        assert (one.cells == other.cells).all()
 
 
 @pytest.mark.parametrize(
@@ -93,7 +102,7 @@ def test_a_list_of_two_radii_is_their_range():
 @pytest.mark.parametrize("fraction", [0.9, -0.1, np.nan])
 def test_a_fraction_without_meaning_is_refused(fraction):
     with pytest.raises(RefusedError) as refused:
-        Packing(10, fraction, EQUAL)
+        pack(10, fraction=fraction, radii=EQUAL)
     assert refused.value.value == repr(fraction)
 
 
