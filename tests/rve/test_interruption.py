@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.rve.cell.outline import circle
+from alphacut.rve import Ellipse
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
@@ -124,5 +124,5 @@ def test_an_interruption_amid_meshing_arrives_after_it(handler):
         return 0.3
 
     with pytest.raises(KeyboardInterrupt):
-        square.gmsh_triangles(0.3, 0.5, circle, size)
+        square.gmsh_triangles(0.3, 0.5, Ellipse(1.0), size)
     assert len(asked) > 50

@@ -9,7 +9,7 @@ from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve import Phase, SeriesModel, SlicesModel
 from alphacut.rve.series.model import CIRCLES
 from alphacut.stochastic import HermiteMap, TruncatedNormal
-from tests.rve.test_result import Bent
+from tests.rve.test_result import Bent, crisp_cell
 
 MATRIX = Phase(20e9)
 EXACT = {
@@ -28,12 +28,6 @@ class Jumping:
     def __call__(self, theta):
         theta = np.asarray(theta, float)
         return np.where(theta < 0.3, 0.4, 0.7) + 0.02 * theta
-
-
-def crisp_cell(radius, matrix, inclusion, **options):
-    """Result of the series of one radius."""
-    radius_map = HermiteMap(radius, 0, radius, 0)
-    return SeriesModel(points=2, **options).solve(radius_map, matrix, [inclusion])[0]
 
 
 def random_cells(count, seed, *, highest):

@@ -14,7 +14,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from alphacut.rve import SlicesModel
 from alphacut.rve.mesh.curved import plane_mesh
 from alphacut.rve.slices.model import PlaneCell, theta_error
-from tests.rve.series.test_series import crisp_cell
+from tests.rve.test_result import crisp_cell
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9)
 ORTHOTROPIC = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 40e9, 0.0), (5e9, 0.0, 25e9)))
