@@ -11,9 +11,10 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.rve import Phase
-from alphacut.rve.cell.cell import AREA, THREE_LOADS
-from alphacut.rve.fenicsx import MPI, PETSc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from alphacut.rve import LOADS, Phase
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.mesh.wedge import wedge
@@ -25,6 +26,8 @@ from alphacut.stochastic import HermiteMap
 CONE = HermiteMap(0.3, 0.1, 0.6, 0.1)
 SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)
 NOTHING = np.zeros((3, 3))
+AREA = 4.0
+THREE_LOADS = np.array([*LOADS, (0.01, -0.01, 0.0)])
 
 
 def exactly_periodic(grid):
