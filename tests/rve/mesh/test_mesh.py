@@ -1,20 +1,25 @@
-"""The plane meshes: periodic, on their outline, sound wherever they slide."""
+"""Plane meshes, periodic, on their outline and sound wherever they slide; prisms, all of which arrive."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy import RefusedError
-from alphacut.rve import Ellipse
-from alphacut.rve.cell.outline import area, circle
-from alphacut.rve.fenicsx import basix
+import basix
+
+from alphacut.fuzzy import FailedError, RefusedError
+from alphacut.rve import Ellipse, MeshModel
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.columns import extrude
+from alphacut.rve.mesh.columns import extrude, grid_of
 from alphacut.rve.mesh.curved import curved_nodes, jacobian_ratios, plane_mesh
-from alphacut.rve.mesh.periodicity import MeshError, unknowns
-from alphacut.rve.mesh.prism_grid import nodes_at_radii, reference_radius
+from alphacut.rve.mesh.periodicity import unknowns
+from alphacut.rve.mesh.prism_grid import Prisms, nodes_at_radii, reference_radius
+from alphacut.rve.mesh.wedge import prism_rule, wedge
 from alphacut.stochastic import HermiteMap
+
+CIRCLE = Ellipse(1.0)
 
 
 def flower(angle):
@@ -22,7 +27,7 @@ def flower(angle):
     return 1 + 0.15 * np.cos(4 * angle)
 
 
-OUTLINES = [circle, Ellipse(2.0), Ellipse(0.7), flower]
+OUTLINES = [CIRCLE, Ellipse(2.0), Ellipse(0.7), flower]
 
 
 def areas(points, triangles):
@@ -34,6 +39,7 @@ def areas(points, triangles):
 def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline):
     mesh = extrude(size=0.2, radius=0.5, outline=outline, layers=1).plane
     signs = np.sign(areas(mesh.points, mesh.triangles))
+    area = np.pi * np.mean(outline(np.linspace(0, 2 * np.pi, 720, endpoint=False)) ** 2)
     for radius in (0.05, 0.3, 0.65):
         points = nodes_at_radii(mesh, np.array([radius]))[0]
         assert (areas(points, mesh.triangles) * signs > 0).all()
@@ -42,7 +48,7 @@ def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline)
         sides = abs(mesh.points) > 1 - 1e-12
         assert points[sides] == pytest.approx(mesh.points[sides], abs=1e-14)
         inside = abs(areas(points, mesh.triangles)[mesh.inside]).sum()
-        assert inside == pytest.approx(radius**2 * area(outline), rel=0.04)
+        assert inside == pytest.approx(radius**2 * area, rel=0.04)
 
 
 def test_opposite_nodes_are_one_unknown_and_all_corners_none():
@@ -90,7 +96,7 @@ def test_gmsh_meshes_a_cell_again_only_if_its_file_is_not_there_whole(tmp_path, 
         assert (has_meshed(Ellipse(1.5)), file.read_bytes()) == (True, whole)
     assert {x.suffix for x in (tmp_path / "meshes").iterdir()} == {".npz"}
     (tmp_path / "meshes").chmod(0o777)  # another user could write there
-    assert [has_meshed(circle) for _ in range(2)] == [True, True]
+    assert [has_meshed(CIRCLE) for _ in range(2)] == [True, True]
 
 
 def test_a_node_without_a_partner_is_refused():
@@ -98,9 +104,9 @@ def test_a_node_without_a_partner_is_refused():
     points = plane.points.copy()
     side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
     points[side[0], 1] += 1e-3
-    with pytest.raises(MeshError, match=r"sides x1 = ±1 at x2 = .* has no partner"):
+    with pytest.raises(FailedError, match=r"sides x1 = ±1 at x2 = .* has no partner"):
         unknowns(points)
-    with pytest.raises(MeshError, match="has no partner"):
+    with pytest.raises(FailedError, match="has no partner"):
         unknowns(np.delete(plane.points, side[1], axis=0))
 
 
@@ -162,7 +168,7 @@ def test_a_corner_that_no_edge_length_makes_sound_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("outline", "radius"), [(circle, 0.9996), (Ellipse(4.0), 0.51), (lambda a: np.cos(a), 0.5)]
+    ("outline", "radius"), [(CIRCLE, 0.9996), (Ellipse(4.0), 0.51), (lambda a: np.cos(a), 0.5)]
 )
 def test_what_does_not_fit_into_the_cell_is_refused(outline, radius):
     with pytest.raises(RefusedError, match="allowed"):
@@ -175,3 +181,110 @@ def test_the_reference_radius_leaves_room_for_the_outline():
     assert reference_radius(HermiteMap(0.6, 0, 0.7, 0), Ellipse(2.0)) == pytest.approx(0.9 / 2**0.5)
     with pytest.raises(RefusedError, match=r"values in \(0, 0.7071\)"):
         reference_radius(HermiteMap(0.3, 0, 0.8, 0), Ellipse(2.0))
+
+
+# prisms
+
+
+def prisms_of(outline):
+    """Three layers, θ from 0 to 1, about a particle that stays as it is in the mesh."""
+    grid = extrude(size=0.5, radius=0.4, outline=outline, layers=3)
+    points = replace(grid, conforming=False).positions(HermiteMap(0.4, 0, 0.4, 0))
+    points[:, 2] = (points[:, 2] + 3) / 6
+    return Prisms(points, grid.cells, grid.phase, grid.names)
+
+
+def volumes(points, cells):
+    """Of prisms of 15 nodes in Basix's order, by quadrature, shape (m,)."""
+    at, weights = prism_rule()
+    slopes = wedge(1).tabulate(1, at)[1:].reshape(3, len(at), 15)
+    jacobians = np.einsum("dqn,mnx->mqdx", slopes, points[cells])
+    return np.linalg.det(jacobians) @ weights
+
+
+@pytest.mark.parametrize("outline", [CIRCLE, Ellipse(2.0, 30.0)])
+def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
+    prisms = prisms_of(outline)
+    each = volumes(prisms.points, prisms.cells)
+    assert (each > 0).all()
+    assert each.sum() == pytest.approx(4.0, rel=1e-12)  # 2 × 2 × 1
+    kept = np.arange(len(each)) != 17
+    rest = replace(prisms, cells=prisms.cells[kept], phase=prisms.phase[kept])
+    lost = 4.0 - volumes(rest.points, rest.cells).sum()
+    assert lost == pytest.approx(each[17], rel=1e-10)
+    with pytest.raises(FailedError, match=r"layers of prisms differ|do not pass all levels"):
+        grid_of(rest)
+
+
+def test_the_order_of_prisms_does_not_matter(rng):
+    prisms = prisms_of(CIRCLE)
+    cells, nodes = rng.permutation(len(prisms.cells)), rng.permutation(len(prisms.points))
+    place = np.argsort(nodes)
+    mixed = replace(
+        prisms,
+        points=prisms.points[nodes],
+        cells=place[prisms.cells[cells]],
+        phase=prisms.phase[cells],
+    )
+    expected = volumes(prisms.points, prisms.cells)[prisms.phase == 1].sum()
+    assert 0.4 < expected < np.pi * 0.4**2  # of straight-sided triangles
+    for grid in (grid_of(mixed), grid_of(prisms)):
+        each = volumes(grid.fixed, grid.cells)
+        assert each.sum() == pytest.approx(4.0, rel=1e-12)
+        assert each[grid.phase == 1].sum() == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("version", "is_binary"), [(2.2, 0), (2.2, 1), (4.1, 0), (4.1, 1)])
+def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused(
+    tmp_path, gmsh, version, is_binary
+):
+    def read():
+        gmsh.write(str(tmp_path / "cell.msh"))
+        return MeshModel(tmp_path / "cell.msh").cached_problem()
+
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.Binary", is_binary)
+    gmsh.option.setNumber("Mesh.SaveAll", 1)
+    gmsh.model.geo.extrude([(2, square.surfaces(0.5, 0.0, CIRCLE)[0])], 0, 0, 1)
+    gmsh.model.geo.synchronize()
+    gmsh.model.mesh.generate(3)
+    with pytest.raises(FailedError, match="volume 1 has no physical group"):
+        read()
+    gmsh.option.setNumber("Mesh.SaveAll", 0)
+    gmsh.model.addPhysicalGroup(3, [1], name="clay")
+    with pytest.raises(FailedError, match="'clay' holds Tetrahedron 4"):
+        read()
+    gmsh.model.mesh.partition(2)
+    with pytest.raises(FailedError, match="partitioned into 2 parts; write the mesh before"):
+        read()
+
+
+def test_a_mesh_of_plane_triangles_is_told_to_make_prisms(tmp_path, gmsh):
+    surface = square.surfaces(0.5, 0.0, CIRCLE)[0]
+    gmsh.model.addPhysicalGroup(2, [surface], name="matrix")
+    gmsh.model.mesh.generate(2)
+    gmsh.write(str(tmp_path / "cell.msh"))
+    with pytest.raises(FailedError, match=r"the mesh is plane: .*; make prisms of the triangles"):
+        MeshModel(tmp_path / "cell.msh").cached_problem()
+
+
+def test_the_rule_of_prisms_prints_in_full_since_forms_are_told_apart_by_that():
+    points, weights = prism_rule()
+    assert "..." not in f"{points} {weights}"
+    assert len(np.unique(points.round(7), axis=0)) == len(points)  # eight digits are printed
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_a_volume_in_two_groups_is_refused_from_each_version_of_msh(tmp_path, gmsh, version):
+    surfaces = [(2, square.surfaces(1.0, 0.0, CIRCLE)[0])]
+    gmsh.model.geo.extrude(surfaces, 0, 0, 1, numElements=[1], recombine=True)
+    gmsh.model.geo.synchronize()
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+    gmsh.model.mesh.generate(3)
+    for name in ("clay", "all"):
+        gmsh.model.addPhysicalGroup(3, [1], name=name)
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.write(str(tmp_path / "cell.msh"))
+    with pytest.raises(FailedError, match="group 'all' are in another one too; give each"):
+        MeshModel(tmp_path / "cell.msh").cached_problem()

@@ -13,9 +13,8 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import Phase, PrismModel
-from alphacut.rve.mesh import square
 from alphacut.stochastic import HermiteMap
-from tests.rve.mesh.test_prisms import volumes
+from tests.rve.mesh.test_mesh import volumes
 
 MAP, SOFT, HARD = HermiteMap(0.3, 0, 0.6, 0), Phase(20e9), Phase(80e9)
 VOLUME = 24.0  # 2 × 2 × 6
@@ -39,28 +38,27 @@ def particle_volume():
 
 
 @pytest.mark.parametrize("written", [".msh"], indirect=True)
-def test_gmsh_reads_its_jacobians_groups_and_fields(written):
-    with square.open_gmsh() as gmsh:
-        gmsh.open(str(written))
-        points, weights = gmsh.model.mesh.getIntegrationPoints(18, "Gauss4")
-        sums = {}
-        for _, group in gmsh.model.getPhysicalGroups(3):
-            (volume,) = gmsh.model.getEntitiesForPhysicalGroup(3, group)
-            _, determinants, _ = gmsh.model.mesh.getJacobians(18, points, volume)
-            assert (determinants > 0).all()
-            sums[gmsh.model.getPhysicalName(3, group)] = (
-                determinants.reshape(-1, len(weights)) @ weights
-            ).sum()
-        assert sum(sums.values()) == pytest.approx(VOLUME, rel=1e-10)
-        assert sums["inclusion"] == pytest.approx(particle_volume(), rel=1e-6)
-        names = {}
-        for view in gmsh.view.getTags():
-            index = gmsh.view.getIndex(view)
-            names[gmsh.option.getString(f"View[{index}].Name")] = view
-        kind, _, data, _, _ = gmsh.view.getModelData(names["stress_1_11_Pa"], 0)
-        assert kind == "ElementNodeData"
-        expected = fields().stress[:, 0, 0][fields().cells]
-        assert np.array(data).reshape(-1, 15) == pytest.approx(expected, rel=1e-12)
+def test_gmsh_reads_its_jacobians_groups_and_fields(written, gmsh):
+    gmsh.open(str(written))
+    points, weights = gmsh.model.mesh.getIntegrationPoints(18, "Gauss4")
+    sums = {}
+    for _, group in gmsh.model.getPhysicalGroups(3):
+        (volume,) = gmsh.model.getEntitiesForPhysicalGroup(3, group)
+        _, determinants, _ = gmsh.model.mesh.getJacobians(18, points, volume)
+        assert (determinants > 0).all()
+        sums[gmsh.model.getPhysicalName(3, group)] = (
+            determinants.reshape(-1, len(weights)) @ weights
+        ).sum()
+    assert sum(sums.values()) == pytest.approx(VOLUME, rel=1e-10)
+    assert sums["inclusion"] == pytest.approx(particle_volume(), rel=1e-6)
+    names = {}
+    for view in gmsh.view.getTags():
+        index = gmsh.view.getIndex(view)
+        names[gmsh.option.getString(f"View[{index}].Name")] = view
+    kind, _, data, _, _ = gmsh.view.getModelData(names["stress_1_11_Pa"], 0)
+    assert kind == "ElementNodeData"
+    expected = fields().stress[:, 0, 0][fields().cells]
+    assert np.array(data).reshape(-1, 15) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("ending", ["vtu", "xdmf"])
