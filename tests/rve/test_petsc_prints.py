@@ -48,8 +48,8 @@ def test_a_complex_build_ends_in_one_line_before_dolfinx_is_imported(tmp_path):
 def test_a_sample_of_the_cell_loads_nothing_of_structures():
     program = """
 import sys
-from alphacut.entry import main
-status = main(["solve", "cases/paper.toml", "--quiet"], program="rve", names={"solve": "cell"})
+from alphacut import main
+status = main(["cell", "cases/paper.toml", "--quiet"])
 modules = [name for name in sys.modules if name.split(".")[0] == "alphacut"]
 print(status, len(modules), any("frame" in name for name in modules), "pint" in sys.modules)
 """
