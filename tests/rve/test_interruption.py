@@ -62,7 +62,7 @@ from alphacut.entry import interrupt_on_stop_signals
 from alphacut.rve.interruption import uninterrupted
 with interrupt_on_stop_signals(), uninterrupted(second_ends=True):
     print("begun", flush=True)
-    np.linalg.svd(np.random.default_rng(0).random((6000, 6000)))
+    np.linalg.svd(np.random.default_rng(0).random((3500, 3500)))
 """
 
 

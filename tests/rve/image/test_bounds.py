@@ -68,8 +68,7 @@ def laminate(axis, fractions, moduli):
     return stiffness
 
 
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("contrast", [1e-3, 10.0, 1e6])
+@pytest.mark.parametrize(("axis", "contrast"), [(0, 1e-3), (1, 10.0), (2, 1e6)])
 def test_bounds_of_laminates_meet_at_their_exact_stiffness(axis, contrast, rng):
     shape = np.full(3, 2)
     shape[2 - axis] = 6
@@ -435,16 +434,16 @@ def random_moduli(rng, shape, span=1e3):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-5])
-def test_bounds_are_as_close_to_those_of_solved_fields_as_the_accuracy(seed, accuracy):
+def test_bounds_are_as_close_to_those_of_solved_fields_as_the_accuracy(seed):
     rng = np.random.default_rng([seed, 1])
-    moduli = random_moduli(rng, rng.integers(2, 24, 2))
+    moduli = random_moduli(rng, rng.integers(2, 20, 2))
     solved = solve_image(*moduli, solver=ConjugateGradient(1e-12)).bounds
-    near = solve_image(*moduli, solver=ConjugateGradient(accuracy)).bounds
-    pairs = ((near.upper, solved.upper), (solved.lower, near.lower))
-    ratios = np.array([np.linalg.eigvals(np.linalg.solve(b, a)).real for a, b in pairs])
-    assert ratios.min() > 1 - 1e-9
-    assert ratios.max() < 1 + 3 * accuracy + 1e-9
+    for accuracy in (1e-2, 1e-5):
+        near = solve_image(*moduli, solver=ConjugateGradient(accuracy)).bounds
+        pairs = ((near.upper, solved.upper), (solved.lower, near.lower))
+        ratios = np.array([np.linalg.eigvals(np.linalg.solve(b, a)).real for a, b in pairs])
+        assert ratios.min() > 1 - 1e-9
+        assert ratios.max() < 1 + 3 * accuracy + 1e-9
 
 
 def test_what_a_watch_raises_ends_both_sides_at_once():
@@ -573,7 +572,7 @@ def rational(stiffness, average):
 @pytest.mark.parametrize("average", ["axes", "isotropic"])
 def test_the_constants_of_one_stiffness(average):
     rng, used = np.random.default_rng(1), np.zeros(4)
-    for _ in range(1200):
+    for _ in range(800):
         bulk = np.exp(rng.uniform(0, 3))
         shear = bulk * 10.0 ** rng.choice([rng.uniform(-1, 0), rng.uniform(0.3, 4)])
         c11, c22 = bulk + shear * np.exp(0.1 * rng.normal(size=2))

@@ -24,24 +24,22 @@ def with_pores(*cell, **options):
     return crisp_cut(*cell, **options).bounds
 
 
-def cube(n=8):
+def cube(n):
     """A cube of side 1/2 as a pore in a unit cell of n³ voxels."""
     inside = np.zeros((n,) * 3, bool)
     inside[(slice(n // 4, n - n // 4),) * 3] = True
     return inside
 
 
-@pytest.mark.parametrize(
-    ("shift", "sides"), [((0, 0, 0), (1.0, 1.0, 1.0)), ((3, 5, 0), (1.3, 0.7, 1.0))]
-)
-def test_columns_beside_a_cube_carry_three_quarters(shift, sides):
+def test_columns_beside_a_cube_carry_three_quarters():
     """Uniaxial stress in the columns that meet no pore: E_x, E_y, E_z ≥ 3/4 E, whatever the sides."""
-    bounds = with_pores(np.roll(cube(), shift, (0, 1, 2)), sides=sides)
-    low, high = bounds.constants()[:3].T / E
+    low, high = with_pores(cube(8)).constants()[:3].T / E
+    assert (high < 0.84).all()
+    assert low == pytest.approx([0.76887] * 3, abs=2e-5)  # what 1e-6 and 1e-8 in the pore tend to
+    moved = np.roll(cube(8), (3, 5, 0), (0, 1, 2))
+    low, high = with_pores(moved, sides=(1.3, 0.7, 1.0)).constants()[:3].T / E
     assert (low >= 0.75).all()
     assert (high < 0.84).all()
-    if len(set(sides)) == 1:  # .7689 is what 1e-6 and 1e-8 in the pore tend to
-        assert low == pytest.approx([0.76887] * 3, abs=2e-5)
 
 
 def test_columns_beside_a_square_carry_half():
@@ -60,10 +58,10 @@ def test_the_bulk_modulus_of_a_spherical_pore_is_that_of_vanishing_moduli():
     assert 0.417 < low < 0.4174 < high
 
 
-@pytest.mark.parametrize("shape", [(15, 20), (5, 5, 10)])
+@pytest.mark.parametrize("shape", [(15, 20), (5, 5, 5)])
 def test_pores_tend_to_phases_of_vanishing_moduli(shape, rng):
     is_pore = closed_pores(rng, shape)
-    pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-7)
+    pores, soft = with_pores(is_pore), with_pores(is_pore, ratio=1e-6)
     assert eigh(pores.lower, pores.upper, eigvals_only=True)[-1] <= 1
     assert eigh(pores.lower, soft.upper, eigvals_only=True)[-1] <= 1
     ratio = eigh(pores.lower, soft.lower, eigvals_only=True)

@@ -35,7 +35,8 @@ for layers, radius_map, options in (
     (3, radii, {"petsc": {"level_pc_type": "gamg", "ksp_rtol": "1e-12"}}),
     (172, radii, {"estimate": False}),  # PETSc takes the parts of one rank in 2 goes, of the other in 3
 ):
-    model = PrismModel(0.4, layers, parallel=True, **options)
+    size = 0.4 if layers > 5 else 0.5
+    model = PrismModel(size, layers, parallel=True, **options)
     solved.append(model.solve(radius_map, Phase(20e9), [Phase(78e9), Phase(80e9)])[1])
 ignoring = LevelSetModel(lambda x, y, theta: np.hypot(x, y) - radii(theta), 0.4, 4, parallel=True)
 phases = {"matrix": Phase(20e9), "inclusion": Phase(80e9)}

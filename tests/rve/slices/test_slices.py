@@ -208,7 +208,7 @@ def estimated_and_true(points, *, seed, decades):
         cell, extremes = Cell(matrix, inclusion, radius_map), radius_map.extremes()
         own, fine = (
             SeriesModel(points=n).solve(radius_map, matrix, [inclusion])[0]
-            for n in (len(rule.nodes), 48)
+            for n in (len(rule.nodes), 40)
         )
         ends = [crisp_cell(radius, matrix, inclusion).moduli for radius in extremes]
         at_nodes = np.stack([along_axes(one)[0] for one in own.curve.stiffness])
