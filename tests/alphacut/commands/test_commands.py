@@ -211,14 +211,14 @@ def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
     tmp_path, capfd, method, integrator, status
 ):
     changes = {'"0.1 mm"': '"1e-20 mm"', '"exact"': f'"{integrator}"', "graph-follower": method}
-    changes |= {'"2 s"': '"0.5 s"', "[0, 0.5, 1]": "[0, 1]"}
+    changes |= {'"2 s"': '"0.1 s"', "[0, 0.5, 1]": "[0]"}
     case = written(tmp_path, **changes)
     code, _, err = spoken(capfd, "run", case, "--no-figures", f"--out={tmp_path}/out")
     assert code == status
     assert "the case allows" in err
 
 
-def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path):
+def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path, capfd):
     case = written(tmp_path, CELL + "[mesh]\nlayers = 3\n")
     words = [*RUN, "run", str(case), "--out", str(tmp_path / "out"), "--no-figures"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env={**os.environ})
@@ -231,8 +231,8 @@ def test_ctrl_c_ends_a_run_and_the_same_run_goes_on(tmp_path):
     assert started.returncode in (0, 128 + signal.SIGINT, -signal.SIGINT)
     if started.returncode:
         assert "continues from" in err
-    again = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
-    assert "E, GPa" in again.stdout
+    assert main(words[len(RUN) :]) == 0
+    assert "E, GPa" in capfd.readouterr().out
 
 
 PROOF = ("--set", "envelope.method=auto")

@@ -12,8 +12,8 @@ from alphacut.stochastic import fit_radius_map, pack, read_particles
 @pytest.fixture
 def image(tmp_path):
     """An image of discs of many sizes on a grid, one grey level each for discs and matrix."""
-    rows, columns = np.mgrid[:720, :720]
-    sizes = np.random.default_rng(1).uniform(6, 26, (12, 12))[rows // 60, columns // 60]
+    rows, columns = np.mgrid[:480, :480]
+    sizes = np.random.default_rng(1).uniform(6, 26, (8, 8))[rows // 60, columns // 60]
     inside = np.hypot(rows % 60 - 30, columns % 60 - 30) < sizes
     path = tmp_path / "section.png"
     Image.fromarray((60 + 120 * inside).astype(np.uint8)).save(path)

@@ -19,7 +19,7 @@ from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import Parts
 from tests.alphacut.small import FRAME
 
-LIMITS, LIMITS_OF_PEAK = 2000, 8
+LIMITS, LIMITS_OF_PEAK = 700, 8
 OUTPUTS = {"q1": "m", "a1": "m/s^2", "base_shear": "N"}
 PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 SI = {prefix + unit: x for prefix, x in PREFIXES.items() for unit in OUTPUTS.values()}
