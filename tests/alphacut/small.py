@@ -1,6 +1,8 @@
 """Cases of a second for the tests of the front door, and one that asks every question."""
 
+import io
 import json
+from contextlib import redirect_stderr
 
 from alphacut import main
 
@@ -100,6 +102,14 @@ def summary_of_run(case, *options):
     words = ["--quiet", "--no-figures", "--out", str(out), *options]
     assert main(["run", str(case), *words]) == 0
     return summary_of(out)
+
+
+def refusals(case, *changes):
+    """What `check` says of a case that it refuses, one line for each problem."""
+    told = io.StringIO()
+    with redirect_stderr(told):
+        assert main(["check", str(case), "--quiet", *(f"--set={x}" for x in changes)]) == 2
+    return told.getvalue().splitlines()
 
 
 def two_floors_run(folder, *options):

@@ -1,14 +1,14 @@
 """A case is read once; every problem has its key, value and cure."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from alphacut.case.content import load
-from alphacut.fuzzy import Interval, RefusedError, Triangular
-from alphacut.io.files import BadInput
-from tests.alphacut.small import CELL, FRAME
+from alphacut.fuzzy import Interval, Triangular
+from tests.alphacut.small import CELL, FRAME, refusals
 
 ROOT = Path(__file__).parents[3]
 
@@ -20,11 +20,9 @@ def read(folder, text, changes=()):
 
 
 def problems(folder, text, changes=()):
-    with pytest.raises((BadInput, RefusedError)) as caught:
-        read(folder, text, changes)
-    if isinstance(caught.value, RefusedError):
-        return [caught.value]
-    return list(caught.value.problems)
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return refusals(path, *changes)
 
 
 def test_sections_hold_objects_in_si_and_change_from_the_command_line(tmp_path):
@@ -44,8 +42,8 @@ def test_a_cell_is_round_or_an_image(tmp_path):
     assert read(tmp_path, CELL).particle_cell.particles == "cylinders"
     path = ROOT / "cases/composite.toml"
     assert load(path).content.image_cell.pairs[0][0] == Triangular(19e9, 20e9, 21e9)
-    with pytest.raises(BadInput, match=r"modulus\.method is series; allowed: auto for this cell"):
-        load(path, ["modulus.method=series"])
+    (line,) = refusals(path, "modulus.method=series")
+    assert "modulus.method is series; allowed: auto for this cell" in line
 
 
 WRONG = [  # text in the case, its replacement; key, and what the message says
@@ -92,18 +90,17 @@ WRONG = [  # text in the case, its replacement; key, and what the message says
 def test_what_is_wrong_is_said_with_its_key(tmp_path, old, new, key, words):
     assert old in FRAME
     first, *_ = problems(tmp_path, FRAME.replace(old, new))
-    assert key in first.key
-    assert words in str(first)
-    assert len(str(first)) <= 1000
+    assert key in first
+    assert words in first
+    assert len(first) <= 1010
 
 
 def test_all_problems_come_at_once_with_their_file(tmp_path):
     text = FRAME.replace("10 mm", "10 q").replace("3 m", "3 q").replace('"2 s"', '"2 q"')
     every = problems(tmp_path, text)
-    assert [p.key for p in every] == [
-        "frame.lengths[1]", "frame.displacements[1]", "envelope.duration",
-    ]  # fmt: skip
-    assert all(str(p).startswith(f"{tmp_path}/case.toml: ") for p in every)
+    keys = "frame.lengths[1]", "frame.displacements[1]", "envelope.duration"
+    for key, line in zip(keys, every, strict=True):
+        assert re.match(rf"alphacut: {tmp_path}/case.toml(, line \d+)?: {re.escape(key)} is ", line)
 
 
 CELLS = [
@@ -120,7 +117,7 @@ CELLS = [
 @pytest.mark.parametrize(("old", "new", "key"), CELLS)
 def test_what_is_wrong_with_a_cell(tmp_path, old, new, key):
     text = CELL.replace("[cell]", '[cell]\nparticles = "spheres"') if "slices" in new else CELL
-    assert key in [p.key for p in problems(tmp_path, text.replace(old, new))]
+    assert any(f" {key} is " in line for line in problems(tmp_path, text.replace(old, new)))
 
 
 FRACTION = """
@@ -159,13 +156,13 @@ def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, facto
 def test_a_fraction_ends_where_particles_touch(tmp_path, particles, least, most):
     assert read(tmp_path, fraction_case(particles, least)).radius_and_cell
     found = problems(tmp_path, fraction_case(particles, most))
-    assert "cell.fraction" in [problem.key for problem in found]
+    assert any(" cell.fraction is " in line for line in found)
 
 
 def test_a_fraction_stands_alone(tmp_path):
     radius = "[radius]\na1 = 0.3\na2 = 0\na3 = 0.4\na4 = 0\n"
     found = problems(tmp_path, fraction_case("spheres", 0.3) + radius)
-    assert [problem.key for problem in found] == ["radius"]
+    assert [" radius is " in line for line in found] == [True]
 
 
 def test_damping_ratios_may_be_given_one_a_mode(tmp_path):
@@ -176,8 +173,8 @@ def test_damping_ratios_may_be_given_one_a_mode(tmp_path):
     cuts = {name: number.cut(0) for name, number in structure.inputs(("zeta",)).items()}
     assert cuts["zeta2"] == pytest.approx((0.03, 0.05))
     assert set(cuts) == {"zeta2"}  # zeta1 is one number
-    with pytest.raises(BadInput, match=key):
-        read(tmp_path, floors, [f'{key}=["2 %", "3 %", "4 %"]'])
+    (line,) = problems(tmp_path, floors, [f'{key}=["2 %", "3 %", "4 %"]'])
+    assert key in line
 
 
 @pytest.mark.parametrize(
@@ -192,22 +189,22 @@ def test_damping_ratios_may_be_given_one_a_mode(tmp_path):
     ],
 )
 def test_a_wrong_change_is_refused(tmp_path, changes, words):
-    assert words in str(problems(tmp_path, FRAME, changes)[0])
+    assert words in problems(tmp_path, FRAME, changes)[0]
 
 
 def test_studies_have_names_of_files(tmp_path):
     study = '[[study]]\nname = "NAME"\nfuzzy = ["E"]\nduration = "1 s"\n'
     assert read(tmp_path, FRAME + study.replace("NAME", "E-1s")).study[0].name == "E-1s"
     for name in ("../x", "a/b", "", "x" * 65, "a..b", ".hidden", "a\\u0007"):
-        (problem,) = problems(tmp_path, FRAME + study.replace("NAME", name))
-        assert problem.key == "study[1].name"
+        (line,) = problems(tmp_path, FRAME + study.replace("NAME", name))
+        assert " study[1].name is " in line
     both = study.replace("NAME", "E") * 2
-    assert "a name of its own" in str(problems(tmp_path, FRAME + both)[0])
+    assert "a name of its own" in problems(tmp_path, FRAME + both)[0]
 
 
 def test_files_are_beside_the_case(tmp_path):
     text = FRAME.replace('displacements = "10 mm"', 'accelerogram = "record.csv"')
-    assert "a file, from the folder" in str(problems(tmp_path, text)[0])
+    assert "a file, from the folder" in problems(tmp_path, text)[0]
     (tmp_path / "record.csv").write_text("time [s],acceleration [g]\n0,0\n0.02,0.1\n0.04,0\n")
     assert read(tmp_path, text).frame.accelerogram.step == pytest.approx(0.02)
 
@@ -216,22 +213,22 @@ def test_questions_have_sections(tmp_path):
     text = FRAME + '[decision]\nlimits = ["q1 <= 9 mm"]\n'
     assert set(read(tmp_path, text).questions) == {"decision"}
     for wrong, words in (("q1 < 9 mm", "<="), ("q1 <= 9 kg", "no unit of"), ("q1 <= 0 mm", "<=")):
-        (problem,) = problems(tmp_path, text.replace("q1 <= 9 mm", wrong))
-        assert problem.key == "decision.limits[1]"
-        assert words in str(problem)
-    (problem,) = problems(tmp_path, text.replace("q1 <=", "q9 <="))
-    assert problem.key == "decision.limits"
+        (line,) = problems(tmp_path, text.replace("q1 <= 9 mm", wrong))
+        assert " decision.limits[1] is " in line
+        assert words in line
+    (line,) = problems(tmp_path, text.replace("q1 <=", "q9 <="))
+    assert " decision.limits is " in line
 
 
 def test_columns_that_yield_refuse_proofs_and_midpoint_steps_by_key():
     for key, value in (("method", "dual"), ("integrator", "midpoint")):
-        with pytest.raises(BadInput, match=rf"envelope\.{key} is {value}; .* columns yield"):
-            load(ROOT / "cases/yielding.toml", [f"envelope.{key}={value}"])
+        (line,) = refusals(ROOT / "cases/yielding.toml", f"envelope.{key}={value}")
+        assert re.search(rf"envelope\.{key} is {value}; .* columns yield", line)
 
 
 def test_fragility_of_columns_that_yield_is_of_magnitudes_and_has_a_largest_measure():
     changes = ["frame.yield_drift=9 mm", "fragility.most=3"]
     assert load(ROOT / "cases/suite.toml", changes).content.fragility.most == 3
     for refused in (["fragility.most=3"], [*changes, "fragility.limits=['max drift1 <= 9 mm']"]):
-        with pytest.raises(BadInput, match=r"fragility\.(most|limits)"):
-            load(ROOT / "cases/suite.toml", refused)
+        (line,) = refusals(ROOT / "cases/suite.toml", *refused)
+        assert re.search(r"fragility\.(most|limits)", line)
