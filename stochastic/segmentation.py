@@ -13,12 +13,12 @@ Clipped until both are flat, an image looks like a clean one and is taken for it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter, minimum_filter, percentile_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, require
@@ -164,11 +164,36 @@ def _impulses(grey: Array, levels: Array, noise: float) -> Mask:
     """
     band = CONFIDENT * noise + _rounding(grey)
     is_outlier = np.abs(grey[..., None] - levels).min(axis=-1) > band
-    # A line takes 7 of the 49 pixels, 14 %, so that these percentiles are greys beside it.
-    low = percentile_filter(grey, 15, 7, mode="wrap")
-    high = percentile_filter(grey, 85, 7, mode="wrap")
-    impulses = is_outlier & ((grey < low - band) | (grey > high + band))
+    # A line takes 7 of the 49 pixels, 14 %, so that the percentiles 15 and 85 are greys beside it.
+    impulses = np.zeros(grey.shape, bool)
+    for place, (low, high) in _ranks(grey, is_outlier, 7, (0.15, 0.85)):
+        values = grey[place]
+        impulses[place] = (values < low - band) | (values > high + band)
     return np.asarray(impulses & (impulses.mean() >= 0.01))
+
+
+def _ranks(
+    values: Array, chosen: Mask, side: int, fractions: Sequence[float]
+) -> Iterator[tuple[tuple[Ints, Ints], Array]]:
+    """Yield values of given rank in the windows about some pixels, of an image that repeats itself.
+
+    Args:
+        values: The image, shape (rows, columns).
+        chosen: Pixels whose windows are wanted, of the same shape.
+        side: Pixels on a side of a window, odd.
+        fractions: Ranks as fractions of the pixels of a window, in [0, 1), rounded down.
+
+    Yields:
+        For portions of the pixels, which fit into memory: their indices along both axes, and the
+        values, shape (fractions, pixels).
+    """
+    ranks = [int(side**2 * fraction) for fraction in fractions]
+    windows = sliding_window_view(np.pad(values, side // 2, mode="wrap"), (side, side))
+    rows, columns = np.nonzero(chosen)
+    for start in range(0, len(rows), 100_000):
+        place = rows[start : start + 100_000], columns[start : start + 100_000]
+        window = windows[place].reshape(-1, side**2)
+        yield place, np.partition(window, ranks, axis=1)[:, ranks].T
 
 
 def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
@@ -187,7 +212,10 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
         RefusedError: A class is clipped.
     """
     # The median over 5 × 5 pixels takes noise off the classes.
-    labels = median_filter(np.searchsorted(borders, values, side="right"), 5, mode="wrap")
+    labels = np.searchsorted(borders, values, side="right")
+    noisy = labels.copy()
+    for place, (median,) in _ranks(noisy, np.ones_like(sound), 5, (0.5,)):
+        labels[place] = median
     interior = _interior(labels, reach=3) & sound
     classes = [values[interior & (labels == k)] for k in range(len(borders) + 1)]
     classes = [grey for grey in classes if grey.size >= 50]
@@ -308,6 +336,8 @@ def _inner_pixels(labels: Ints, classes: int) -> Mask:
 
 def _interior(labels: Ints, reach: int) -> Mask:
     """Return the pixels with no other class within `reach` pixels, the image repeated."""
-    lowest = minimum_filter(labels, 2 * reach + 1, mode="wrap")
-    highest = maximum_filter(labels, 2 * reach + 1, mode="wrap")
+    lowest = highest = np.pad(labels, reach, mode="wrap")
+    for axis in (0, 1):
+        lowest = sliding_window_view(lowest, 2 * reach + 1, axis).min(axis=-1)
+        highest = sliding_window_view(highest, 2 * reach + 1, axis).max(axis=-1)
     return np.asarray(lowest == highest)

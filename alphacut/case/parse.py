@@ -173,7 +173,7 @@ def _suggested_key(model: type[Section], key: str) -> str:
     section, dot, name = key.rpartition(".")
     if close := nearest(name, _sibling_names(model, key)):
         return f"{section}{dot}{close}"
-    elsewhere = {x.rpartition(".")[2]: x for x in keys_of(model)}
+    elsewhere = {x.rpartition(".")[2]: x for x in _names_of(model)}
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
@@ -262,8 +262,10 @@ def apply_changes(
     Raises:
         RefusedError: A change has no value, or its key is unknown or given before.
     """
+    if not changes:
+        return ()
     # Studies are entries of an array, which a key without an index does not tell apart.
-    full_keys = [key for key in keys_of(model) if not key.startswith("study.")]
+    full_keys = [key for key in _names_of(model) if not key.startswith("study.")]
     keys: list[str] = []
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
@@ -317,28 +319,41 @@ def _parse_value(text: str) -> object:
 
 @cache  # the walk reads the source of all sections
 def keys_of(model: type[Section]) -> dict[str, FieldInfo]:
-    """Return all keys below the class of a section by their full names, sections left out."""
-    return {name: info for name, info, is_section in _walk_keys("", model) if not is_section}
+    """Return all keys below the class of a section by their full names, sections left out.
+
+    The fields have descriptions.
+    """
+    every = _walk_keys("", model, described=True)
+    return {name: info for name, info, is_section in every if not is_section}
 
 
-def _walk_keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, bool]]:
+def _names_of(model: type[Section]) -> list[str]:
+    """Return the full names of all keys below the class of a section, sections left out."""
+    return [name for name, _, is_section in _walk_keys("", model) if not is_section]
+
+
+def _walk_keys(
+    prefix: str, model: type[Section], *, described: bool = False
+) -> Iterator[tuple[str, FieldInfo, bool]]:
     """Yield the keys below a class of sections, each before the keys inside it.
 
     Args:
         prefix: Beginning of the full names, empty or with its dot, such as "cell.".
         model: The class. A key may take sections of several classes: their keys all follow.
+        described: Whether the fields get their descriptions, for which sources are read.
 
     Yields:
         Full name such as "cell.fraction", Pydantic's field, and whether the key takes a section.
     """
-    for key, info in model.described_fields().items():
+    fields = model.described_fields() if described else model.model_fields
+    for key, info in fields.items():
         name = f"{prefix}{key}"
         # the annotation itself and all types inside it, as in tuple[ForceSection, ...]
         parts = itertools.chain([info.annotation], _annotation_parts(info.annotation))
         models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
         yield name, info, bool(models)
         for inner in models:
-            yield from _walk_keys(f"{name}.", inner)
+            yield from _walk_keys(f"{name}.", inner, described=described)
 
 
 def quantity_of(info: FieldInfo) -> Quantity | None:

@@ -35,7 +35,6 @@ from alphacut.io.quantity import QUANTITIES
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA
 from alphacut.stages.foreseen import MOST_TIMED_STEPS, foreseen_structure
-from alphacut.stages.suite import suite_records
 
 if TYPE_CHECKING:
     pass
@@ -94,19 +93,21 @@ def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
         return list(doubts(content, rows, None))
 
 
-def motion_text(content: Content, structure: Structure) -> str:
+def motion_text(
+    content: Content, structure: Structure, records: Sequence[ScaledRecord] = ()
+) -> str:
     """Return lines on what moves the structure, and warnings of a time step that misses peaks.
 
     Args:
         content: The case.
         structure: Its structure at the nominal values of the material.
+        records: Records of its suite as they move the structure, if it has one.
 
     Returns:
         Lines that end with a newline: the record of the ground or the records of a suite, and
         "warning: …" lines. Empty without [envelope], and of a structure that is not linear.
 
     Raises:
-        RefusedError: The records of a suite do not fit the structure.
         FailedError: The response that the time step is judged by could not be computed.
     """
     section = content.envelope
@@ -136,7 +137,6 @@ def motion_text(content: Content, structure: Structure) -> str:
             text += "".join(f"warning: {line}\n" for line in short)
     text += "".join(f"warning: {line}\n" for line in load_end_warnings(content, structure))
     if content.records is not None:
-        records = suite_records(content.records, section, structure)
         text += records_text(content.records, records, nominal_mode(linear))
         # Of a linear structure peaks under records are found with time nodes of their own, finer
         # than the step of the case. Where columns yield, the step must be fine enough for the

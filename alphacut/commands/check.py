@@ -52,7 +52,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
 
     rows = list(rows_of("", content))
     try:
-        study = require_runnable(content)
+        study, records = require_runnable(content)
         structure = structure_of_envelope(content)
     except RefusedError:
         # A wrong unit may be the cause of what is refused, and is shown before it.
@@ -77,7 +77,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         is_shaken = content.records is not None or structure.linear.ground is not None
         text += modes_text(modes, is_shaken=is_shaken)
     if structure is not None:
-        text += motion_text(content, structure)
+        text += motion_text(content, structure, records)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
     if not options.quiet and options.json != "-":

@@ -7,10 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from alphacut.case.content import Content
-from alphacut.fuzzy import propagate
-from alphacut.rve.fuzzy_cell import FuzzyCell, proved_signs
-from alphacut.stages import envelope, modulus
 from alphacut.stages.cell import CellProblem
+from alphacut.stages.envelope import tasks
 
 
 class Foreseen(NamedTuple):
@@ -64,7 +62,7 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
         if content.incremental_question is not None:
             yield Foreseen("fragility", count, "records")
         return
-    studies = envelope.tasks(section, content.study)
+    studies = tasks(section, content.study)
     yield Foreseen("envelopes", len(studies), "studies")
     if "probability" in content.questions:
         yield Foreseen("probability", 1, "campaigns")
@@ -87,12 +85,16 @@ def sample_count(problem: CellProblem) -> int:
         RefusedError: The model of the cell needs a library that is missing, or the plan does not
             fit.
     """
+    from alphacut.fuzzy import propagate  # takes time to import
+    from alphacut.rve.fuzzy_cell import FuzzyCell, proved_signs
+    from alphacut.stages.modulus import OUTPUTS, PLANS
+
     cell = FuzzyCell.of(problem.nominal_radius, problem.nominal_phases, problem.inputs)
     # The signs that mechanics proves shorten a plan: they are found from the model as in a run.
     bounds = propagate(
-        lambda **_: dict.fromkeys(modulus.OUTPUTS, 1.0),
+        lambda **_: dict.fromkeys(OUTPUTS, 1.0),
         cell.inputs,
-        modulus.PLANS[problem.modulus.plan],
+        PLANS[problem.modulus.plan],
         alpha=problem.modulus.alpha,
         knowledge=proved_signs(problem.model(), cell),
         progress=False,

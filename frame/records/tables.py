@@ -11,6 +11,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import lru_cache
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -277,7 +279,7 @@ def _with_units(heads: Sequence[str]) -> str:
 
 def _are_numbers(cells: Sequence[str]) -> bool:
     """Return whether all cells are finite numbers in plain digits, as 1.25 or 1e-3."""
-    return all(NUMBER.fullmatch(cell) and np.isfinite(float(cell)) for cell in cells)
+    return all(NUMBER.fullmatch(cell) and isfinite(float(cell)) for cell in cells)
 
 
 def _wrong_row(table: _Table, line: int) -> RefusedError:
@@ -376,6 +378,12 @@ def _have_decimal_commas(rows: Sequence[str]) -> bool:
     return bool((np.diff(before_commas) <= 0).any())
 
 
+@lru_cache(maxsize=1)  # whether a file is a table is asked before it is read as one
+def _table_of(file: TextFile) -> _Table:
+    """Return the table of numbers in a file, which nobody changes."""
+    return _Table.of(file)
+
+
 def is_table(file: TextFile, *, is_described: bool = False) -> bool:
     """Return whether a file is a table of numbers, such as one in CSV.
 
@@ -388,7 +396,7 @@ def is_table(file: TextFile, *, is_described: bool = False) -> bool:
         file: The file. Lines that begin with "#" do not count.
         is_described: Whether the user says how to read the numbers: a channel, or step and unit.
     """
-    table = _Table.of(file)
+    table = _table_of(file)
     if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
         return True
     last_row = list(table.rows.values())[-1:]
@@ -424,7 +432,7 @@ def read_table(
             from 4e-5 s to below 0.5 s; the column is not one of accelerations; or the samples have
             another peak than a line above them states.
     """
-    table = _Table.of(file)
+    table = _table_of(file)
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
     _require_cell_of_each_head(table)
@@ -861,7 +869,7 @@ def read_force_history(path: Path) -> ForceHistory:
             elsewhere, or all forces are 0.
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
-    table = _Table.of(file)
+    table = _table_of(file)
     _require_cell_of_each_head(table)
     if cure := _cure_of_force_head(table):
         allowed = "time [s],force [kN], or time [s],force of a course without a unit"

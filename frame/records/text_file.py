@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import ceil, isfinite
+from math import ceil, isfinite, nan
 from pathlib import Path
 from typing import Self
 
@@ -120,13 +120,14 @@ class TextFile:
                 if not word:  # an empty column
                     continue
                 is_number = NUMBER.fullmatch(word) is not None
-                if not is_number or not isfinite(float(re.sub("[dD]", "e", word))):
+                value = float(word.replace("D", "e").replace("d", "e")) if is_number else nan
+                if not isfinite(value):
                     allowed = "finite numbers such as -.1394908E-02"
                     cure = ""
                     if re.search(r"\d,\d", word):
                         cure = "write decimal points"
                     raise self.refusal(row, repr(word), allowed, cure)
-                values.append(float(re.sub("[dD]", "e", word)))
+                values.append(value)
         return np.array(values)
 
     def head_numbers(self, first: int, n_lines: int, *, width: int, layout: str) -> Array:

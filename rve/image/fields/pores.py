@@ -14,12 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
-from scipy import ndimage
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.rve.image.fields.element import (
@@ -28,6 +25,9 @@ from alphacut.rve.image.fields.element import (
     unknown_functions,
 )
 from alphacut.rve.image.fields.grid import Fields, namespace, on_host
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,8 @@ class PoreNodes:
             the sides of the grid. None where a pore meets its own periodic image, so that it is not
             closed.
         """
+        from scipy import ndimage  # takes time to import
+
         shape = np.array(is_pore.shape)
         cells = np.argwhere(is_pore)
         labels, count = ndimage.label(is_pore, np.ones((3,) * is_pore.ndim))
@@ -121,6 +123,9 @@ def _unwrapped_pieces(
         it is moved along the axes to lie beside the others of its pore, shape (count, dimension).
         None where a pore meets its own periodic image.
     """
+    from scipy.sparse import csr_array  # takes time to import
+    from scipy.sparse.csgraph import breadth_first_order, connected_components
+
     # Links (piece, neighbouring piece, periods from one to the other along each axis). Pieces are
     # few where cells are many, so that links are compared by piece and each kind counts once.
     rows = []
@@ -257,6 +262,8 @@ def _node_matrix(
     Returns:
         Sparse matrix with a row for each potential, unknown at a node, and node, in this order.
     """
+    from scipy.sparse import csr_array  # takes time to import
+
     number, potential, monomial = np.nonzero(polynomials)
     size = coefficients.shape[1]
     factors = polynomials[number, potential, monomial]

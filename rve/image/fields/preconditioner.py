@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-import scipy.fft
 
 from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.element import Element
@@ -182,6 +181,8 @@ class FourierPreconditioner:
         Returns:
             New array of doubles in the shape of `fields`.
         """
+        import scipy.fft  # takes time to import
+
         xp = namespace(fields)
         axes = tuple(range(2, fields.ndim))
         # SciPy transforms several axes faster than NumPy, and takes no arrays of a device.
