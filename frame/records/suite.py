@@ -161,12 +161,12 @@ def read_recordings(
         if channel:
             name += f"_{channel}"
         recordings.append(replace(recording, name=name, remarks=remarks))
-    if errors:
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:  # the others are named in the cure, which is never cut off
         first, *others = errors
-        cure = first.cure
-        if others:  # named in the cure, which is never cut off
-            names = ", ".join(error.key.partition(",")[0] for error in others)
-            cure = "; ".join(filter(None, (f"bad as well: {names}", cure)))
+        names = ", ".join(error.key.partition(",")[0] for error in others)
+        cure = "; ".join(filter(None, (f"bad as well: {names}", first.cure)))
         raise RefusedError(first.key, first.value, first.allowed, cure)
     return tuple(recordings)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from alphacut.frame import INTEGRATORS, Accelerogram, Exact, LinearFlow, StoreyFrame
-from alphacut.frame.dynamics.integrators import Integrator
 from alphacut.fuzzy import RefusedError
 from benchmarks.frame.envelopes import FRAME
 from tests.frame.differences import require_derivatives
@@ -27,7 +26,7 @@ def modal(names: tuple[str, ...], system: StoreyFrame = FRAME) -> np.ndarray:
 
 @pytest.mark.parametrize("method", ALL, ids=str)
 @pytest.mark.parametrize("system", [FRAME, SHAKEN], ids=["free", "shaken"])
-def test_error_falls_with_the_square_of_the_step(method: Integrator, system: StoreyFrame) -> None:
+def test_error_falls_with_the_square_of_the_step(method, system: StoreyFrame) -> None:
     truth = LinearFlow(system, ("E",), 10, 0.1, Exact()).values(modal(("E",)))
     flows = [(LinearFlow(system, ("E",), 10, 0.1 / n, method), n) for n in (2, 4)]
     errors = [np.abs(flow.values(modal(("E",)))[:, ::n] - truth).max() for flow, n in flows]
@@ -44,7 +43,7 @@ def test_motions_as_of_a_stiffness_in_a_wrong_unit_are_refused() -> None:
 
 
 @pytest.mark.parametrize("method", ALL, ids=str)
-def test_derivatives_are_those_of_the_scheme(method: Integrator) -> None:
+def test_derivatives_are_those_of_the_scheme(method) -> None:
     flow, (p,) = LinearFlow(SHAKEN, NAMES, 8, 0.1, method), modal(NAMES)
     shares = np.array((3e-4, 1e-3, 3e-4, 3e-2, 0.3, 0.3))  # weaker effects take longer steps
     require_derivatives(flow.taylor, p, shares, within=(1e-7, 1e-7))

@@ -14,9 +14,8 @@ from alphacut.frame import (
     tolerances,
 )
 from alphacut.frame.analyses.fragility import CriticalMeasures
-from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import Interval, Knowledge, Signed, from_data, jointly, propagate
+from tests.frame.motions import exact_motions
 
 FRAME = StoreyFrame(
     [20e3, 20e3],
@@ -25,7 +24,8 @@ FRAME = StoreyFrame(
     q0=(0.01, 0.02),
     outputs=("drift1", "drift2"),
 )
-MOTION = {"duration": 1.5, "step": 0.02, "progress": False}
+DURATION, STEP = 0.9, 0.03
+MOTION = {"duration": DURATION, "step": STEP, "progress": False}
 BOX = "of the box around the learned set"
 
 
@@ -64,14 +64,12 @@ def test_bounds_hold_for_the_set_and_nothing_in_the_box_is_said_to_be_reached(
     assert found.to_dataset().attrs["encloses"] == "the learned set"
     # the same bounds as over the box itself, which reaches more than structures of the set do
     np.testing.assert_allclose(found.upper[0], of_box.upper[0], atol=1e-3 * found.upper.max())
-    cuts = boxes(box, (0,))
-    flow = make_flow(FRAME, cuts.names, 1.5, 0.02, "exact")
-    unit = rng.uniform(-1, 1, (2000, 2))
-    k = cuts.to_physical(unit).T / 20e3
+    points = rng.uniform(*np.transpose([number.support for number in box.values()]), (2000, 2))
+    k = points.T / 20e3
     squared = k[0] / 2 + k[1] - np.sqrt(k[0] ** 2 / 4 + k[1] ** 2)  # of mode 1
     fits = np.abs(np.sqrt(squared) / (2 * np.pi) / 2.199 - 1) <= 0.01
     assert 0 < fits.sum() < len(fits) / 2
-    motions = UnitFlow(flow, cuts).values(unit[fits])
+    motions = exact_motions(FRAME, points[fits], box, DURATION, STEP)
     assert (motions <= found.upper[0] + 1e-12).all()
     assert (motions >= found.lower[0] - 1e-12).all()
     reached = np.abs(motions).max((0, 1))
@@ -92,7 +90,7 @@ def test_a_limit_that_structures_of_the_box_exceed_is_undecided(learned, found, 
     never = [Limit(name, 1.01 * peak.upper[0]) for name, peak in peaks(found).items()]
     assert decide(found, never).limits["drift1"].verdict == "not exceeded"
     assert BOX in str(decide(found, never))
-    scale = tolerances(FRAME, learned.inputs, never, most=1.0, duration=1.5, step=0.02)
+    scale = tolerances(FRAME, learned.inputs, never, most=1.0, duration=DURATION, step=STEP)
     assert 0 < scale.kept < 1  # as the prior's support is wider than the box
     assert scale.clear is None
     assert scale.passed is None

@@ -14,8 +14,6 @@ from alphacut.frame import (
     identify,
     measured_mode,
 )
-from alphacut.frame.identification.modes import Chain, chain_modes
-from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import FuzzyNumber, Interval, RefusedError, Triangular, from_data
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
@@ -28,14 +26,20 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(20)
 
 
-def modes_at(chain, points):
-    """Eigenvalues (S, n) and shapes (S, floor, mode) at parameters (S, d)."""
-    stiffness, mass = np.exp(np.log(points / chain.nominal) @ chain.powers.swapaxes(1, 2))
-    return chain_modes(chain.stiffness * stiffness, chain.mass * mass)
+def modes_at(names, points):
+    """Eigenvalues (S, n) and shapes (S, floor, mode) of FRAME with other parameters (S, d)."""
+    given = FRAME.parameters | dict(zip(names, points.T, strict=True))
+    p = {name: np.broadcast_to(x, len(points)) for name, x in given.items()}
+    storeys, below = range(1, 4), np.eye(3) - np.eye(3, k=-1)
+    springs = [12 * p[f"c{z}"] * p["E"] * p["I"] / p[f"l{z}"] ** 3 for z in storeys]
+    root = np.stack([p[f"m{z}"] for z in storeys], -1)[:, :, None] ** -0.5
+    stiffness = below.T * np.stack(springs, -1)[:, None] @ below
+    squared, vectors = np.linalg.eigh(root * stiffness * root.swapaxes(1, 2))
+    return squared, root * vectors
 
 
 def measured(truth, rng, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records=20, noise=0.01):
-    values, vectors = modes_at(Chain(FRAME, names), truth[None])
+    values, vectors = modes_at(names, truth[None])
     found = []
     for mode in modes:
         shape = vectors[0, :, mode - 1]
@@ -54,7 +58,7 @@ def measured(truth, rng, *, names=NAMES, modes=(1, 2), floors=(1, 2, 3), records
 def agree(found: Identified, points: np.ndarray, level: float) -> np.ndarray:
     """Whether points (S, d) and their modes lie in all cuts at a joint level, shape (S,)."""
     of = found.evidence
-    values, vectors = modes_at(of.chain, points)
+    values, vectors = modes_at(tuple(of.prior), points)
     columns = list(zip(points.T, [of.cut(x, level) for x in of.prior.values()], strict=True))
     for mode, cut in zip(of.measured, of.modes(level), strict=True):
         shape = vectors[:, :, mode.mode - 1]
@@ -66,12 +70,14 @@ def agree(found: Identified, points: np.ndarray, level: float) -> np.ndarray:
     return np.all([(low <= x) & (x <= high) for x, (low, high) in columns], axis=0)
 
 
-def test_modes_of_the_chain_are_those_of_the_frame():
-    chain = Chain(FRAME, ("E", "l2", "m1", "c3"))
-    point = np.array([31e9, 2.7, 21e3, 2.2])
-    changes = {"lengths": (3.0, 2.7, 2.8), "masses": (21e3, 15e3, 10e3), "columns": (2, 2, 2.2)}
-    other = frequencies(replace(FRAME, modulus=31e9, **changes))
-    assert np.sqrt(modes_at(chain, point[None])[0][0]) == pytest.approx(other, rel=1e-10)
+def test_parameters_of_every_kind_move_the_predicted_frequencies(rng):
+    """Each prior is hardly wider than a point that is not the frame's nominal one."""
+    names, point = ("E", "l2", "m1", "c3", "I"), np.array([31e9, 2.7, 21e3, 2.2, 3.1e-4])
+    prior = {name: Interval(x, x * (1 + 1e-9)) for name, x in zip(names, point, strict=True)}
+    predicted = identify(FRAME, prior, measured(point, rng, names=names)).predictions()
+    hertz = np.sqrt(modes_at(names, point[None])[0][0]) / (2 * np.pi)
+    assert predicted.lower[0] == pytest.approx(hertz, rel=1e-7)
+    assert predicted.upper[0] == pytest.approx(hertz, rel=1e-7)
 
 
 @pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
@@ -87,7 +93,7 @@ def test_a_box_holds_all_that_agrees_and_is_sharp(rng, shown: dict[str, tuple[in
         points = points[agree(found, points, float(level))]
         assert len(points) > 20
         assert ((found.lower[row] <= points) & (points <= found.upper[row])).all()
-        hertz = np.sqrt(modes_at(found.evidence.chain, points)[0]) / (2 * np.pi)
+        hertz = np.sqrt(modes_at(NAMES, points)[0]) / (2 * np.pi)
         assert ((predicted.lower[row] <= hertz) & (hertz <= predicted.upper[row])).all()
         if shown != {"floors": ()}:
             assert np.mean(np.ptp(points, axis=0) / width[row]) > 0.6
@@ -105,7 +111,7 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
         assert (found.upper[row] <= cuts[:, 1] + 1e-12).all()
     assert max(found.narrowed.values()) < 0.5
     after, before = (
-        envelope(FRAME, inputs, duration=1.0, step=0.05, alpha=(0.05,))
+        envelope(FRAME, inputs, duration=0.5, step=0.05, alpha=(0.05,))
         for inputs in (found.inputs, prior)
     )
     assert (after.upper - after.lower).mean() < 0.5 * (before.upper - before.lower).mean()
@@ -114,7 +120,7 @@ def test_cuts_are_nested_inside_the_priors_and_feed_an_envelope(rng):
 
 def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(rng):
     names = (*NAMES, "m1", "m2", "m3")
-    nominal = Chain(FRAME, names).nominal
+    nominal = np.array([FRAME.parameters[name] for name in names])
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
     found = identify(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
     assert min(found.narrowed.values()) > 0.7
@@ -204,8 +210,14 @@ LEVELS = r"rising in \(0, 1\]"
         (identified_from(FIRST, prior={"c1": Interval(-1, 2)}), r"is -1.*: positive priors"),
         (identified_from(FIRST, prior={}), r"inputs is {}; allowed: a mapping"),
         (identified_from(FIRST, prior={"c1": "2"}), r"input c1 is '2'; allowed: finite numbers"),
-        (lambda: Chain(FRAME, ("d1",)), r"parameters is d1; allowed: E, I, c1"),
-        (lambda: Chain(FRAME, ("c4",)), r"parameters is c4; allowed: E, I, c1"),
+        (
+            identified_from(FIRST, prior={"d1": Interval(1, 2)}),
+            r"parameters is d1; allowed: E, I, c1",
+        ),
+        (
+            identified_from(FIRST, prior={"c4": Interval(1, 2)}),
+            r"parameters is c4; allowed: E, I, c1",
+        ),
         (identified_from(FIRST, alpha=(0.0, 0.5)), LEVELS),
         (identified_from(FIRST, alpha=(0.5, 1.2)), LEVELS),
         (identified_from(FIRST, alpha=()), LEVELS),
@@ -219,7 +231,7 @@ def test_what_makes_no_sense_is_refused(make, message):
 @pytest.mark.parametrize(("count", "share"), [(1, 0.9), (3, -0.6)])
 def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(count: int, share: float):
     rng, held = np.random.default_rng(count), 0
-    for _ in range(125):  # all floors scatter alike, and no scatter of chance is refused
+    for _ in range(60):  # all floors scatter alike, and no scatter of chance is refused
         rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
         mode = measured_mode(
             1, 2 + 0.01 * rng.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
@@ -227,7 +239,7 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(count: int
         )  # fmt: skip
         low, high = mode.shape[1].cut(0.1)
         held += low <= share <= high
-    assert 0.84 <= held / 125 <= 0.96
+    assert 0.84 <= held / 60 <= 0.96
 
 
 def test_a_reference_is_near_the_largest_and_its_size_counts():
@@ -241,14 +253,16 @@ def test_a_reference_is_near_the_largest_and_its_size_counts():
     width = mode.shape[1].cut(0.05).width  # and a little for second order
     assert 1.0 < width / (2 * 1.959964 * scatter) < 1.01
     assert mode.frequency.cut(0.05) == pytest.approx((1.960801, 2.039199), abs=1e-6)
+    of_four = measured_mode(1, [2.0] * 4, frequency_deviation=0.01).frequency
+    assert of_four.cut(0.05) == pytest.approx((1.9804, 2.0196), abs=1e-6)
 
 
 def test_at_level_1_a_prior_that_agrees_is_a_point():
     frame = StoreyFrame([1000.0, 1000.0], stiffness=[103510.0, 103510.0])
-    values, _ = modes_at(Chain(frame, ("k1", "k2")), np.full((1, 2), 103510.0))
+    values = np.linalg.eigvalsh(103.51 * np.array([[2, -1], [-1, 1]]))
     modes = [
         measured_mode(k + 1, np.sqrt(x) / (2 * np.pi) * np.array([0.998, 1.0, 1.002]))
-        for k, x in enumerate(values[0])
+        for k, x in enumerate(values)
     ]
     prior = dict.fromkeys(("k1", "k2"), Triangular(95e3, 103510.0, 112e3))
     found = identify(frame, prior, modes, alpha=(0.05, 1.0))
@@ -260,9 +274,9 @@ def test_at_level_1_a_prior_that_agrees_is_a_point():
 def test_ratios_of_noisy_amplitudes_are_not_biased(known, rng):
     """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
     inside = 0
-    for _ in range(30):
+    for _ in range(15):
         rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
         mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)
         low, high = mode.shape[1].cut(0.05)
         inside += low <= 0.6 <= high
-    assert inside >= 25
+    assert inside >= 13

@@ -24,6 +24,26 @@ def test_several_rows_scatter_and_a_single_one_takes_the_given_deviation(tmp_pat
     assert (low, high) == pytest.approx((4 - 1.96 * 0.04, 4 + 1.96 * 0.04), abs=2e-4)
 
 
+@pytest.mark.parametrize(("old", "new"), [("1.5", "x"), ("q1", "u1"), ("2,4", "0,4")])
+def test_wrong_modes_are_refused(tmp_path, old, new):
+    with pytest.raises(RefusedError):
+        read_modes(written(tmp_path, MODES.replace(old, new, 1)))
+
+
+def test_modes_and_deviations_of_an_operational_analysis_are_read(tmp_path):
+    """Columns as the how-to writes them from pyOMA2's arrays Fn, Fn_std, Phi and Phi_std."""
+    head = "mode,frequency [Hz],frequency_std [Hz],shape_std,q1,q2"
+    rows = "1,1.5,0.015,0.03,0.5,1\n2,4,0.08,0.02,-1,0.5\n"
+    first, second = read_modes(written(tmp_path, f"{head}\n{rows}"))
+    assert (first.mode, second.mode, first.reference, second.reference) == (1, 2, 2, 1)
+    assert second.shape[2].nominal == pytest.approx(-0.5, rel=1e-3)
+    # both amplitudes of a ratio scatter
+    scatters = [(first.frequency, 0.015), (second.frequency, 0.08)]
+    scatters += [(first.shape[1], 0.03 * 1.25**0.5), (second.shape[2], 0.02 * 1.25**0.5)]
+    for number, scatter in scatters:
+        assert number.cut(0.05).width == pytest.approx(2 * 1.96 * scatter, rel=0.02)
+
+
 def test_a_deviation_in_the_file_counts_before_the_given_one(tmp_path):
     text = "mode,frequency [Hz],frequency_std [Hz],q1,q2\n1,4,0.08,-1,0.5\n"
     (mode,) = read_modes(written(tmp_path, text), frequency_deviation=0.01, shape_deviation=0.02)

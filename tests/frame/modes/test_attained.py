@@ -87,8 +87,8 @@ STARTED = {"q0": (0.01, 0.0, 0.02), "v0": (0.1, -0.5, 0.2)}
 )
 def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
     frame, box, rng = drawn(int(np.log10(stiff)), stiff, ground, **start)
-    unit = np.vstack([np.zeros((4, 6)), rng.uniform(-1, 1, (8, 6))])
-    node, output = rng.integers(1, 61, 12), np.arange(12) % 4
+    unit = np.vstack([np.zeros((4, 6)), rng.uniform(-1, 1, (4, 6))])
+    node, output = rng.integers(1, 61, 8), np.arange(8) % 4
     value, error = box.exact_values(unit, node, output)
     motion = box.midpoint_response()
     values, errors = (
@@ -99,7 +99,7 @@ def test_motions_are_off_by_their_rounding_at_most(stiff, ground, start):
     shares = []
     with mp.workdps(40):
         for i, point in enumerate(points):
-            time, name = box.time[node[i % 12]], frame.outputs[i % 4]
+            time, name = box.time[node[i % 8]], frame.outputs[i % 4]
             true = exact_output(frame, point[:3], point[3:], time, name)
             shares.append(float(abs(true - mp.mpf(float(values[i])))) / errors[i])
     assert IDLE <= np.max(shares) <= 1
@@ -124,7 +124,7 @@ def test_responses_bend_with_eigenvalues_as_far_as_stated(source, rng):
     """Against differences of forty digits, with all three kinds of damping, heavy ones too."""
     reached = 0.0
     with mp.workdps(40):
-        for _ in range(300):
+        for _ in range(120):
             order, time = int(rng.integers(0, 3)), mp.mpf(rng.uniform(0, 3))
             eigenvalue = 10 ** rng.uniform(-1, 3)
             damping = rng.dirichlet(np.ones(4))[:3] * rng.uniform(0, 1.2) ** 2
@@ -220,7 +220,7 @@ def test_rounding_of_attained_bounds_is_declared():
         masses=masses, stiffness=springs, damping_ratio=0.05, ground=RECORD, outputs=("shear2",)
     )
     inputs = {"k1": Interval(4.9e7, 5.1e7), "m2": Interval(0.98 * masses[1], 1.02 * masses[1])}
-    given = {"duration": 0.4, "step": 0.02, "alpha": (0,), "progress": False}
+    given = {"duration": 0.1, "step": 0.02, "alpha": (0,), "progress": False}
     found = envelope(frame, inputs, method=DualProof(), **given)
     assert found.attained_error.max() > 1e-9 * np.abs(found.upper).max()
 
@@ -238,7 +238,7 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
     ]
     shares = {"omega": [], "share": []}
     with mp.workdps(40):
-        for u in rng.uniform(-1, 1, (12, 6)):
+        for u in rng.uniform(-1, 1, (6, 6)):
             unit = [mp.mpf(float(x)) for x in u]
             p = [(a + b) / 2 + (b - a) / 2 * x for (a, b), x in zip(ends, unit, strict=True)]
             for mode, squared, x in zip(single, *exact_modes(p[:3], p[3:]), strict=True):

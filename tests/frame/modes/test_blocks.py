@@ -196,7 +196,7 @@ def test_what_couples_a_block_holds_and_half_would_not_do(ratio, source, widths,
     single, added, _ = coupled(own, structure, time)
     assert len(single) == 2
     reached = np.zeros(len(time))
-    for u in (np.array([0, 0, 1.0]), *draws(3, 30)):
+    for u in (np.array([0, 0, 1.0]), *draws(3, 8)):
         K, _ = pencil(own, "abc", centre + radius * u)
         q0, v0 = (np.zeros(2) if x is None else x for x in (own.q0, own.v0))
         total = free_motion(K, ratio, q0, v0, time)[:, read]
@@ -239,7 +239,7 @@ def test_a_block_strays_from_lines_between_nodes_as_far_as_stated():
     single, _, deviation = coupled(own, structure, time)
     assert max(mode.participation.magnitude().max() for mode in single) < 1e-12
     fine, reached = np.linspace(0, 4, 80 * parts + 1), np.zeros(80)
-    for u in (np.array([0, 0, 1.0]), *draws(3, 10)):
+    for u in (np.array([0, 0, 1.0]), *draws(3, 4)):
         K, _ = pencil(own, "abc", centre + radius * u)
         motion = free_motion(K, 0.002, np.zeros(2), np.array([0, 1.0]), fine)[:, 0]
         off = np.abs(motion - np.interp(fine, time, motion[::parts]))[1:].reshape(80, parts).max(1)
@@ -280,7 +280,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
     (others,) = models.truncated
     assert len(models.oscillators) == 1
     ratios = np.zeros(len(time))
-    for u in draws(2, 20):
+    for u in draws(2, 8):
         K, _ = pencil(own, "ab", centre + radius * u)
         squared, shape = np.linalg.eigh(K)
         omega = np.sqrt(squared[1] * (1 - 0.03**2))

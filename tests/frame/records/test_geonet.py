@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.frame.records.read import read_recording
+from alphacut.frame import read_record
 from alphacut.fuzzy import RefusedError
 
 N_SAMPLES, STEP = 403, 0.02
@@ -46,20 +46,20 @@ def test_each_component_is_read_by_number_and_orientation(tmp_path):
     path = saved(tmp_path, *map(component, names, WAVES))
     for number, (name, wave) in enumerate(zip(names, WAVES, strict=True), 1):
         for channel in (str(number), name):
-            record = read_recording(path, channel)
+            record = read_record(path, channel=channel)
             assert record.step == STEP
             assert record.samples == pytest.approx(1e-3 * wave, abs=6e-5)  # one digit of mm/s²
-    assert any("vertical" in doubt for doubt in record.doubts())
+    assert any("vertical" in doubt for doubt in record.remarks)
     with pytest.raises(RefusedError, match="one of: 1 or s90e; 2 or n00e; 3 or up"):
-        read_recording(path)
+        read_record(path)
 
 
 def test_components_of_one_orientation_are_numbered(tmp_path):
     path = saved(tmp_path, component("S90E", WAVES[0]), component("S90E", WAVES[1]))
-    record = read_recording(path, "S90E#2")
+    record = read_record(path, channel="S90E#2")
     assert record.samples == pytest.approx(1e-3 * WAVES[1], abs=6e-5)
     with pytest.raises(RefusedError, match="s90e#1; 2 or s90e#2"):
-        read_recording(path, "S90E")
+        read_record(path, channel="S90E")
 
 
 @pytest.mark.parametrize(
@@ -80,19 +80,19 @@ def test_a_damaged_file_is_one_line(tmp_path, change, words):
     damaged = change(text)
     assert damaged != text
     with pytest.raises(RefusedError, match=words):
-        read_recording(saved(tmp_path, damaged))
+        read_record(saved(tmp_path, damaged))
 
 
 def test_another_time_of_the_peak_than_the_head_states_is_remarked(tmp_path):
     text = component("S90E", WAVES[0])
     time = f"{STEP * np.abs(WAVES[0]).argmax():8.3f}"
     path = saved(tmp_path, text)
-    assert not [*read_recording(path).doubts()]
+    assert not read_record(path).remarks
     path = saved(tmp_path, text.replace(time, f"{0.85:8.3f}"))
-    assert "its head states" in " ".join(read_recording(path).doubts())
+    assert "its head states" in " ".join(read_record(path).remarks)
 
 
 def test_another_peak_than_the_head_states_is_no_record_without_a_word(tmp_path):
     path = saved(tmp_path, component("S90E", WAVES[0], peak=25.0))
     with pytest.raises(RefusedError, match="peak"):
-        read_recording(path)
+        read_record(path)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.frame.records.read import read_recording
+from alphacut.frame import read_record
 from alphacut.frame.records.uff import floats
 from alphacut.fuzzy import RefusedError
 from tests.frame.records.samples import uff58
@@ -24,36 +24,36 @@ WAVE = np.sin(9 * 0.005 * np.arange(400))
 @pytest.mark.parametrize("kind", [2, 4])
 def test_text_and_bytes_of_single_and_double_reals_are_read(tmp_path, kind, order):
     content = uff58(WAVE, kind=kind, order=order)
-    record = read_recording(saved(tmp_path, content))
+    record = read_record(saved(tmp_path, content))
     assert record.samples == pytest.approx(WAVE, abs=1e-11 if kind == 4 else 1e-5)
     several = content + uff58(2 * WAVE, kind=kind, order=order).replace(
         b"         7   1", b"         8   1"
     )
-    assert read_recording(saved(tmp_path, several), "8.x").samples == pytest.approx(
+    assert read_record(saved(tmp_path, several), channel="8.x").samples == pytest.approx(
         2 * WAVE, abs=2e-5
     )
     with pytest.raises(RefusedError, match=r"one of: 7\.x; 8\.x"):
-        read_recording(saved(tmp_path, several))
+        read_record(saved(tmp_path, several))
 
 
 def test_padding_is_dropped_and_a_missing_point_refused(tmp_path):
     content = uff58(WAVE)
     padded = content.replace(b"    -1\n", b" 0.00000E+00 0.00000E+00\n    -1\n")
-    assert len(read_recording(saved(tmp_path, padded)).samples) == len(WAVE)
+    assert len(read_record(saved(tmp_path, padded)).samples) == len(WAVE)
     with pytest.raises(RefusedError, match="401 points, and 400 are there"):
-        read_recording(saved(tmp_path, content.replace(b"       400", b"       401")))
+        read_record(saved(tmp_path, content.replace(b"       400", b"       401")))
 
 
 @pytest.mark.parametrize("rate", [256, 200, 1000])
 def test_times_that_are_even_but_for_their_digits_are_even(tmp_path, rate):
     wave = np.sin(np.arange(8000) / 40)
     times = np.arange(8000) / rate
-    record = read_recording(saved(tmp_path, uff58(wave, times=times)))
+    record = read_record(saved(tmp_path, uff58(wave, times=times)))
     assert record.step == pytest.approx(1 / rate, rel=1e-9)
     assert record.samples == pytest.approx(wave, abs=1e-5)
     times[4000:] += 0.4 / rate
     with pytest.raises(RefusedError, match="uneven"):
-        read_recording(saved(tmp_path, uff58(wave, times=times)))
+        read_record(saved(tmp_path, uff58(wave, times=times)))
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_times_that_are_even_but_for_their_digits_are_even(tmp_path, rate):
 )  # fmt: skip
 def test_what_is_no_acceleration_over_time_is_refused(tmp_path, changes, message):
     with pytest.raises(RefusedError, match=message):
-        read_recording(saved(tmp_path, uff58(WAVE, **changes)))
+        read_record(saved(tmp_path, uff58(WAVE, **changes)))
 
 
 @pytest.mark.parametrize("unit", ["ms", "msec", "[ms]"])
@@ -75,36 +75,36 @@ def test_abscissas_in_milliseconds_are_read_as_such(tmp_path, unit, has_times):
     content = uff58(WAVE, step=5.0, times=times)
     axis = f"{'Time':<20} {'s':<20}".encode()
     for words in (f"{'Time':<20} {unit:<20}", f"{'Time ' + unit:<20} {'NONE':<20}"):
-        record = read_recording(saved(tmp_path, content.replace(axis, words.encode())))
+        record = read_record(saved(tmp_path, content.replace(axis, words.encode())))
         assert record.step == pytest.approx(0.005, rel=1e-6)
     without = content.replace(axis, f"{'Time':<20} {'NONE':<20}".encode())
     with pytest.raises(RefusedError, match="a step of 5 s"):
-        read_recording(saved(tmp_path, without))
+        read_record(saved(tmp_path, without))
 
 
 def test_data_sets_of_one_response_are_told_apart(tmp_path):
     runs = [uff58(k * WAVE).replace(b"made up", b"run %d  " % k) for k in (1, 2)]
     path = saved(tmp_path, b"".join(runs))
     with pytest.raises(RefusedError, match=r"one of: 7\.x#1 or run 1; 7\.x#2 or run 2"):
-        read_recording(path)
+        read_record(path)
     with pytest.raises(RefusedError, match=r"channel 7\.x; allowed: one of: 7\.x#1"):
-        read_recording(path, "7.x")
+        read_record(path, channel="7.x")
     for channel, factor in {"7.x#1": 1, "7.X#2": 2, "run 2": 2}.items():
-        samples = read_recording(path, channel).samples
+        samples = read_record(path, channel=channel).samples
         assert samples == pytest.approx(factor * WAVE, abs=2e-5)
 
 
 def test_a_universal_file_without_time_histories_is_told_so(tmp_path):
     geometry = "    -1\n    15\n" + f"{7:10d}{0:10d}{0:10d}{8:10d}\n" + "    -1\n"
     with pytest.raises(RefusedError, match="without a data set 58"):
-        read_recording(saved(tmp_path, geometry))
+        read_record(saved(tmp_path, geometry))
 
 
 def test_exponents_without_their_letter_are_read_as_fortran_does(tmp_path):
     content = uff58(WAVE)
     bare = re.sub(rb"(\d\.\d+)[eE]([-+])(\d\d)(?!\d)", rb"\1\g<2>0\3", content)
     assert bare != content
-    record = read_recording(saved(tmp_path, bare))
+    record = read_record(saved(tmp_path, bare))
     assert record.step == pytest.approx(0.005)
     assert record.samples == pytest.approx(WAVE, abs=1e-5)
     assert floats("  8.82898-001 -1.00000+000 2 .5+001") == [0.882898, -1.0, 2.0, 5.0]
@@ -116,6 +116,6 @@ def test_a_data_set_that_ends_in_its_head_is_told_why(tmp_path):
     start, _, rest = content.partition(b"made up")
     _, _, below = rest.partition(b"\n")
     with pytest.raises(RefusedError, match=r"an ID line is −1: write NONE there"):
-        read_recording(saved(tmp_path, start + b"    -1\n" + below))
+        read_record(saved(tmp_path, start + b"    -1\n" + below))
     with pytest.raises(RefusedError, match="it is cut off"):
-        read_recording(saved(tmp_path, start + b"NONE\n"))
+        read_record(saved(tmp_path, start + b"NONE\n"))

@@ -2,7 +2,15 @@
 
 import pytest
 
-from alphacut.frame.records.units import acceleration_factor, other_quantity
+from alphacut.frame import read_record
+from alphacut.fuzzy import RefusedError
+
+
+def read_in(unit, folder):
+    """Samples 3 and −2 of a file without a unit, in m/s²."""
+    path = folder / "record.txt"
+    path.write_text("3\n-2\n")
+    return read_record(path, step=0.02, unit=unit).samples
 
 
 @pytest.mark.parametrize(
@@ -16,27 +24,11 @@ from alphacut.frame.records.units import acceleration_factor, other_quantity
         ("mg", 9.80665e-3), ("%g", 0.0980665), ("% g", 0.0980665), ("‰g", 9.80665e-3),
     ],
 )  # fmt: skip
-def test_accelerations_are_read_in_the_units_of_files(unit, factor):
-    assert acceleration_factor(unit) == pytest.approx(factor, rel=1e-15)
+def test_accelerations_are_read_in_the_units_of_files(tmp_path, unit, factor):
+    assert read_in(unit, tmp_path) == pytest.approx([3 * factor, -2 * factor], rel=1e-15)
 
 
-@pytest.mark.parametrize("unit", ["", "m", "cm/s", "counts", "N", "m/s^3", "furlongs", "s^2", "2"])
-def test_other_units_are_none_of_an_acceleration(unit):
-    assert acceleration_factor(unit) is None
-
-
-@pytest.mark.parametrize(
-    ("unit", "quantity"),
-    [
-        ("cm", "displacement"), ("cm/s", "velocity"), ("m s-1", "velocity"), ("kN", "force"),
-        ("counts", "counts"), ("mV", "voltage"), ("kPa", "pressure"), ("deg", "angle"),
-    ],
-)  # fmt: skip
-def test_units_of_other_quantities_are_named_by_them(unit, quantity):
-    assert quantity in other_quantity(unit)
-    assert acceleration_factor(unit) is None
-
-
-def test_units_of_accelerations_and_times_are_of_no_other_quantity():
-    for unit in ("g", "mg", "%g", "gal", "m/s^2", "cm s-2", "s", "ms", "min", "kg"):
-        assert not other_quantity(unit)
+@pytest.mark.parametrize("unit", ["m", "cm/s", "counts", "N", "m/s^3", "furlongs", "s^2", "2"])
+def test_other_units_are_none_of_an_acceleration(tmp_path, unit):
+    with pytest.raises(RefusedError, match="allowed: a unit of g"):
+        read_in(unit, tmp_path)

@@ -18,9 +18,9 @@ from alphacut.frame import (
     MatrixStructure,
     Output,
     StoreyFrame,
+    envelope,
     pendulum,
 )
-from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import RefusedError
 
 COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
@@ -140,7 +140,10 @@ def test_a_lagrangian_system_refuses(changes, message):
         (lambda: LinearFlow(COLUMNS, ("E",), 1.0, 0.3), "whole steps of 0.3 s"),
         (lambda: LinearFlow(COLUMNS, ("E",), 1.0, -0.1), "step is -0.1; .* greater than 0"),
         (lambda: LagrangianFlow(pendulum(), ("x",), 1.0, 0.1), "parameter is x; allowed: m, l"),
-        (lambda: make_flow(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
+        (
+            lambda: envelope(pendulum(), {"l": 1.0}, duration=1, step=0.1, integrator="euler"),
+            "integrator is euler",
+        ),
         (
             lambda: LagrangianFlow(LagrangianSystem(**ROUGH), ("m",), 1.0, 0.1).values(ONE),
             "function of the lagrangian is sign; allowed: reciprocal",

@@ -25,7 +25,7 @@ def bits():
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
-@pytest.mark.parametrize("processes", [1, 3])
+@pytest.mark.parametrize("processes", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_any_number_of_mpi_processes(processes):
     command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py.futures", __file__]
     assert subprocess.run(command, capture_output=True, text=True).stdout.strip() == bits()

@@ -5,7 +5,6 @@ import pytest
 
 from alphacut.fuzzy import (
     Automatic,
-    Crisp,
     Knowledge,
     RefusedError,
     Signed,
@@ -14,8 +13,6 @@ from alphacut.fuzzy import (
     jointly,
     propagate,
 )
-from alphacut.fuzzy.knowledge.joint import JointClaim, joined_inputs
-from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from benchmarks.fuzzy.coverage import jointly_held
 
 BOUNDS = (0, 100)
@@ -35,9 +32,11 @@ def test_joint_cuts_are_those_of_the_lower_levels(alpha):
     assert unknown["y"].cut(alpha) == SECOND.cut(alpha / 2)
     assert independent["y"].cut(alpha) == SECOND.cut(1 - np.sqrt(1 - alpha))
     assert jointly({"x": FIRST})["x"].cut(alpha) == FIRST.cut(alpha)
-    three = joined_inputs({**independent, "z": FIRST})
-    assert three["z"].joint.words == "3 sources of unknown dependence"
-    assert joined_inputs(independent) == independent
+    both = propagate(total, independent, Signed(), knowledge=RISING, alpha=[0.5])
+    ends = np.add(*(number.cut(0.5) for number in independent.values()))
+    assert both.bounds() == pytest.approx(ends[:, None])  # which are not joined again
+    three = propagate(lambda x, y, z: x + y + z, {**independent, "z": FIRST}, alpha=[1])
+    assert "3 sources of unknown dependence" in str(three)
 
 
 def test_propagation_joins_and_prints_the_claim_with_its_conditions():
@@ -57,13 +56,12 @@ def test_propagation_joins_and_prints_the_claim_with_its_conditions():
 def test_opinions_are_said_to_be_opinions():
     claim = propagate(total, {"x": Triangular(0, 1, 2), "y": 1}, Signed()).claim
     assert str(claim) == "x: opinions, so that no level has a probability"
-    assert not JointClaim.from_inputs({"x": Crisp(1.0)}).opinions
+    assert not propagate(total, {"x": 2, "y": 1}, Signed()).claim.opinions
 
 
 def test_a_result_hands_its_claim_on_in_steps():
     result = propagate(total, {"x": FIRST, "y": 2}, Signed(), alpha=[0, 0.25, 0.5, 1])
     number = result.number()
-    assert isinstance(number, ClaimedNumber)
     assert number.cut(0.4) == number.cut(0.25) == tuple(end[1] for end in result.bounds())
     assert number.claim.about == "next value"
     assert "x: 19 values drawn alike and independently" in number.claim.conditions[0]

@@ -82,11 +82,14 @@ WAVES = {
 
 @pytest.mark.parametrize("wave", WAVES)
 @pytest.mark.parametrize("length", [0.02, 0.07, 0.3])
-def test_waves_of_many_lengths_and_sizes_exceed_no_declared_error(wave, length):
+@pytest.mark.parametrize(
+    "phase", [2.0, *(pytest.param(x, marks=pytest.mark.slow) for x in (0.5, 4.0))]
+)
+def test_waves_of_many_lengths_and_sizes_exceed_no_declared_error(phase, wave, length):
     """Right values are those of 400,001 points; some waves leave the output monotone."""
-    for size, phase, slope in product((0.01, 0.04, 0.15), (0.5, 2.0, 4.0), (0.2, 2.0)):
+    for size, slope in product((0.01, 0.04, 0.15), (0.2, 2.0)):
 
-        def of_x(x, size=size, phase=phase, slope=slope):
+        def of_x(x, size=size, slope=slope):
             trend = np.expm1(slope * x) / np.expm1(slope)
             return trend + size * WAVES[wave](2 * np.pi * x / length + phase)
 
@@ -100,8 +103,8 @@ def test_waves_of_many_lengths_and_sizes_exceed_no_declared_error(wave, length):
         )
         if bounds.nature is Nature.ESTIMATED:
             error = bounds.error.item() + 1e-6
-            assert bounds.upper.item() + error >= values.max(), (size, phase, slope)
-            assert bounds.lower.item() - error <= values.min() - 1, (size, phase, slope)
+            assert bounds.upper.item() + error >= values.max(), (size, slope)
+            assert bounds.lower.item() - error <= values.min() - 1, (size, slope)
 
 
 @pytest.mark.parametrize(("inputs", "most"), [(1, 110), (2, 150), (3, 220), (7, 440)])
