@@ -27,7 +27,10 @@ from zlib import crc32
 
 import numpy as np
 
+from alphacut.frame import read_matrix, read_modes, read_record
 from alphacut.fuzzy import RefusedError
+from alphacut.rve import read_image
+from alphacut.stochastic import read_particles
 from tests.frame.records import samples
 
 MOST_MEGABYTES, MOST_SECONDS = 1000.0, 20
@@ -216,44 +219,38 @@ def formats() -> list[Format]:
 
 
 def _records() -> list[Format]:
-    from alphacut.frame.records.read import read_recording
-
     def variant(name: str) -> bytes:
         return samples.variant(name, 0)[0]
 
     found = [
         Format(name, bytes_to("record.txt", lambda name=name: variant(name)),
-               lambda path: read_recording(path, "", samples.STEP, "g"))
+               lambda path: read_record(path, step=samples.STEP, unit="g"))
         for name in samples.FORMATS
     ]  # fmt: skip
     wave = np.sin(np.arange(400) / 20)
     for order in ("<", ">"):
         write = bytes_to("record.uff", lambda order=order: samples.uff58(wave, order=order))
-        found.append(Format(f"UFF 58b {order}", write, read_recording))
+        found.append(Format(f"UFF 58b {order}", write, read_record))
     if importlib.util.find_spec("obspy"):
         import obspy
 
         trace = obspy.Trace(wave.astype("float32"), {"delta": samples.STEP, "channel": "HNE"})
         for name in ("MSEED", "SAC"):
             saved = saved_by("record", lambda path, name=name: trace.write(str(path), format=name))
-            found.append(Format(name, saved, lambda path: read_recording(path, unit="m/s^2")))
+            found.append(Format(name, saved, lambda path: read_record(path, unit="m/s^2")))
     return found
 
 
 def _modes() -> list[Format]:
-    from alphacut.frame.identification.uff_modes import uff_mode_rows
-
     floors = {"11.x": 1, "12.x": 2}
     text = "".join(samples.uff55(k, (1.0, 0.5, 0.2, 0.1), frequency=k) for k in (1, 2))
     write = bytes_to("modes.uff", text.encode)
-    return [Format("UFF 55", write, lambda path: uff_mode_rows(path, floors))]
+    return [Format("UFF 55", write, lambda path: read_modes(path, floors=floors))]
 
 
 def _matrices() -> list[Format]:
     import scipy.io
     import scipy.sparse
-
-    from alphacut.frame import read_matrix
 
     matrix = np.diag(np.arange(1.0, 9.0)) + np.diag(np.ones(7), 1) + np.diag(np.ones(7), -1)
     sparse = scipy.sparse.csr_matrix(matrix)
@@ -274,7 +271,6 @@ def _matrices() -> list[Format]:
 def _pictures() -> list[Format]:
     from PIL import Image
 
-    from alphacut.rve.image.files import read_grid
     from alphacut.stochastic.particles.measured import section_picture
 
     grey = np.random.default_rng(0).integers(0, 250, (40, 50)).astype(np.uint8)
@@ -290,7 +286,9 @@ def _pictures() -> list[Format]:
         write = saved_by(name, lambda path, options=options: picture.save(path, **options))
         found.append(Format(f"section {name}", write, section_picture))
         if name not in COLOURED:
-            found.append(Format(f"picture {name}", write, lambda path: read_grid(path, (1, 1))))
+            found.append(
+                Format(f"picture {name}", write, lambda path: read_image(path, spacing=(1.0, 1.0)))
+            )
     return found
 
 
@@ -299,8 +297,6 @@ def _volumes() -> list[Format]:
 
     import tifffile
     from PIL import Image
-
-    from alphacut.rve.image.files import read_grid
 
     values = np.random.default_rng(0).integers(0, 250, (6, 8, 10)).astype(np.uint8)
 
@@ -336,7 +332,7 @@ def _volumes() -> list[Format]:
     }
 
     def read(path: Path) -> object:
-        return read_grid(path, (1, 1, 1))
+        return read_image(path, spacing=(1.0, 1.0, 1.0))
 
     found = [Format(f"volume {x}", saved_by(x, save), read) for x, save in savers.items()]
     return [*found, Format("volume of slices", folder_of_slices, read)]
@@ -346,7 +342,6 @@ def _texts() -> list[Format]:
     from alphacut.case.content import load
     from alphacut.frame.records.tables import read_force_history
     from alphacut.io.files import BadInput
-    from alphacut.stochastic import read_particles
 
     def read_case(path: Path) -> object:
         try:

@@ -13,7 +13,7 @@ import scipy.io
 from alphacut.frame import read_matrix
 from alphacut.fuzzy import RefusedError
 from alphacut.io.quantity import parse_number
-from alphacut.rve.image.files import read_grid
+from alphacut.rve import read_image
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "tools.md"
@@ -44,7 +44,7 @@ def test_a_thin_volume_saved_as_colour_or_as_pages_is_refused(tmp_path):
     first.save(tmp_path / "five.tif", save_all=True, append_images=others)
     for name, words in (("three.tif", "in colours"), ("five.tif", "5 pages")):
         with pytest.raises(RefusedError, match=words):
-            read_grid(tmp_path / name, (1, 1))
+            read_image(tmp_path / name, spacing=(1.0, 1.0))
 
 
 def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
@@ -53,7 +53,7 @@ def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
     picture = Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8))
     picture.save(tmp_path / "a.tif", dpi=(100, 300))
     with pytest.raises(RefusedError, match=r"100 by 300 per inch"):
-        read_grid(tmp_path / "a.tif", (1, 1))
+        read_image(tmp_path / "a.tif", spacing=1.0)
 
 
 def test_a_bmp_whose_resolution_is_zero_has_square_pixels(tmp_path):
@@ -65,7 +65,7 @@ def test_a_bmp_whose_resolution_is_zero_has_square_pixels(tmp_path):
     content = bytearray((tmp_path / "a.bmp").read_bytes())
     content[38:46] = bytes(8)
     (tmp_path / "a.bmp").write_bytes(content)
-    assert np.array_equal(read_grid(tmp_path / "a.bmp", (1, 1)), values[::-1])
+    assert np.array_equal(read_image(tmp_path / "a.bmp", spacing=1.0).values, values[::-1])
 
 
 def test_a_tiff_whose_resolution_is_over_zero_states_no_pixels(tmp_path):
@@ -78,7 +78,7 @@ def test_a_tiff_whose_resolution_is_over_zero_states_no_pixels(tmp_path):
     tags[y_resolution] = TiffImagePlugin.IFDRational(72, 1)
     tags[unit] = 2  # inch
     Image.fromarray(values).save(tmp_path / "a.tif", tiffinfo=tags)
-    assert np.array_equal(read_grid(tmp_path / "a.tif", (1, 1)), values[::-1])
+    assert np.array_equal(read_image(tmp_path / "a.tif", spacing=1.0).values, values[::-1])
 
 
 @pytest.mark.parametrize("kind", [np.uint32, np.int8])
@@ -93,7 +93,7 @@ def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
         signed, unsigned = (struct.pack("<HHIHH", 339, 3, 1, x, 0) for x in (2, 1))
         (tmp_path / "labels.tif").write_bytes(content.replace(signed, unsigned))
     with pytest.raises(RefusedError, match="sign"):
-        read_grid(tmp_path / "labels.tif", (1, 1))
+        read_image(tmp_path / "labels.tif", spacing=1.0)
 
 
 def test_gmsh_takes_no_settings_of_the_caller(tmp_path):

@@ -7,9 +7,7 @@ import pytest
 
 from alphacut.base import memory
 from alphacut.base.memory import free_memory, require_free_memory
-from alphacut.frame import read_matrix
-from alphacut.frame.identification.uff_modes import uff_mode_rows
-from alphacut.frame.records.read import read_recording
+from alphacut.frame import read_matrix, read_modes, read_record
 from alphacut.fuzzy import RefusedError
 from alphacut.stochastic import read_particles
 
@@ -27,8 +25,8 @@ def test_a_limit_of_the_process_is_one_of_its_memory(monkeypatch):
 READERS = {
     "matrix.mtx": read_matrix,
     "matrix.csv": read_matrix,
-    "record.csv": read_recording,
-    "modes.uff": lambda path: uff_mode_rows(path, {}),
+    "record.csv": read_record,
+    "modes.uff": lambda path: read_modes(path, floors={"1.x": 1}),
     "circles.csv": lambda path: read_particles(path, size=(0.1, 0.1)),
 }
 

@@ -8,12 +8,12 @@ import pytest
 from alphacut.base import memory, pictures
 from alphacut.base.pictures import opened_picture
 from alphacut.fuzzy import RefusedError
-from alphacut.rve.image.files import read_grid
+from alphacut.rve import read_image
 from alphacut.stochastic.particles.measured import section_picture
 
 Image = pytest.importorskip("PIL.Image")
 READERS = {
-    "picture": lambda path: read_grid(path, (1, 1)),
+    "picture": lambda path: read_image(path, spacing=1.0).values,
     "section": section_picture,
 }
 

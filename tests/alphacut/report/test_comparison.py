@@ -3,13 +3,9 @@
 import csv
 import re
 
-import numpy as np
 import pytest
 
 from alphacut import main
-from alphacut.frame import SuitePeaks
-from alphacut.report.results import comparison
-from alphacut.stages.summary import Parts
 from tests.alphacut.small import summary_of, two_floors_run
 
 
@@ -31,15 +27,6 @@ def test_two_runs_stand_side_by_side(runs, capsys):
     assert ratio == pytest.approx(peaks[1] / peaks[0], abs=1e-3)
     assert rows["|q2| ≤ 300 mm"]["first"] == "not exceeded"
     assert "width of the peak of drift1" in rows
-
-
-def test_statistics_of_records_stand_in_the_order_of_their_file():
-    names = ["median", "84 %", "mean", "least"]
-    statistics = {"q1": {name: np.ones(1) for name in names}}
-    facts = {"period_s": 1.0, "damping_ratio": 0.05, "alpha": np.zeros(1), "units": {"q1": "m"}}
-    facts |= {"by_record": {}, "peak": {}, "farthest_record": {}}
-    parts = Parts(records=SuitePeaks(**facts, statistics=statistics))
-    assert [row[0].partition(" of")[0] for row in comparison(parts, parts).rows] == names
 
 
 def test_the_comparison_and_all_tables_are_written(runs, tmp_path):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from alphacut import main
-from alphacut.io.results import ResultsFolder
-from alphacut.report.page import render_page
 
 CASE = """
 title = "pores"
@@ -65,7 +63,8 @@ def test_texts_say_what_is_guaranteed_of_what(
     assert words[0] in unwrapped(capfd.readouterr().out)
     assert main(["modulus", case, f"--out={out}"]) == 0
     printed = unwrapped(capfd.readouterr().out)
-    page = unwrapped(render_page(ResultsFolder.read(out)))
+    assert main(["report", str(out), "--quiet"]) == 0
+    page = unwrapped((out / "report.html").read_text(encoding="utf-8"))
     for text in (printed, page):
         assert all(x in text for x in words)
     assert other not in printed

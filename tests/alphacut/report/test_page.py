@@ -17,8 +17,8 @@ from alphacut.fuzzy import Nature, RefusedError
 from alphacut.fuzzy.result import Ends
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page
-from alphacut.report.results import answers, drivers, peak_table, run_text
-from alphacut.report.tables import shown, write_tables
+from alphacut.report.results import answers, comparison, drivers, peak_table, run_text
+from alphacut.report.tables import shown, write_csv, write_tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import FrameResult, Parts, Summary
 from tests.alphacut.small import summary_of
@@ -201,3 +201,21 @@ def test_one_peak_has_one_value_in_every_place(two_floors, tables):
     # no motion passes the limit within the supports as they are, so more than these are kept
     assert at_one["upper"][0] + at_one["error"][0] <= 0.28
     assert summary["tolerances"]["kept"] >= 1
+
+
+def test_statistics_of_records_stand_in_the_order_of_their_file():
+    names = ["median", "84 %", "mean", "least"]
+    statistics = {"q1": {name: np.ones(1) for name in names}}
+    facts = {"period_s": 1.0, "damping_ratio": 0.05, "alpha": np.zeros(1), "units": {"q1": "m"}}
+    facts |= {"by_record": {}, "peak": {}, "farthest_record": {}}
+    parts = Parts(records=SuitePeaks(**facts, statistics=statistics))
+    assert [row[0].partition(" of")[0] for row in comparison(parts, parts).rows] == names
+
+
+def test_numbers_of_csv_are_exact_and_its_texts_are_no_formulas(tmp_path):
+    frame = pd.DataFrame(
+        {"what": ["=1+1", "−3 … 4", "max a,b"], "value": [-1.5, 0.1 + 0.2, float("nan")]}
+    )
+    (path,) = write_csv({"answers": frame}, tmp_path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert lines[1:] == ["'=1+1,-1.5", "'-3 … 4,0.30000000000000004", '"max a,b",']

@@ -3,12 +3,9 @@
 import json
 import re
 
-import matplotlib.pyplot as plt
 import pytest
 
 from alphacut import main
-from alphacut.base.number_text import ShownUnit
-from alphacut.figures.style import figure_style, prefix_axis
 from alphacut.frame.analyses.limits import LimitResult
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page
@@ -85,14 +82,3 @@ def test_an_output_is_shown_in_the_unit_of_its_limit(folder):
 def test_the_unit_of_a_limit_is_read_from_its_text(stated, limit, unit):
     found = LimitResult(output="q1", unit="m", limit=limit, stated=stated).stated_unit
     assert found == (None if unit is None else (unit[0], pytest.approx(unit[1])))
-
-
-def test_an_axis_takes_the_unit_that_is_shown():
-    with figure_style():
-        figure, axes = plt.subplots()
-        axes.plot([0, 1], [0, 0.02])
-        prefix_axis(axes, "drift", "m", shown=ShownUnit("cm", 100.0))
-        figure.draw_without_rendering()
-        assert axes.get_ylabel() == "drift (cm)"
-        assert "2" in [label.get_text() for label in axes.get_yticklabels()]
-        plt.close(figure)
