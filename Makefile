@@ -79,7 +79,7 @@ findings:
 	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done
 
 docs:
-	$(IN) sphinx-build -q docs build/docs
+	$(IN) sphinx-build -q -W --keep-going docs build/docs
 
 clean:
 	rm -rf results build

@@ -49,7 +49,7 @@ def test_each_target_of_make_exists():
     commands = [word for section in SECTIONS for word in words_of(section) if word[:5] == "make "]
     targets = {word for command in commands for word in command.split()[1:] if "=" not in word}
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert targets >= {"lint", "test", "test-slow", "test-wheels", "quick"}
+    assert "quick" in targets
     assert not [x for x in targets if not re.search(rf"^{x}:", makefile, re.MULTILINE)]
 
 

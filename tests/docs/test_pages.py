@@ -59,11 +59,24 @@ def defined(tree):
     return names
 
 
-def test_links_to_files_lead_somewhere():
-    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
-        for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):
-            target = page.parent / link
+def anchors(page):
+    """Ends of links to the headings of a page: words in small letters, joined by hyphens."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_links_within_the_project_lead_somewhere():
+    pages = [
+        *ROOT.glob("*.md"),
+        *(ROOT / "benchmarks").rglob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
+    ]
+    for page in pages:
+        for link in re.findall(r"\]\(([^):]+)\)", page.read_text(encoding="utf-8")):
+            file, _, anchor = link.partition("#")
+            target = page.parent / file if file else page
             assert target.exists() or target.with_suffix(".py").exists(), (page, link)
+            assert not anchor or anchor in anchors(target), (page, link)
 
 
 @pytest.mark.parametrize(

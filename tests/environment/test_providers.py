@@ -87,12 +87,15 @@ def foreign_imports(*folders: str) -> set[str]:
     return names - sys.stdlib_module_names - set(FOLDERS) - LOCAL
 
 
-def environment_packages() -> set[str]:
-    """Debian packages that `enter` installs."""
+def environment_packages(*lists: str) -> set[str]:
+    """Debian packages in lists of `enter`, by the names of these."""
     text = (ROOT / "enter").read_text(encoding="utf-8")
-    listed = re.search(r"^packages=\((.*?)^\)", text, re.MULTILINE | re.DOTALL)
-    assert listed
-    return set(re.sub(r"#.*", "", listed[1]).split())
+    names = set[str]()
+    for name in lists:
+        listed = re.search(rf"^{name}=\((.*?)^\)", text, re.MULTILINE | re.DOTALL)
+        assert listed
+        names |= set(re.sub(r"#.*", "", listed[1]).split())
+    return names
 
 
 def test_every_import_has_a_provider():
@@ -100,9 +103,16 @@ def test_every_import_has_a_provider():
 
 
 def test_every_provider_is_in_the_package_list():
-    assert {*DIRECT.values(), *INDIRECT.values()} <= environment_packages()
+    listed = environment_packages("packages", "tool_packages")
+    assert {*DIRECT.values(), *INDIRECT.values()} <= listed
     for name, file in FROM_PYPI.items():
         assert name in (ROOT / file).read_text(encoding="utf-8").lower()
+
+
+def test_what_cases_import_is_in_the_smaller_of_both_trees():
+    providers = DIRECT | INDIRECT
+    imported = foreign_imports(*PACKAGES) - set(FROM_PYPI)
+    assert {providers[name] for name in imported} <= environment_packages("packages")
 
 
 def test_the_environment_has_all_outside_the_home_folder():

@@ -126,14 +126,23 @@ def test_the_archive_holds_what_tests_need(archive):
         here = {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*.py")}
         assert {f"alphacut/{file}" for file in here} <= files
         assert not here & files
-    for name in ("enter", "Makefile", ".ci/run", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
+    for name in (
+        "enter",
+        "Makefile",
+        ".ci/run",
+        ".ci/slow",
+        "README.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+    ):
         assert name in files
 
 
-def readme_blocks() -> list[str]:
-    """README's programs: an envelope, and a function of one's own."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    return re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+def program_of(page: str) -> str:
+    """The one Python program of a page."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    (program,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return program
 
 
 def test_without_an_extra_frames_and_functions_work_and_other_doors_name_theirs(wheel, tmp_path):
@@ -144,8 +153,8 @@ def test_without_an_extra_frames_and_functions_work_and_other_doors_name_theirs(
     assert {"numpy", "scipy", "numba", "joblib", "threadpoolctl"} <= names
     assert not {"sympy", "xarray", "pandas", "pydantic", "matplotlib", "pillow"} & names
     assert len(names) <= 10
-    envelope, function = readme_blocks()
-    assert venv.run("python", "-c", envelope).startswith("bounds guaranteed")
+    function = program_of("docs/howto/installation.md")
+    assert venv.run("python", "-c", program_of("README.md")).startswith("bounds guaranteed")
     assert venv.run("python", "-c", function).startswith("bounds estimated")
     message = venv.run(
         "python", "-c", f"{function}\npropagate(deflection, inputs).to_dataset()", status=1
@@ -159,8 +168,8 @@ def test_without_an_extra_frames_and_functions_work_and_other_doors_name_theirs(
 def works(venv: Venv, folder: Path) -> None:
     """README's ten lines, a series cell, an envelope, a report; no class exists twice."""
     shutil.copytree(ROOT / "cases", folder / "cases")
-    envelope, _ = readme_blocks()
-    assert venv.run("python", "-c", envelope, cwd=folder).startswith("bounds guaranteed")
+    envelope = venv.run("python", "-c", program_of("README.md"), cwd=folder)
+    assert envelope.startswith("bounds guaranteed")
     case = "cases/paper.toml"
     cell = venv.run("alphacut", "cell", case, "--method=series", "--json=-", cwd=folder)
     assert 22 < json.loads(cell)["E_GPa"] < 26
