@@ -5,7 +5,7 @@ import pytest
 
 from tests.calibration.declared import Calibration, free_seed
 
-FEW = 2
+FEW = 1
 
 
 @pytest.mark.parametrize(

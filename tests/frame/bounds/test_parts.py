@@ -133,14 +133,14 @@ def spring():
 @pytest.mark.parametrize("method", [DualProof(peaks=1e-3), Proof(tolerance=1e-3)], ids=repr)
 def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
     fuzzy = {"s": Interval(0.5, 2.0)}
-    given = {"duration": 2.0, "step": 0.05, "alpha": (0,), "relative": True, "progress": False}
+    given = {"duration": 2.0, "step": 0.1, "alpha": (0,), "relative": True, "progress": False}
     alone, threads = (
         envelope(spring(), fuzzy, replace(method, workers=n), **given) for n in (1, 3)
     )
     assert alone.facts["parts"] > 1
     assert alone.facts["gap_of_peaks"] <= 1.1e-3
     points = np.linspace(0.5, 2.0, 1001)[:, None]
-    require_inside(exact_motions(spring(), points, fuzzy, 2.0, 0.05), alone)
+    require_inside(exact_motions(spring(), points, fuzzy, 2.0, 0.1), alone)
     for name in ("lower", "upper", "lower_at", "upper_at", "between"):
         assert (getattr(alone, name) == getattr(threads, name)).all()
 

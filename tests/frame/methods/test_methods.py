@@ -119,7 +119,7 @@ def test_auto_takes_a_proof_else_the_follower_and_says_why():
             system,
             inputs,
             method=method,
-            **{**MOTION, "step": 0.02, "duration": 1.0, "alpha": (0,)},
+            **{**MOTION, "duration": 1.0, "alpha": (0,)},
         )
         assert found.nature is nature
         assert found.notes[0].startswith(why)
@@ -131,10 +131,10 @@ def test_more_inputs_than_a_proof_takes_are_followed_to_the_error_allowed(dashpo
     start = {"q0": (0.01, 0.02, 0.03), "damping_ratio": 0.03, "dampers": dashpots}
     system = StoreyFrame((2e4,) * 3, stiffness=(8e6,) * 3, **start)
     inputs = {x: Interval(0.9 * system.parameters[x], 1.1 * system.parameters[x]) for x in names}
-    motion = {**MOTION, "alpha": (0,), "duration": 1.6, "integrator": "exact"}
+    motion = {**MOTION, "alpha": (0,), "duration": 0.8, "integrator": "exact"}
     method = frame.Auto(1e-3) if dashpots else frame.ImprovedFollower(2e-4)
     found = envelope(system, inputs, method=method, **motion)
-    values = trajectories(system, inputs, random_points(inputs, 3000, rng), duration=1.6)
+    values = trajectories(system, inputs, random_points(inputs, 2000, rng), duration=0.8)
     assert found.method == "improved-graph-follower"
     assert attained(found, system, inputs) <= 1e-9 * np.abs(found.upper).max()
     require_inside(values, found)
