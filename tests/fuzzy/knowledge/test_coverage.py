@@ -14,10 +14,17 @@ from benchmarks.fuzzy.coverage import LAWS, held, ways
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
 
 
+OFTEN = ("normal", "uniform", "skewed beta", "Poisson 2", "coin 0.1")
+"""Laws that few samples show always: a named one, bounded ones and discrete ones."""
+
+
 @pytest.mark.parametrize(
-    ("samples", "far"), [(150, 6.0), pytest.param(1500, 4.5, marks=pytest.mark.slow)]
+    ("law", "samples", "far"),
+    [
+        *((law, 150, 6.0) for law in OFTEN),
+        *(pytest.param(law, 1500, 4.5, marks=pytest.mark.slow) for law in LAWS),
+    ],
 )
-@pytest.mark.parametrize("law", LAWS)
 def test_cuts_hold_what_they_claim(law, samples, far, rng):
     """So many standard errors below are what chance does not explain in a thousand comparisons."""
     for n in (1, 5, 10, 30) if samples > 1000 else (1, 8):
