@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
@@ -45,6 +46,18 @@ exit status:
 """
 
 
+class ShowVersion(argparse.Action):
+    """Option that prints the version, which takes time to find, and ends the process."""
+
+    def __init__(self, **names: Any) -> None:
+        super().__init__(nargs=0, **names)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object, **__: object) -> None:
+        """Print the version, and raise SystemExit."""
+        print(f"alphacut {own_version()}")
+        parser.exit()
+
+
 def build_parsers(
     program: str, commands: Mapping[str, Command]
 ) -> tuple[Parser, dict[str, Parser]]:
@@ -61,7 +74,7 @@ def build_parsers(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"alphacut {own_version()}")
+    parser.add_argument("--version", action=ShowVersion, help="show the version and exit")
     subparsers = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )

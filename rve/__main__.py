@@ -3,7 +3,6 @@
 import sys
 
 from alphacut.__main__ import main
-from alphacut.commands.table import COMMANDS
 
 if __name__ == "__main__":
-    sys.exit(main(program=f"python -m {__package__}", commands={"solve": COMMANDS["cell"]}))
+    sys.exit(main(program=f"python -m {__package__}", names={"solve": "cell"}))

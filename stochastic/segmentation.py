@@ -213,7 +213,7 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
     """
     # The median over 5 × 5 pixels takes noise off the classes.
     labels = np.searchsorted(borders, values, side="right")
-    noisy = labels.copy()
+    noisy = labels.astype(float)
     for place, (median,) in _ranks(noisy, np.ones_like(sound), 5, (0.5,)):
         labels[place] = median
     interior = _interior(labels, reach=3) & sound

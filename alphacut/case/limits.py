@@ -20,7 +20,7 @@ from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
 from alphacut.frame import Limit
-from alphacut.frame.analyses.limits import Side, limits_by_name
+from alphacut.frame.analyses.limits import Side, limits_by_name, require_fragile
 from alphacut.frame.structures.quantities import OUTPUTS, Output
 from alphacut.frame.structures.storey import yields
 from alphacut.io import quantity
@@ -358,8 +358,6 @@ class FragilitySection(QuestionSection):
                 it, or does not limit a magnitude; or `most`, the largest intensity tried, is stated
                 though no columns yield.
         """
-        from alphacut.frame.analyses.fragility import require_fragile  # takes time to import
-
         super().require_answerable(structure)
         with _naming("fragility.limits"):
             require_fragile(structure.model, self.limits_of(structure))

@@ -12,7 +12,6 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import FunctionType
 
@@ -29,6 +28,8 @@ NESTED = ("stochastic", "rve", "fuzzy", "frame")
 
 def version_of(distribution: str) -> str:
     """Return the version of an installed distribution; empty if it is not there."""
+    from importlib.metadata import PackageNotFoundError, version  # takes time to import
+
     try:
         return version(distribution)
     except PackageNotFoundError:

@@ -36,7 +36,13 @@ from alphacut.frame.analyses.incremental import (
     Increments,
     curve_rows,
 )
-from alphacut.frame.analyses.limits import Limit, LimitResult, about_limit, limits_by_name
+from alphacut.frame.analyses.limits import (
+    Limit,
+    LimitResult,
+    about_limit,
+    limits_by_name,
+    require_fragile,
+)
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
 from alphacut.frame.analyses.suites import (
@@ -49,8 +55,7 @@ from alphacut.frame.analyses.suites import (
 )
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.linear import LinearSystem, has_matrices
-from alphacut.frame.structures.model import StructureModel
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.storey import StoreyFrame, yields
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
@@ -702,33 +707,6 @@ def fragility(
         suite=peaks,
         increments=increments,
     )
-
-
-def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
-    """Check that a structure and its limits permit a fragility analysis.
-
-    Args:
-        model: The structure.
-        limits: Limits with one value each.
-
-    Raises:
-        RefusedError: The structure has no matrices of mass, damping and stiffness, does not start
-            at rest or has forces; a limit is one of the mean over records; a linear structure at
-            rest exceeds a limit; or columns yield, and a limit is not one of a magnitude.
-    """
-    is_moved_by_record = has_matrices(model) and not model.loads and model.is_at_rest
-    # A start or a force would add a part to the response that does not scale with the record.
-    allowed = "linear structures and frames that yield, at rest and without forces"
-    require(is_moved_by_record, "fragility", value="of another motion", allowed=allowed)
-    for limit in limits:
-        # A structure that exceeds a limit at rest has no critical measure.
-        if yields(model):
-            fits = limit.side == ""
-            allowed = "limits of magnitudes, of columns that yield"
-        else:
-            fits = limit.outwards > 0 and not limit.mean
-            allowed = "limits of each record that the structure at rest keeps"
-        require(fits, "limits", value=limit.text, allowed=allowed)
 
 
 def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:

@@ -10,7 +10,10 @@ from typing import Literal
 from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import MINUS, ShownUnit, engineering
 from alphacut.frame.analyses.answer import Record
+from alphacut.frame.structures.linear import has_matrices
+from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.storey import yields
 
 Side = Literal["", "max", "min", "mean"]
 """What is limited: the largest magnitude, the largest value or the smallest value of an output over
@@ -260,3 +263,30 @@ def about_limit(limit: Limit, unit: str) -> LimitResult:
     return LimitResult(
         side=limit.side, output=limit.output, unit=unit, limit=limit.number, stated=limit.stated
     )
+
+
+def require_fragile(model: StructureModel, limits: Sequence[Limit]) -> None:
+    """Check that a structure and its limits permit a fragility analysis.
+
+    Args:
+        model: The structure.
+        limits: Limits with one value each.
+
+    Raises:
+        RefusedError: The structure has no matrices of mass, damping and stiffness, does not start
+            at rest or has forces; a limit is one of the mean over records; a linear structure at
+            rest exceeds a limit; or columns yield, and a limit is not one of a magnitude.
+    """
+    is_moved_by_record = has_matrices(model) and not model.loads and model.is_at_rest
+    # A start or a force would add a part to the response that does not scale with the record.
+    allowed = "linear structures and frames that yield, at rest and without forces"
+    require(is_moved_by_record, "fragility", value="of another motion", allowed=allowed)
+    for limit in limits:
+        # A structure that exceeds a limit at rest has no critical measure.
+        if yields(model):
+            fits = limit.side == ""
+            allowed = "limits of magnitudes, of columns that yield"
+        else:
+            fits = limit.outwards > 0 and not limit.mean
+            allowed = "limits of each record that the structure at rest keeps"
+        require(fits, "limits", value=limit.text, allowed=allowed)

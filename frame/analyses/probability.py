@@ -38,7 +38,7 @@ CONFIDENCE = 0.95
 """Probability with which the intervals of all fuzzy points of a limit contain their probabilities;
 conventional."""
 
-Sampler = Callable[[np.random.Generator, int], Array]
+Sampler = Callable[["np.random.Generator", int], Array]
 """Function that returns a number of values of a random parameter, in SI units, by a generator."""
 
 

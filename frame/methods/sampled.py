@@ -15,10 +15,6 @@ from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.result import Envelope
 from alphacut.fuzzy.campaign.call import Call, SpentError
-from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.design import bounds_of_samples
-from alphacut.fuzzy.plans.settings import SEARCH
-from alphacut.fuzzy.plans.single_linkage import SingleLinkage
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, chebyshev_points, corners
 
@@ -140,6 +136,11 @@ class PeakSearch:
             RefusedError: A trajectory does not exist, for example since the structure collapses.
             StepError: A trajectory has too many events in a step, or its energy is not in balance.
         """
+        from alphacut.fuzzy.campaign.campaign import Campaign  # searches take time to import
+        from alphacut.fuzzy.plans.design import bounds_of_samples
+        from alphacut.fuzzy.plans.settings import SEARCH
+        from alphacut.fuzzy.plans.single_linkage import SingleLinkage
+
         cuts = flow.boxes
         outputs = tuple(map(str, flow.outputs))
         yielding_flow = flow.flow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -303,9 +304,13 @@ def _finite_array(name: str, value: ArrayLike | None) -> Array:
     """
     # A masked entry has no value, and an array with a unit loses it on conversion: both would pass
     # as plain numbers.
-    array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
+    array = np.asanyarray(value)
+    is_masked = False
+    if "numpy.ma" in sys.modules:  # which takes time to import, and without which nothing is masked
+        array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
+        is_masked = np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     # `all` of a masked array without entries is masked, which counts as False below.
-    is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
+    is_plain = array.dtype.kind in "biuf" and not is_masked
     is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()
     if not is_allowed:  # not by `require`: the text of an array takes longer than all else here
         shown = " ".join(repr(value).split())[:80]
