@@ -1,4 +1,4 @@
-"""The page and the CSV files of a run: what they say, and what they refuse to believe."""
+"""The page and the CSV files of a run: what they say, in which units, what they refuse to believe."""
 
 import csv
 import json
@@ -10,9 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from alphacut import main
 from alphacut.base.number_text import range_text
 from alphacut.frame import Decision, Peak, SuitePeaks
 from alphacut.frame.analyses.decision import LimitDecision
+from alphacut.frame.analyses.limits import LimitResult
 from alphacut.fuzzy import Nature, RefusedError
 from alphacut.fuzzy.result import Ends
 from alphacut.io.results import ResultsFolder
@@ -219,3 +221,75 @@ def test_numbers_of_csv_are_exact_and_its_texts_are_no_formulas(tmp_path):
     (path,) = write_csv({"answers": frame}, tmp_path)
     lines = path.read_text(encoding="utf-8").splitlines()
     assert lines[1:] == ["'=1+1,-1.5", "'-3 … 4,0.30000000000000004", '"max a,b",']
+
+
+UNITS = """
+title = "Units"
+stages = ["envelope"]
+[frame]
+masses = ["20 t", "10 t"]
+lengths = "3 m"
+stiffness = ["[7, 8, 9] MN/m", "8 MN/m"]
+damping_ratio = "5 %"
+displacements = ["5 mm", "8 mm"]
+outputs = ["drift1", "q2", "base_shear", "a2"]
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+[decision]
+limits = ["drift1 <= 2 cm", "base_shear <= 0.09 MN", "q2 <= 12 mm"]
+"""
+
+
+@pytest.fixture(scope="module")
+def shown_units(tmp_path_factory):
+    path = tmp_path_factory.mktemp("units")
+    (path / "case.toml").write_text(UNITS, encoding="utf-8")
+    arguments = ["run", f"{path}/case.toml", f"--out={path}/out", "--quiet", "--no-figures"]
+    assert main(arguments) == 0
+    return ResultsFolder.read(path / "out")
+
+
+def test_an_output_is_shown_in_the_unit_of_its_limit(shown_units):
+    summary = Summary.read(shown_units)
+    labels = [row[0] for row in peak_table(summary).rows]
+    assert {"drift1, cm", "base_shear, MN", "q2, mm", "a2, g"} <= set(labels)
+    by_output = {part.output: part for part in summary.decision.limits.values()}
+    for name, unit in (("drift1", "cm"), ("base_shear", "MN"), ("q2", "mm")):
+        head, rows = summary.decision.table()
+        (row,) = [row for row in rows if row[0] == by_output[name].words]
+        texts = dict(zip(head, row, strict=True))
+        values = [text for text in texts.values() if re.search(r"\d (c|m|M|k)?[mN]\b", text)]
+        assert values
+        assert all(re.search(rf"\d {unit}\b", text) for text in values), values
+    page = render_page(shown_units)
+    data = json.loads(re.search(r'id="envelopes">(.*?)</script>', page, re.DOTALL)[1])[0]
+    pairs = zip(data["units"], data["factors"], strict=True)
+    shown = dict(zip(data["outputs"], pairs, strict=True))
+    assert shown["drift1"] == ("cm", pytest.approx(100.0))
+    assert shown["base_shear"] == ("MN", pytest.approx(1e-6))
+    assert shown["a2"] == ("g", pytest.approx(1 / 9.80665))
+    # the peak in the table is that of the summary, times the factor
+    row = next(row for row in peak_table(summary).rows if row[0] == "drift1, cm")
+    peak = summary.envelopes["all"].peak["drift1"]
+    assert float(row[2].split(" … ")[1]) == pytest.approx(100 * peak.upper[0], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("stated", "limit", "unit"),
+    [
+        ("20 mm", 0.02, ("mm", 1e3)),
+        ("-60 mm", -0.06, ("mm", 1e3)),
+        ("350 kN m", 350e3, ("kN m", 1e-3)),
+        ("0.3 g", 2.941995, ("g", 1 / 9.80665)),
+        ("2 %", 0.06, None),
+        ("1/200", 0.015, None),
+        ("4", 4.0, None),
+        ("", 0.02, None),
+    ],
+)
+def test_the_unit_of_a_limit_is_read_from_its_text(stated, limit, unit):
+    found = LimitResult(output="q1", unit="m", limit=limit, stated=stated).stated_unit
+    assert found == (None if unit is None else (unit[0], pytest.approx(unit[1])))

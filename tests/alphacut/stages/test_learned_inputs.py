@@ -33,7 +33,7 @@ most = 1
 [probability]
 limits = ["drift1 <= 11 mm"]
 random = ["zeta"]
-samples = 10
+samples = 3
 """
 BOX = "of the box around the learned set"
 
