@@ -211,7 +211,7 @@ def test_cells_as_tight_as_no_square_are_counted_or_refused():
     assert 0 < dense.rule.capped_fraction(dense.sample) < 0.05
     assert dense.fraction_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
-        fit_radius_map(pack(200, packings=5, fraction=0.75, radii=(1e-3, 1e-3)))
+        fit_radius_map(pack(80, packings=5, fraction=0.75, radii=(1e-3, 1e-3)))
 
 
 def test_equal_cells_leave_nothing_to_fit():
@@ -225,7 +225,7 @@ def few_packings(tmp_path_factory):
     """Path of the shipped case of packings, of five small ones."""
     path = tmp_path_factory.mktemp("few") / "few.toml"
     case = (ROOT / "cases/concrete.toml").read_text(encoding="utf-8")
-    few = case.replace("particles = 2000", "particles = 120").replace("= 20  ", "= 5  ")
+    few = case.replace("particles = 2000", "particles = 60").replace("= 20  ", "= 5  ")
     path.write_text(few, encoding="utf-8")
     return path
 
@@ -241,7 +241,8 @@ def test_the_command_prints_a_section_that_gives_the_map(few_packings, capfd):
 
 
 def test_the_papers_figures_are_drawn(few_packings, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(packing_figures, "N_EQUAL", 200)
+    for name, few in (("N_EQUAL", 100), ("CORNER_DISCS", 30)):
+        monkeypatch.setattr(packing_figures, name, few)
     packing_figures.main([str(few_packings), "--out", str(tmp_path)])
     files = list(map(Path, capsys.readouterr().out.splitlines()))
     numbers = ["03-04", "05-08", "06-07", "09", "10", "11", "12"]
