@@ -5,11 +5,8 @@ import pytest
 from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, DualProof, Force, History, MatrixStructure, Proof, envelope
-from alphacut.frame.bounds.box import over_box, sources
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.modes.intervening import Excitation
-from alphacut.frame.modes.models import ModalResponseModels
-from alphacut.frame.structures.linear import histories, modal_damping
+from alphacut.frame.structures.linear import modal_damping
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, require_inside
 
@@ -83,10 +80,10 @@ def test_an_oscillator_is_left_where_all_blocks_are_narrower_by_sums():
         ground=ground,
         loads=[Force(np.eye(6)[1], 1.3, history)],
     )
-    names, time = ("rb", "l", "g3", "g0", "ra"), 1.533 * np.arange(41)
-    structure = over_box(system, names, np.full(5, 0.92), np.full(5, 1.06))
-    excitation = Excitation(histories(system), time, sources(system, structure))
-    assert ModalResponseModels.from_structure(structure, excitation, np.full(2, 1e-2)).oscillators
+    inputs = dict.fromkeys(("rb", "l", "g3", "g0", "ra"), Interval(0.92, 1.06))
+    nodes = {"duration": 20 * 1.533, "step": 1.533, "alpha": [0], "progress": False}
+    found = envelope(system, inputs, DualProof(parts=1, slabs=1, steps=2), **nodes)
+    assert found.facts["single_modes"] > 0
 
 
 def test_damping_by_ratios_is_smooth_where_modes_of_one_ratio_meet(rng):
