@@ -21,7 +21,6 @@ from alphacut.fuzzy import (
     propagate,
     width_fractions,
 )
-from alphacut.fuzzy.campaign.store import model_key
 
 X = {"x": Triangular(0, 1, 2)}
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
@@ -59,7 +58,7 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: run(lambda x: x, X, Signed(outputs=("z",))), "output"),
         (lambda: run(store="/proc/none/s.db", identity={"v": 1}), "store"),
         (lambda: run(store="s.db"), "identity"),
-        (lambda: model_key({"f": abs}), "identity"),
+        (lambda: run(store="s.db", identity={"f": abs}), "identity"),
         (lambda: run(alpha=[0.5]).number(), "alpha"),
         (
             lambda: width_fractions(lambda x: run(inputs=x), X, groups={"g": ("z",)}),

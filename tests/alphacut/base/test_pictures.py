@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from alphacut.base import memory, pictures
-from alphacut.base.pictures import opened_picture
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
 from alphacut.stochastic.particles.measured import section_picture
@@ -39,11 +38,8 @@ def test_a_head_that_promises_more_pixels_than_its_file_holds_is_refused(tmp_pat
 def test_a_picture_that_does_not_fit_the_free_memory_is_refused(tmp_path, monkeypatch):
     Image.fromarray(np.zeros((40, 50), np.uint8)).save(tmp_path / "a.png")
     monkeypatch.setattr(memory, "free_memory", lambda: 3e4)
-    with (
-        pytest.raises(RefusedError, match=r"50 × 40 pixels, which takes 3\.2e-05 GB"),
-        opened_picture(tmp_path / "a.png"),
-    ):
-        pass
+    with pytest.raises(RefusedError, match=r"50 × 40 pixels, which takes 3\.2e-05 GB"):
+        read_image(tmp_path / "a.png", spacing=1.0)
 
 
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
