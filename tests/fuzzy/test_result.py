@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import Bounds, FailedError, Nature, RefusedError, Triangular
-from alphacut.fuzzy.result import Ends
 
 ALPHA = np.array([0.0, 1.0])
 
@@ -52,20 +51,22 @@ def test_cuts_that_are_not_nested_are_a_failure():
 @pytest.mark.parametrize("time", [None, np.array([0.0, 0.5, 1.0])])
 def test_attained_bounds_lie_inside_proved_ones_but_for_the_error_of_the_scheme(time):
     found = bounds(time=time)
-    outer = Ends(found.lower + 0.1, found.upper - 0.1)
+    outer = found.attained._replace(lower=found.lower + 0.1, upper=found.upper - 0.1)
     with pytest.raises(FailedError, match="attained bounds lie outside the proved ones: of y"):
         replace(found, outer=outer)
     replace(found, outer=outer, error=np.full(found.lower.shape, 0.2))
     proved = replace(found, nature=Nature.GUARANTEED)
     with pytest.raises(FailedError, match="attained bounds lie outside the proved ones: of y"):
-        replace(proved, inner=Ends(found.lower - 0.1, found.upper))
-    both = replace(proved, inner=Ends(found.lower + 0.1, found.upper - 0.1))
+        replace(proved, inner=found.attained._replace(lower=found.lower - 0.1))
+    both = replace(
+        proved, inner=found.attained._replace(lower=found.lower + 0.1, upper=found.upper - 0.1)
+    )
     assert (both.proved.lower == found.lower).all()
     assert (both.attained.upper < found.upper).all()
     # bounds may miss each other by a billionth of 16, the output's size, and by no more
-    replace(proved, inner=Ends(found.lower, found.upper + 0.5 * 16e-9))
+    replace(proved, inner=found.attained._replace(upper=found.upper + 0.5 * 16e-9))
     with pytest.raises(FailedError, match="lie outside"):
-        replace(proved, inner=Ends(found.lower, found.upper + 2 * 16e-9))
+        replace(proved, inner=found.attained._replace(upper=found.upper + 2 * 16e-9))
 
 
 def test_a_range_at_each_time_is_no_number():

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from alphacut.base.arrays import Array
+from alphacut.frame import LearnedInputs
 from alphacut.fuzzy import Nature
 from alphacut.io.files import as_json
 from alphacut.io.results import plain_name
 from alphacut.io.typed_json import from_document, to_document
+from tests.frame.identification.test_learned import LEARNED, REFUTED
 
 
 class Ends(NamedTuple):
@@ -105,3 +107,12 @@ def test_what_is_missing_is_named():
         from_document(Whole, damaged)
     with pytest.raises(ValueError, match=r"^the document"):
         from_document(Whole, [])
+
+
+@pytest.mark.parametrize("answer", [LEARNED, REFUTED])
+def test_a_document_of_what_was_learned_gives_the_same_answer(answer):
+    document = json.loads(as_json(to_document(answer)))
+    again = from_document(LearnedInputs, document)
+    assert as_json(to_document(again)) == as_json(to_document(answer))
+    assert again.is_refuted == answer.is_refuted
+    assert str(again) == str(answer)

@@ -1,16 +1,12 @@
-"""What was learned, as a table, as rows of numbers and as a document."""
+"""What was learned, as a table and as rows of numbers."""
 
 import csv
 import io
-import json
 
 import numpy as np
-import pytest
 
 from alphacut.frame import LearnedInputs, Prediction
 from alphacut.fuzzy.result import Ends
-from alphacut.io.files import as_json
-from alphacut.io.typed_json import from_document, to_document
 
 LEARNED = LearnedInputs(
     alpha=np.array([0.05, 1.0]),
@@ -51,12 +47,3 @@ def test_a_csv_file_has_the_rows_and_none_of_a_refuted_frame(tmp_path):
             _, *rows = csv.reader(file)
         assert [row[0] for row in rows] == [row["input or mode"] for row in answer.records()]
         assert answer.to_dataset().sizes.get("row", 0) == len(answer.records())
-
-
-@pytest.mark.parametrize("answer", [LEARNED, REFUTED])
-def test_a_document_gives_the_same_answer(answer):
-    document = json.loads(as_json(to_document(answer)))
-    again = from_document(LearnedInputs, document)
-    assert as_json(to_document(again)) == as_json(to_document(answer))
-    assert again.is_refuted == answer.is_refuted
-    assert str(again) == str(answer)
