@@ -27,12 +27,12 @@ def test_the_table_has_every_number_and_fails_beyond_a_twentieth(tmp_path, capsy
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_random_problem_said_otherwise_gives_no_contradiction(kind):
-    chance, of = np.random.default_rng(60), KINDS[kind]
+    chance, of = np.random.default_rng(62), KINDS[kind]
     relations = [x for x in of.relations if "processes" not in x.name]
     chosen = [relations[k] for k in chance.permutation(len(relations))[:3]]
     problem = of.drawn(chance)
-    if "workers" in problem:
-        problem["workers"] = 1
+    quicker = {"workers": 1, "nodes": 20}
+    problem |= {name: value for name, value in quicker.items() if name in problem}
     found = dict(of.checked(problem, chance, chosen))
     assert not {name: lines for name, lines in found.items() if lines}
 

@@ -21,7 +21,7 @@ OFTEN = ("normal", "uniform", "skewed beta", "Poisson 2", "coin 0.1")
 @pytest.mark.parametrize(
     ("law", "samples", "far"),
     [
-        *((law, 150, 6.0) for law in OFTEN),
+        *((law, 100, 6.0) for law in OFTEN),
         *(pytest.param(law, 1500, 4.5, marks=pytest.mark.slow) for law in LAWS),
     ],
 )

@@ -95,7 +95,7 @@ def test_what_values_do_not_decide_is_refused_at_the_joint_level():
 
 @pytest.mark.parametrize(
     ("links", "samples"),
-    [(4, 300), *(pytest.param(links, 600, marks=pytest.mark.slow) for links in (2, 5))],
+    [(4, 120), *(pytest.param(links, 600, marks=pytest.mark.slow) for links in (2, 5))],
 )
 def test_joint_coverage_holds_where_the_minimum_rule_fails(links, samples, rng):
     scores = jointly_held(links, samples, rng)
