@@ -22,8 +22,10 @@ SHORTEST_PERIOD = 2 * np.pi / np.sqrt(np.linalg.eigvalsh(STIFFNESS)[-1])
 PROOFS = [DualProof(slabs=2, steps=4, peaks=1.0, workers=1), Proof(tolerance=5e-2, workers=1)]
 
 
-@pytest.mark.parametrize("periods", [0.1, 1.0, 1.5])
-@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize(
+    ("load", "periods"),
+    [*((load, 0.1) for load in LOADS), *zip(LOADS, (1.5, 1.0, 1.0, 1.5), strict=True)],
+)
 @pytest.mark.parametrize("proof", PROOFS)
 def test_between_is_at_most_three_times_the_true_deviation(proof, load, periods):
     frame = StoreyFrame(
