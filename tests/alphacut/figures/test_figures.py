@@ -15,18 +15,15 @@ from alphacut.figures import answers, envelope, material
 from alphacut.figures.style import figure_style, prefix_axis
 from alphacut.frame import (
     Accelerogram,
-    Decision,
     Limit,
     Output,
     Peak,
     StoreyFrame,
+    decide,
     fragility,
     propagation,
 )
-from alphacut.frame.analyses.decision import LimitDecision
 from alphacut.fuzzy import Nature, Triangular
-from alphacut.fuzzy.result import Ends
-from alphacut.report.page import caption, named_words
 from tests.alphacut.small import summary_of, two_floors_run
 
 
@@ -44,16 +41,12 @@ def test_figures_are_drawn_once_and_anew_where_the_case_changed(two_floors, tmp_
     assert drawn.stat().st_mtime_ns > before
 
 
-def test_every_figure_has_both_forms_and_a_caption(two_floors):
+def test_every_figure_has_both_forms(two_floors):
     names = summary_of(two_floors)["figures"]
     stems = {name.removeprefix("figures/").rpartition(".")[0] for name in names}
     assert {"decision", "probability", "tolerances"} <= stems
     assert set(names) == {f"figures/{stem}.{kind}" for stem in stems for kind in ("svg", "png")}
     assert all((two_floors / name).stat().st_size > 1000 for name in names)
-    named = named_words()["figures"]
-    assert all(stem in named or stem.startswith("envelope-all-") for stem in stems)
-    assert caption("decision", named) == "Fuzzy peak of each limited output over its limit"
-    assert caption("fig28-envelope-E-5s-q1", named) == "Fig. 28: Envelope of q1, study E-5s"
 
 
 def image_dataset(young, shape=(4, 6)):
@@ -160,15 +153,10 @@ def test_numbers_and_bounds_are_drawn_with_their_own_ends():
 
 
 def test_a_limit_of_zero_leaves_room_for_the_bars_of_others():
-    limits = {}
-    for size in (0.0, 0.02):
-        bounds = [np.array([x]) for x in (0.01, 0.02, 0.0, 0.02, 0.0, 0.02)]
-        limits[f"{size}"] = LimitDecision(
-            output="q1", unit="m", limit=size, possibility=(0, 0), necessity=(0, 0),
-            margin=Ends(np.array([size - 0.02]), np.array([size - 0.01])), verdict="not exceeded",
-            from_level=0, nature=Nature.ESTIMATED, peak=Peak(np.zeros(1), *bounds, Nature.ESTIMATED),
-        )  # fmt: skip
-    (axes,) = answers.draw_decision(Decision(np.zeros(1), limits)).axes
+    bounds = [np.array([x]) for x in (0.01, 0.02, 0.0, 0.02, 0.0, 0.02)]
+    peak = Peak(np.zeros(1), *bounds, Nature.ESTIMATED, side="max")
+    limits = [Limit("q1", size, largest=True, event=f"{size}") for size in (0.0, 0.02)]
+    (axes,) = answers.draw_decision(decide({"max q1": peak}, limits)).axes
     assert max(abs(end) for end in axes.get_xlim()) < 3
 
 

@@ -1,26 +1,28 @@
-"""The page and the CSV files of a run: what they say, in which units, what they refuse to believe."""
+"""The page, the tables and the CSV files of a run: what they say, in which units and with which signs.
+
+Signs of limits and peaks are tested against motions drawn at random.
+"""
 
 import csv
 import json
 import re
 import shutil
+import subprocess
 from dataclasses import replace
+from html import unescape
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from alphacut import main
-from alphacut.base.number_text import range_text
-from alphacut.frame import Decision, Peak, SuitePeaks
-from alphacut.frame.analyses.decision import LimitDecision
-from alphacut.frame.analyses.limits import LimitResult
+from alphacut.base.number_text import Table, range_text
+from alphacut.frame import Limit, Peak, SuitePeaks, decide
 from alphacut.fuzzy import Nature, RefusedError
-from alphacut.fuzzy.result import Ends
 from alphacut.io.results import ResultsFolder
-from alphacut.report.page import render_page
+from alphacut.report.page import caption, named_words, render_page, render_template
 from alphacut.report.results import answers, comparison, drivers, peak_table, run_text
-from alphacut.report.tables import shown, write_csv, write_tables
+from alphacut.report.tables import frames, latex, shown, write_csv, write_tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import FrameResult, Parts, Summary
 from tests.alphacut.small import summary_of
@@ -46,6 +48,16 @@ def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(two_flo
     assert page.count("data:image/png;base64,") == len(drawn) > 3
     for words in ("Can or must limits be exceeded?", "How far may tolerances go?", "How probable"):
         assert page.count(words) == 1
+
+
+def test_every_figure_has_a_caption(two_floors):
+    named = named_words()["figures"]
+    stems = {name.rpartition(".")[0] for name in summary_of(two_floors)["figures"]}
+    stems = {stem.removeprefix("figures/") for stem in stems}
+    assert stems
+    assert all(stem in named or stem.startswith("envelope-all-") for stem in stems)
+    assert caption("decision", named) == "Fuzzy peak of each limited output over its limit"
+    assert caption("fig28-envelope-E-5s-q1", named) == "Fig. 28: Envelope of q1, study E-5s"
 
 
 def test_texts_of_the_case_are_no_markup(page):
@@ -99,13 +111,9 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
         "a3": ([1.0, 1.5, 2.0], [3.0, 2.5, 2.0]),
         "base_shear": ([1e4, 1e4, 2e4], [4e4, 3e4, 2e4]),
     }
-    limit = LimitDecision(
-        side="", output="drift1", unit="m", limit=0.02, possibility=(0, 0), necessity=(0, 0),
-        margin=Ends(np.zeros(1), np.zeros(1)), verdict="not exceeded", from_level=0, nature=Nature.ESTIMATED,
-        peak=None,
-    )  # fmt: skip
-    decision = Decision(alpha=np.array([0, 0.5, 1]), limits={"drift1": limit})
-    head, rows = peak_table(replace(peaks_of(**ends), decision=decision))
+    parts = peaks_of(**ends)
+    decision = decide({"drift1": parts.envelopes["all"].peak["drift1"]}, Limit("drift1", 0.02))
+    head, rows = peak_table(replace(parts, decision=decision))
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
     assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
     assert rows[0][5:] == ("20", "no")
@@ -291,5 +299,224 @@ def test_an_output_is_shown_in_the_unit_of_its_limit(shown_units):
     ],
 )
 def test_the_unit_of_a_limit_is_read_from_its_text(stated, limit, unit):
-    found = LimitResult(output="q1", unit="m", limit=limit, stated=stated).stated_unit
+    peak = peaks_of(q1=([0.0] * 3, [1.0] * 3)).envelopes["all"].peak["q1"]
+    answer = decide(
+        {"max q1": replace(peak, side="max")}, Limit("q1", limit, largest=True, stated=stated)
+    )
+    found = answer.limits["max q1"].stated_unit
     assert found == (None if unit is None else (unit[0], pytest.approx(unit[1])))
+
+
+LIMITS, LIMITS_OF_PEAK = 700, 8
+OUTPUTS = {"q1": "m", "a1": "m/s^2", "base_shear": "N"}
+PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+SI = {prefix + unit: x for prefix, x in PREFIXES.items() for unit in OUTPUTS.values()}
+SI |= {"": 1.0, "g": 9.80665}
+EXCEEDED = {"yes": "exceeded", "no": "not exceeded", "can be": "can be exceeded"}
+
+
+def quantity(text):
+    """The number of a text such as "−2.000 mm" in SI."""
+    number, _, unit = text.replace("\N{MINUS SIGN}", "-").partition(" ")
+    return float(number) * SI[unit]
+
+
+class Drawn:
+    """The peak of a side of random motions: its values, bounds of them, and limits in SI."""
+
+    def __init__(self, rng, output, side):
+        self.name, self.output, self.side = f"{side} {output}".strip(), output, side
+        size, middle = 10 ** rng.uniform(-2, 1.5), rng.choice([-2, -0.5, 0, 0.5, 2])
+        extremes = np.sort(size * (rng.normal(size=(6, 2)) + middle), axis=1)  # (motion, min, max)
+        magnitudes = np.abs(extremes).max(axis=1)
+        values = np.sort({"max": extremes[:, 1], "min": extremes[:, 0], "": magnitudes}[side])
+        self.outwards = -1 if side == "min" else 1
+        self.nearest, self.farthest = values[:: self.outwards][[0, -1]]
+        gap = size * rng.choice([0, 0.05]) * self.outwards
+        self.proved = [self.nearest - gap, self.farthest + gap]
+        if not side:
+            self.proved[0] = max(0.0, self.proved[0])
+        limits = rng.choice([*values, *self.proved], LIMITS_OF_PEAK)
+        limits += size * rng.normal(size=LIMITS_OF_PEAK) * rng.choice([0.01, 0.3])
+        # each once: a case refuses a limit that it states twice
+        self.limits = sorted({float(f"{x if side else abs(x):.7g}") for x in limits})
+
+    def limit(self, value):
+        """A limit of the peak, as a case states it."""
+        largest = {"max": True, "min": False, "": None}[self.side]
+        stated = f"{value!r} {OUTPUTS[self.output]}"
+        return Limit(self.output, value, largest=largest, stated=stated)
+
+    def verdict(self, limit):
+        """What is known of the limit, from the definitions of the words."""
+        nearest, farthest = (self.outwards * (x - limit) > 0 for x in self.proved)
+        if not farthest:
+            return "not exceeded"
+        is_reached = self.outwards * (self.farthest - limit) > 0
+        return "exceeded" if nearest else "can be exceeded" if is_reached else "undecided"
+
+
+def parts_of(drawn):
+    """Envelope and decision of the drawn bounds."""
+    peaks = {}
+    for x in drawn:
+        ends = {"lower": x.proved[0], "upper": x.proved[1], "error": 0.0, "reached": x.farthest}
+        ends |= {"least_lower": x.proved[0], "least_upper": x.nearest}
+        if x.side == "min":
+            ends |= {"lower": x.proved[1], "upper": x.proved[0]}
+        bounds = {end: np.array([value]) for end, value in ends.items()}
+        peaks[x.name] = Peak(np.zeros(1), **bounds, nature=Nature.GUARANTEED, side=x.side)
+    limits = [x.limit(value) for x in drawn for value in x.limits]
+    answer = decide(peaks, limits, units=OUTPUTS)
+    numbers = {key: {} for key in ("min", "max", "error")}
+    study = EnvelopeResult(
+        **numbers, fuzzy=("k1",), alpha=np.zeros(1), peak=peaks,
+        seconds=1.0, method="proof", nature=Nature.GUARANTEED, motions_tested=0,
+        units=OUTPUTS,
+    )  # fmt: skip
+    return Parts(envelopes={"all": study}, decision=answer)
+
+
+def check_answer(peak, limit, cells):
+    """A row of an answer: the limit's words, the verdict, margin, bound and reached value.
+
+    Texts are rounded to the side on which they stay true, by up to one unit of the fourth digit.
+    """
+    size = 1.1e-3 * sum(abs(x) for x in (*peak.proved, limit))
+    output = peak.output if peak.side else f"|{peak.output}|"
+    before = f"{peak.side} {output} {'≥' if peak.side == 'min' else '≤'} ".lstrip()
+    assert cells["limit"].startswith(before)
+    assert quantity(cells["limit"].removeprefix(before)) == pytest.approx(limit, abs=size)
+    assert cells["verdict"] == peak.verdict(limit)
+    margin = peak.outwards * (limit - peak.proved[1])
+    relation, bound = cells["bound of peak"].split(" ", 1)
+    assert relation == ("≥" if peak.side == "min" else "≤")
+    found = [quantity(x) for x in (cells["least margin"], bound, cells["peak reached"])]
+    assert found == pytest.approx([margin, peak.proved[1], peak.farthest], abs=size)
+    assert found[0] <= margin + 1e-9 * size
+    assert peak.outwards * (found[1] - peak.proved[1]) >= -1e-9 * size
+    assert peak.outwards * (found[2] - peak.farthest) <= 1e-9 * size
+
+
+def check_peak(peak, limit, cells):
+    """A row of the table of peaks: the range in order, what is reached, limit and verdict."""
+    factor = SI[cells["peak of"].rpartition(", ")[2]]
+    assert factor * quantity(cells["limit"]) == pytest.approx(limit, rel=1e-3)
+    assert EXCEEDED.get(cells["exceeded"], cells["exceeded"]) == peak.verdict(limit)
+    if not cells["α = 0"]:  # of further limits
+        return
+    ends, slack = sorted(peak.proved), 6e-3 * max(map(abs, peak.proved))
+    shown = [factor * quantity(x) for x in cells["α = 0"].split(" … ")]
+    assert shown[0] <= ends[0] + 1e-9 * slack
+    assert shown[-1] >= ends[1] - 1e-9 * slack
+    assert [shown[0], shown[-1]] == pytest.approx(ends, abs=slack)
+    reached = factor * quantity(cells["reached"])
+    assert reached == pytest.approx(peak.farthest, abs=slack)
+    assert peak.outwards * (reached - peak.farthest) <= 1e-9 * slack
+
+
+def tables_of_page(page):
+    """Rows of each table of a page, by the titles of its head."""
+    tables = []
+    for table in re.findall(r"<table>(.*?)</table>", page, re.DOTALL):
+        head, *rows = (
+            re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL)
+            for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)
+        )
+        tables.append([dict(zip(head, map(unescape, row), strict=True)) for row in rows])
+    return tables
+
+
+def rows_of_latex(text):
+    signs = {"$-$": "−", r"$\leq$": "≤", r"$\geq$": "≥", r"\dots{}": "…", r"\_": "_", r"\%": "%", "$^2$": "²"}  # fmt: skip
+    for sign, letter in signs.items():
+        text = text.replace(sign, letter)
+    text = text.replace(r"\textasciicircum ", "^").replace(r"\textmu{}", "µ")
+    text = text.replace(r"$\alpha$", "α")
+    rows = re.findall(r"^(.*) \\\\$", text, re.MULTILINE)
+    head, *rows = (row.split(" & ") for row in rows)
+    return [dict(zip(head, row, strict=True)) for row in rows]
+
+
+def test_limits_and_peaks_have_the_sign_that_they_were_given(tmp_path, rng):
+    kinds = [(output, side) for output in OUTPUTS for side in ("max", "min", "")]
+    for _ in range(LIMITS // (len(kinds) * LIMITS_OF_PEAK)):
+        drawn = [Drawn(rng, *kind) for kind in kinds]
+        limits = [(peak, limit) for peak in drawn for limit in peak.limits]
+        parts = parts_of(drawn)
+        of_limits, of_peaks = parts.decision.table(), peak_table(parts)
+        page = "".join(
+            render_template("comparison.html", title="", name="", about="", comparison=table)
+            for table in (of_peaks, of_limits)
+        )
+        lines = run_text(parts).splitlines()
+        written = "|".join(re.findall(r">([^<]*)</t[dh]>", page)) + "".join(lines)
+        assert "|−" in written
+        assert not re.search(r"(?<![\w.])-(?=[\d.])|(?<=\de)-(?=\d)|−0(?![.\d])", written)
+        for peak_rows, rows in (
+            (rows_of_latex(latex(of_peaks)), rows_of_latex(latex(of_limits))),
+            tables_of_page(page),
+        ):
+            assert rows[-1]["limit"] == "any of them"
+            assert len(peak_rows) == len(limits) == len(rows) - 1
+            for (peak, limit), peak_row, row in zip(limits, peak_rows, rows, strict=False):
+                check_peak(peak, limit, peak_row)
+                check_answer(peak, limit, row)
+                assert f"decision: {row['limit']}: {peak.verdict(limit)} (guaranteed)" in lines
+        write_csv({x: frames(parts)[x] for x in ("peaks", "decision")}, tmp_path)
+        numbers, answers = (
+            list(csv.DictReader((tmp_path / f"{x}.csv").read_text("utf-8").splitlines()))
+            for x in ("peaks", "decision")
+        )
+        for peak, number in zip(drawn, numbers, strict=True):
+            ends = [float(number[x]) for x in ("least peak", "greatest peak", "peak reached")]
+            assert ends == pytest.approx([*sorted(peak.proved), peak.farthest], rel=1e-9)
+        for (peak, limit), answer in zip(limits, answers, strict=False):
+            found = [float(answer[x]) for x in ("limit", "bound of peak", "peak reached")]
+            assert found == pytest.approx([limit, peak.proved[1], peak.farthest], rel=1e-9)
+            assert answer["verdict"] == peak.verdict(limit)
+
+
+WIDE_HEAD = ("output", *(f"α = {k / 20:g}: mean over records" for k in range(21)))
+WIDE_ROW = ("overturning_moment", *["1.234 … 2.345 MN*m"] * 21)
+A4 = 688  # px of 210 mm less both margins of 14 mm, at 96 px an inch
+MEASURED = """
+<p id="measured"></p><script>
+const box = document.querySelector(".scroll"), table = box.querySelector("table");
+const cells = [...table.querySelectorAll("td, th")];
+const cut = cells.filter((cell) => cell.scrollWidth > cell.clientWidth + 1).length;
+document.getElementById("measured").textContent = JSON.stringify({
+  table: table.getBoundingClientRect().right, page: document.documentElement.clientWidth, cut,
+  overflow: getComputedStyle(box).overflowX, scrolled: box.scrollWidth, width: box.clientWidth });
+</script></body>"""
+
+
+def measured(folder, *, printed):
+    """Places of a wide table in px, as chromium lays the page out on paper or on a screen."""
+    table = Table(WIDE_HEAD, [WIDE_ROW] * 3)
+    text = render_template("comparison.html", title="t", name="n", about="", comparison=table)
+    if printed:  # the rules of the paper, in a window as wide as the paper
+        text = text.replace("@media print", "@media all")
+    (folder / "page.html").write_text(text.replace("</body>", MEASURED), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder}/profile"]
+    size = f"--window-size={A4 if printed else 1000},900"
+    command = ["chromium", *options, size, "--dump-dom", (folder / "page.html").as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    return json.loads(re.search(r'id="measured">(.*?)</p>', dom)[1])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_a_wide_table_is_whole_on_paper(tmp_path):
+    found = measured(tmp_path, printed=True)
+    assert found["table"] <= found["page"] + 1
+    assert found["cut"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_a_wide_table_scrolls_on_the_screen(tmp_path):
+    found = measured(tmp_path, printed=False)
+    assert found["overflow"] == "auto"
+    assert found["scrolled"] >= found["width"]
+    assert found["width"] <= found["page"]
