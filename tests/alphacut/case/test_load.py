@@ -1,14 +1,21 @@
-"""A case is read once; every problem has its key, value and cure."""
+"""A case is read once; every problem has its key, value and cure.
+
+Sections and changes come first, then structures from matrices, then forces.
+"""
 
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
+import scipy.sparse
 
+from alphacut import main
 from alphacut.case.content import load
+from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope, peaks
 from alphacut.fuzzy import Interval, Triangular
-from tests.alphacut.small import CELL, FRAME, refusals
+from tests.alphacut.small import CELL, FRAME, refusals, written
 
 ROOT = Path(__file__).parents[3]
 
@@ -232,3 +239,269 @@ def test_fragility_of_columns_that_yield_is_of_magnitudes_and_has_a_largest_meas
     for refused in (["fragility.most=3"], [*changes, "fragility.limits=['max drift1 <= 9 mm']"]):
         (line,) = refusals(ROOT / "cases/suite.toml", *refused)
         assert re.search(r"fragility\.(most|limits)", line)
+
+
+MATRICES = """
+title = "Two storeys as matrices"
+stages = ["envelope"]
+[matrices]
+unknowns = ["1.x", "2.x"]
+mass = [["m", "masses.csv"]]
+stiffness = [["12*E*I*l^-3", "lower.mtx"], ["2*k2", "upper.npz:springs"]]
+damping_ratio = "2 %"
+direction = "x"
+accelerogram = "record.csv"
+[matrices.parameters]
+m = "20 t"
+E = "30 GPa ± 5 %"
+I = "2e-4 m^4"
+l = "3 m"
+k2 = "10 MN/m"
+[matrices.outputs]
+roof = { row = { "2.x" = 1.0 } }
+shear = { row = { "1.x" = 1.0 }, unit = "N", factor = "12*E*I*l^-3" }
+[envelope]
+fuzzy = ["E"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    np.savetxt(tmp_path / "masses.csv", np.diag([1.0, 0.5]), delimiter=",")
+    scipy.io.mmwrite(tmp_path / "lower.mtx", scipy.sparse.coo_matrix([[1.0, 0.0], [0.0, 0.0]]))
+    springs = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    np.savez(tmp_path / "upper.npz", springs=springs, other=np.eye(2))
+    (tmp_path / "short.csv").write_text("1,0\n")
+    np.save(tmp_path / "diagonal.npy", np.ones(2))
+    (tmp_path / "upper.csv").write_text("9,3\n0,4\n")
+    np.save(tmp_path / "zeros.npy", np.zeros((2, 2)))
+    times = 0.02 * np.arange(40)
+    rows = [f"{t:.2f},{np.sin(9 * t):.8f}" for t in times]
+    (tmp_path / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + "\n".join(rows))
+    return tmp_path
+
+
+def changed(folder, old="", new=""):
+    path = folder / "case.toml"
+    path.write_text(MATRICES.replace(old, new), encoding="utf-8")
+    return path
+
+
+def loaded(folder, old="", new=""):
+    return load(changed(folder, old, new)).content
+
+
+MODULI = np.linspace(28.5e9, 31.5e9, 5)[:, None]
+
+
+def test_matrices_and_the_storey_frame_move_alike(folder):
+    """Displacement of the roof and, with the factor of its member, the force of a storey."""
+    structure = loaded(folder).structure
+    by_matrices = LinearFlow(structure.model, ("E",), 1.0, 0.02, Exact()).values(MODULI)
+    frame = StoreyFrame(
+        masses=[20e3, 10e3],
+        stiffness=[12 * 30e9 * 2e-4 / 27, 20e6],
+        damping_ratio=0.02,
+        ground=structure.model.ground,
+        outputs=("q2", "shear1"),
+    )
+    stiffness = 12 * MODULI * 2e-4 / 27
+    by_storeys = LinearFlow(frame, ("k1",), 1.0, 0.02, Exact()).values(stiffness)
+    size = abs(by_storeys).max((0, 1))
+    assert (abs(by_matrices - by_storeys).max((0, 1)) < 1e-9 * size).all()
+    assert size[1] > 1e3
+    assert structure.inputs(["E"])["E"].support == (28.5e9, 31.5e9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"lower.mtx"', '"nothing.mtx"', "a file, from the folder"),
+        ("upper.npz:springs", "upper.npz", "one of springs, other"),
+        ("12*E*I*l^-3", "sin(E)", "a product of powers"),
+        ("12*E*I*l^-3", "E*J", "factor"),
+        ('row = { "2.x"', 'row = { "9.x"', "matrices.outputs.roof.row"),
+        ('direction = "x"', 'direction = "y"', "matrices.direction"),
+        ('.x"', '"', "name the unknowns NODE.DIRECTION, as 1.x"),
+        ('direction = "x"', 'direction = ["x", "y"]', "of a list make a table"),
+        ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
+        ('"lower.mtx"', '"short.csv"', "short.csv is of shape (1, 2); allowed: (2, 2); the case"),
+        ('"lower.mtx"', '"diagonal.npy"', "of a diagonal make a matrix, by numpy.diag"),
+        ('"lower.mtx"', '"upper.csv"', "upper.csv is not symmetric: [1.x, 2.x] is 3, [2.x, 1.x]"),
+        ('"lower.mtx"', '"zeros.npy"', "zeros.npy is zeros throughout"),
+        ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
+        (
+            "roof =",
+            '"roof drift" =',
+            "matrices.outputs is 'roof drift'; allowed: names of a letter",
+        ),
+        ("roof =", '"roof\\u001b[31m" =', "matrices.outputs is 'roof\\x1b[31m'"),
+        ("roof =", '"2nd" =', "matrices.outputs is '2nd'"),
+        ("roof =", '"" =', "matrices.outputs is ''"),
+        ('m = "20 t"', 'm = "20 t"\n"k 3" = 1', "matrices.parameters is 'k 3'"),
+        ('unit = "N"', 'unit = "N\\u001b[2J"', "unit of shear is 'N\\x1b[2J'"),
+        ('unit = "N"', 'unit = "kN"', "unit is kN; allowed: SI units, as m, N or N*m; write N;"),
+        ('{ row = { "2.x" = 1.0 } }', "{ }", "matrices.outputs.roof.row is missing"),
+    ],
+)
+def test_what_makes_no_structure_is_one_line(folder, old, new, message):
+    lines = refusals(changed(folder, old, new))
+    assert any(message in line for line in lines), lines
+
+
+def test_a_fuzzy_parameter_in_no_factor_is_doubted(folder):
+    section = loaded(folder, 'm = "20 t"', 'm = "20 t"\nmr = "1 ± 10 %"').structure_section
+    (doubt,) = section.warnings(None)
+    assert doubt.startswith("matrices.parameters.mr is in no factor")
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("roof <= 40 kN", "is a unit of force, and no unit of length"),
+        ("roof <= 40", "the unit is missing"),
+        ("shear <= 40 mm", "no unit of force"),
+        ("roof <= 40 mm", ""),
+    ],
+)
+def test_a_limit_is_in_the_unit_of_its_output(folder, limit, words):
+    section = f'step = "0.02 s"\n[decision]\nlimits = ["{limit}"]\n'
+    if words:
+        (line,) = refusals(changed(folder, 'step = "0.02 s"\n', section))
+        assert words in line
+    else:
+        content = loaded(folder, 'step = "0.02 s"\n', section)
+        (found,) = content.decision.limits_of(content.structure)
+        assert found.value == 0.04
+
+
+WIND = "time [s],force [kN]\n0,2\n0.5,-4\n1,3\n"
+IN_THE_WIND = """
+title = "Two floors in the wind"
+stages = ["envelope"]
+[frame]
+masses = ["10 t", "8 t"]
+stiffness = "9 MN/m"
+damping_ratio = "2 %"
+[[force]]
+history = "wind.csv, static"
+amplitude = { 1 = "1", 2 = "1 ± 10 %" }
+[[force]]
+history = "harmonic, 2 Hz, 90 deg, from 0.3 s"
+amplitude = { 2 = "[1, 2, 3] kN" }
+[[force]]
+history = "impulse"
+amplitude = { 1 = "0.4 kN s" }
+[envelope]
+fuzzy = ["F", "F2_2"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+"""
+
+
+def in_the_wind(folder, **changes):
+    (folder / "wind.csv").write_text(WIND, encoding="utf-8")
+    return written(folder, IN_THE_WIND, **changes)
+
+
+def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path):
+    structure = load(in_the_wind(tmp_path)).content.structure
+    assert structure.inputs(("F",)).keys() == {"F2", "F2_2"}
+    numbers = {name: structure.numbers[name].support for name in structure.model.force_names}
+    assert numbers == {"F1": (1.0, 1.0), "F2": (0.9, 1.1), "F2_2": (1e3, 3e3), "J1": (4e2, 4e2)}
+    wind, _, machine, hammer = structure.model.loads
+    np.testing.assert_allclose(wind.history.values([0.0, 0.25, 1.0, 9.0]), [2e3, -1e3, 0.0, 0.0])
+    assert wind.history.is_static
+    assert machine.history.values([0.29, 0.3]) == pytest.approx([0.0, 1.0])
+    assert hammer.history is None
+    units = {"F1": "", "F2": "", "F2_2": "N", "J1": "N*s", "m1": "kg"}  # no unit: factors of a file
+    assert {name: structure.input_unit(name) for name in units} == units
+
+
+MACHINE = """
+title = "A machine below resonance"
+stages = ["envelope"]
+[frame]
+masses = ["50 t"]
+stiffness = ["10 MN/m ± 1 %"]
+damping_ratio = "0 %"
+outputs = ["q1"]
+[[force]]
+history = "harmonic, 1.5 Hz"
+amplitude = { 1 = "10 kN" }
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "6 s"
+step = "0.01 s"
+"""
+
+
+@pytest.mark.parametrize(
+    "frequency", ["1.5 Hz", "9.42477796076938 rad/s", "90 rpm", "540 deg/s", "1.5 turn/s"]
+)
+def test_a_frequency_counts_turns_in_whatever_unit_it_is_given(tmp_path, capsys, frequency):
+    case = written(tmp_path, MACHINE, **{"1.5 Hz": frequency})
+    assert main(["check", str(case)]) == 0
+    assert "1.5 Hz, period 0.6667 s" in capsys.readouterr().out
+    (machine,) = load(case).content.structure.model.loads
+    assert machine.history.frequency == pytest.approx(3 * np.pi, rel=1e-14)
+
+
+def test_bounds_under_a_machine_in_turns_per_minute_hold_the_largest_displacement(tmp_path):
+    structure = load(written(tmp_path, MACHINE, **{"1.5 Hz": "90 rpm"})).content.structure
+    found = envelope(
+        structure.model, structure.inputs(("k1",)), alpha=(1,), duration=6.0, step=0.01
+    )
+    # q(t) = F/(m (ω² - Ω²)) (sin Ω t - Ω/ω sin ω t), without damping, at rest at t = 0
+    mass, force, turning, time = 50e3, 10e3, 2 * np.pi * 1.5, np.linspace(0.0, 6.0, 60001)
+    omega = np.sqrt(np.linspace(9.9e6, 10.1e6, 41) / mass)[:, None]
+    amplitude = force / (mass * (omega**2 - turning**2))
+    shape = np.sin(turning * time) - turning / omega * np.sin(omega * time)
+    largest = np.abs(amplitude * shape).max()
+    assert largest == pytest.approx(3.0055e-3, rel=1e-4)
+    assert largest <= peaks(found)["q1"].upper[0] <= 3.0095e-3
+    attained = np.maximum(found.inner.upper, -found.inner.lower).max()
+    assert 3.002e-3 <= attained <= largest
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('{ 2 = "[1, 2, 3] kN" }', '{ 3 = "1 kN" }', "force.amplitude is 3"),
+        ('"impulse"', '"drum"', "a file, from the folder"),
+        ('"impulse"', '"impulse, from 1 s"', "force[3].history is impulse, from 1 s"),
+        ('"0.4 kN s"', '"0.4 kN"', "force.amplitude.1 is N"),
+        (", 2 Hz, 90 deg", "", "force[2].history is harmonic"),
+        ("2 Hz", "2 m", "2 m"),
+        ("2 Hz", "2 s", "no unit of frequency"),
+        ("from 0.3 s", "static", "force[2].history"),
+        ("from 0.3 s", "from -1 s", "force[2]"),
+        ("from 0.3 s", "from 1 s", "force[2].history is from 1 s"),  # at the end of the motion
+        ('"wind.csv, static"', '"case.toml"', "case.toml, line"),
+        ('"1 ± 10 %"', '"3 lb"', "3 lb; allowed: a force"),
+        ('{ 1 = "0.4 kN s" }', "{}", "one floor or more"),
+    ],
+)
+def test_what_is_wrong_with_a_force_is_said_in_one_line(tmp_path, old, new, words):
+    (line,) = refusals(in_the_wind(tmp_path, **{old: new}))
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time [s],force [bar]\n0,1\n1,2\n", "line 1"),
+        ("time [s],force\n0,1\n1,x\n", "line 3"),
+        ("time [s],force\n0,0\n1,0\n", "zeros throughout"),
+        ("time [s],force\n0,1\n1,2\n1.5,2\n", "even steps"),
+    ],
+)
+def test_files_that_hold_no_force_are_refused_by_their_line(tmp_path, text, words):
+    (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
+    (line,) = refusals(written(tmp_path, IN_THE_WIND))
+    assert words in line

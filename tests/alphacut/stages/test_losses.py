@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import eigvals
 
-from alphacut.frame import MatrixStructure
-from alphacut.frame.structures.matrix import modal_energy_fractions
 from tests.alphacut.small import CELL, refusals, summary_of_run, written
 
 LOSSES = 'matrix_loss = "[1.4, 2, 2.6] %"\ninclusion_loss = "[0.35, 0.5, 0.65] %"\n'
@@ -70,30 +67,3 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, old, new, key, words):
     lines = refusals(written(tmp_path, CASE, **{old: new}))
     assert any(f": {key} is " in line for line in lines)
     assert any(words in line for line in lines)
-
-
-def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
-    """Against complex modes, whose distance is of third order in the loss factor."""
-    upper = np.array([[1.0, -1, 0], [-1, 2, -1], [0, -1, 1]]) * 4e6
-    ground = np.diag([9e6, 0, 0])
-    mass = np.diag([2e4, 1e4, 1e4, 0.0])
-    upper, ground = (np.pad(x, (0, 1)) for x in (upper, ground))
-    joined = np.zeros((4, 4))  # an unknown without mass on the roof
-    joined[2:, 2:] = np.array([[1, -1], [-1, 1.0]]) * 1e6
-    ground_of_it = np.diag([0, 0, 0, 2e5])
-    structure = MatrixStructure(
-        {"E": 1.0},
-        mass=[(1.0, mass)],
-        stiffness=[("E", upper), (1.0, ground), ("E", joined), (1.0, ground_of_it)],
-        observed={"roof": np.eye(4)[2]},
-    )
-    shares, gaps = modal_energy_fractions(structure, [0, 2]), []
-    for loss in (0.04, 0.02):
-        stiffness = (upper + joined) * (1 + 1j * loss) + ground + ground_of_it
-        a, b = np.ix_(range(3), range(3)), stiffness[3:, :3]
-        condensed = stiffness[a] - b.T @ b / stiffness[3, 3]
-        squared = np.sort(eigvals(condensed, mass[a]))
-        exact = np.sin(np.angle(squared) / 2)
-        gaps.append(abs(np.sin(np.arctan(loss * shares) / 2) / exact - 1).max())
-    assert gaps[0] < 1e-3
-    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2, abs=0.05)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import eigvals
 from scipy.sparse import coo_array
 
 from alphacut.frame import (
@@ -16,7 +17,7 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.structures.matrix import Monomial
+from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
 from alphacut.fuzzy import Interval, RefusedError
 
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
@@ -99,3 +100,60 @@ def test_a_matrix_of_the_other_sign_is_told_to_turn_it():
     with pytest.raises(RefusedError, match=r"negative diagonal in term 2; .* it seems to be −K"):
         signed_structure(mass=1.0, stiffness=-3.0)
     assert signed_structure(mass=1.0, stiffness=-0.5).size == 2  # a weight takes some stiffness
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1", 1.0), ("2*a", 6.0), ("a^2*b**-1", 4.5), ("b/a^2", 2 / 9), ("1e-3 * a / b", 1.5e-3)],
+)
+def test_monomials_are_read(text, value):
+    assert Monomial.parse(text)({"a": 3.0, "b": 2.0}) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "a+b",
+        "a^b",
+        "(a)",
+        "a**",
+        "__import__('os')",
+        "a*",
+        "a b",
+        "1/0",
+        "0^-1",
+        "9^999",
+        "1e999",
+    ],
+)
+def test_other_expressions_are_refused(text):
+    with pytest.raises(RefusedError):
+        Monomial.parse(text)
+
+
+def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
+    """Against complex modes, whose distance is of third order in the loss factor."""
+    upper = np.array([[1.0, -1, 0], [-1, 2, -1], [0, -1, 1]]) * 4e6
+    ground = np.diag([9e6, 0, 0])
+    mass = np.diag([2e4, 1e4, 1e4, 0.0])
+    upper, ground = (np.pad(x, (0, 1)) for x in (upper, ground))
+    joined = np.zeros((4, 4))  # an unknown without mass on the roof
+    joined[2:, 2:] = np.array([[1, -1], [-1, 1.0]]) * 1e6
+    ground_of_it = np.diag([0, 0, 0, 2e5])
+    structure = MatrixStructure(
+        {"E": 1.0},
+        mass=[(1.0, mass)],
+        stiffness=[("E", upper), (1.0, ground), ("E", joined), (1.0, ground_of_it)],
+        observed={"roof": np.eye(4)[2]},
+    )
+    shares, gaps = modal_energy_fractions(structure, [0, 2]), []
+    for loss in (0.04, 0.02):
+        stiffness = (upper + joined) * (1 + 1j * loss) + ground + ground_of_it
+        a, b = np.ix_(range(3), range(3)), stiffness[3:, :3]
+        condensed = stiffness[a] - b.T @ b / stiffness[3, 3]
+        squared = np.sort(eigvals(condensed, mass[a]))
+        exact = np.sin(np.angle(squared) / 2)
+        gaps.append(abs(np.sin(np.arctan(loss * shares) / 2) / exact - 1).max())
+    assert gaps[0] < 1e-3
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2, abs=0.05)
