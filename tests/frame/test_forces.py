@@ -23,12 +23,7 @@ from alphacut.frame import (
     UnprovedError,
     envelope,
 )
-from alphacut.frame.bounds.model_error import proved_error
-from alphacut.frame.boxes import boxes
 from alphacut.frame.dynamics.flow import trajectory
-from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.response.chord_deviation import load_deviation
-from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.verification.self_test import (
     ContradictionError,
@@ -216,17 +211,6 @@ def random_frame(rng):
     return frame, inputs | {name: Triangular(0.9 * amplitude, amplitude, 1.1 * amplitude)}
 
 
-def test_no_history_strays_farther_from_its_chords_than_is_said(rng):
-    for _ in range(60):
-        history, time = random_history(rng), np.arange(30) * rng.uniform(0.01, 0.2)
-        fraction = np.arange(1, 64)[:, None] / 64
-        values = history.values(time)
-        inside = history.values(time[:-1] + fraction * np.diff(time))
-        chord = values[:-1] + fraction * np.diff(values)
-        off = np.abs(inside - chord).max(0)
-        assert (off <= load_deviation(history, time)[1:] + 1e-9 * history.extremes[0]).all()
-
-
 CHANGES = {"start": 0.05, "phase": 0.3, "frequency": 0.5, "samples": 0.01}
 ALWAYS = 2
 """Random frames that are tested always; thirty in all are with `-m slow`."""
@@ -251,19 +235,6 @@ def test_a_right_proof_of_a_random_frame_agrees_with_its_judge_and_no_other_does
         other = replace(frame, loads=[replace(force, history=changed), *frame.loads[1:]])
         with pytest.raises(ContradictionError):
             with_motions_tested(found, other)
-
-
-def test_a_wrong_share_at_once_is_proved_to_be_no_better():
-    inputs = {"m1": Interval(1.9e3, 2.1e3), "F1": Interval(1.9e3, 2.1e3)}
-    frame = replace(FRAME, damping_ratio=None, rayleigh=(0.3, 1e-4))
-    flow, cuts = LinearFlow(frame, tuple(inputs), 2.0, 0.02, Exact()), boxes(inputs, (0,))
-    good = ModalModel.of_degree(flow, cuts, 6)
-    assert proved_error(good)[:, 3:5].max() < 1e-4
-    loads = [replace(x, share=x.share * 1.01) if isinstance(x, Direct) else x for x in good.loads]
-    bad, unit = replace(good, loads=tuple(loads)), np.array([[1.0, -1.0], [0.3, 0.9]])
-    missed = np.abs(bad.values(unit) - flow.values(cuts.to_physical(unit))).max(0)
-    assert missed.max() > 1e-3
-    assert (missed <= proved_error(bad) + 1e-12).all()
 
 
 STEPS = [0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, np.pi / 50, 0.1 / 3]
@@ -357,21 +328,6 @@ def test_derivatives_by_modes_are_those_of_the_steps(dampers: tuple[float, ...])
         a, b = getattr(found, name), getattr(by_steps, name)
         size = np.abs(b).max((-3, -2), keepdims=True)
         assert (np.abs(a - b) <= 1e-9 * size).all()
-
-
-def test_tables_of_the_modes_are_exact_under_any_record() -> None:
-    rng = np.random.default_rng(2)
-    for _ in range(10):
-        frame = replace(random_structure(rng), dampers=())
-        step = float(rng.choice(NODES))
-        cuts = boxes({"E": Interval(frame.modulus, 1.0001 * frame.modulus)}, (0,))
-        flow = LinearFlow(frame, ("E",), round(4 / step) * step, step, Exact())
-        model = ModalModel.of_degree(flow, cuts, 4)
-        truth = motion(replace(frame, modulus=1.0001 * frame.modulus), flow.time)
-        everywhere = (np.ones((truth.size, 1)), *map(np.ravel, np.indices(truth.shape)))
-        for values in (model.values(np.ones((1, 1)))[0], model.at(*everywhere)[0]):
-            wrong = np.abs(values.reshape(truth.shape) - truth).max(0)
-            assert (wrong < 1e-10 * np.abs(truth).max(0)).all()
 
 
 @pytest.mark.parametrize("turn", [1.99, 7.9, 31.0])

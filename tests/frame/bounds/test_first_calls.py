@@ -8,7 +8,6 @@ import pytest
 from numba._dispatcher import compute_fingerprint
 
 import alphacut.base.kernels
-from alphacut.base.threads import KernelThreads
 from alphacut.frame import DualProof, Proof, envelope
 from alphacut.fuzzy import Interval
 from tests.frame.bounds.test_parts import spring
@@ -57,14 +56,6 @@ def test_threads_of_proofs_bring_no_new_type_of_argument(calls, method):
     assert found.facts["parts"] > 1
     assert len(calls.known) >= 3
     assert calls.first_in_threads == []
-
-
-def test_kernels_are_called_before_there_are_threads():
-    threads = []
-    with KernelThreads(2, lambda: threads.append(current_thread())) as pool:
-        pool.submit(lambda: threads.append(current_thread())).result()
-    assert threads[0] is main_thread()
-    assert threads[1] is not main_thread()
 
 
 def test_all_pools_of_threads_in_the_rooms_call_kernels_before():

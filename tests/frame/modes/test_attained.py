@@ -8,14 +8,14 @@ import pytest
 
 from alphacut.frame import Accelerogram, DualProof, StoreyFrame, envelope
 from alphacut.frame.bounds.box import Box
-from alphacut.frame.modes import superposition
 from alphacut.frame.modes.superposition import _curvature_bound, modes_at
 from alphacut.frame.structures.linear import undamped_modes
 from alphacut.fuzzy import Interval
-from tests.frame.bounds.test_remainders import masses_on_springs
 from tests.frame.calculus.test_taylor_model import exact_value
-from tests.frame.response.test_duhamel import exact_response
+from tests.frame.modes.test_blocks import masses_on_springs
+from tests.frame.response.test_responses import exact_response
 
+UNDAMPED_MODES = "alphacut.frame.modes.superposition.undamped_modes"
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""
 
@@ -177,7 +177,7 @@ def test_what_wrong_modes_do_to_second_order_is_in_the_error(monkeypatch):
     box = Box(frame, ("k1",), time, 0.9 * centre, 1.1 * centre)
     given = np.zeros((1, 1)), np.ones(1, int), np.zeros(1, int)
     exact = box.exact_values(*given).value
-    monkeypatch.setattr(superposition, "undamped_modes", shifted(1e-5))
+    monkeypatch.setattr(UNDAMPED_MODES, shifted(1e-5))
     value, error = box.exact_values(*given)
     off = np.abs(value - exact)
     assert (off <= error).all()
@@ -196,7 +196,7 @@ def test_modes_that_are_wrong_on_purpose_are_off_by_their_error_at_most(
     unit = rng.uniform(-1, 1, (16, 6))
     node, output = rng.integers(1, 61, 16), np.arange(16) % 4
     exact = box.exact_values(unit, node, output).value
-    monkeypatch.setattr(superposition, "undamped_modes", shifted(turn, turn, rng))
+    monkeypatch.setattr(UNDAMPED_MODES, shifted(turn, turn, rng))
     value, error = box.exact_values(unit, node, output)
     shares = np.abs(value - exact) / error
     assert 1e-3 <= shares.max() <= 1

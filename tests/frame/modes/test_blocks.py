@@ -1,9 +1,10 @@
-"""Blocks of modes, what couples them and what the others add: nothing leaves the bounds.
+"""Modes and blocks of them, what couples them and what the others add: nothing leaves the bounds.
 
 Pieces of the dual proof that matter by themselves: enclosures of blocks, bounds of their coupling,
 and what is known of the truncated modes by sums alone, each also hardly wider than need be.
 """
 
+from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -11,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh, expm
 
-from alphacut.frame import Accelerogram, MatrixStructure, UnprovedError
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, UnprovedError
 from alphacut.frame.bounds.box import over_box, sources
+from alphacut.frame.bounds.level import LevelModels, OutputBounds
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
-from alphacut.frame.modes import truncated_modes
 from alphacut.frame.modes.blocks import (
     Block,
     CentredMatrices,
@@ -36,10 +37,12 @@ from alphacut.frame.modes.models import (
     ModeSelection,
     inverse_with_rounding,
 )
+from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import (
     WeightedSums,
     _coupling_factors,
     _largest_within_steps,
+    _with_best_weights,
     coupling_bounds,
     inverse_form,
     response_slopes,
@@ -155,6 +158,128 @@ def test_half_of_a_remainder_of_a_block_would_not_do():
         bound = getattr(block, name).remainder
         assert (value <= bound + 1e-12).all()
         assert (value > 0.2 * bound).any()
+
+
+def is_tight(off, bound):
+    return (TIGHT * bound < off).all() and (off <= bound * (1 + 1e-9)).all()
+
+
+def frame_in_box(storeys=4, width=0.05, **values):
+    """A frame with a stiffness and a mass a storey, and its structure over the box."""
+    own = StoreyFrame(
+        masses=(2e4,) * storeys,
+        stiffness=(3e7,) * storeys,
+        v0=(1.0,) * storeys,
+        damping_ratio=0.03,
+        **values,
+    )
+    names = tuple(f"{kind}{z + 1}" for kind in "km" for z in range(storeys))
+    centre = np.array([own.parameters[name] for name in names])
+    radius = width * centre
+    return own, names, centre, radius, over_box(own, names, centre - radius, centre + radius)
+
+
+def along(own, names, centre, radius, i):
+    """The structure where input i alone varies."""
+    only = radius * (np.arange(len(names)) == i)
+    return over_box(own, names, centre - only, centre + only)
+
+
+def all_blocks(structure):
+    """All blocks of a structure."""
+    centre, used = centred_matrices(structure.mass, structure.stiffness)
+    return enclose_subspaces(centre, used, centre.mode_count)
+
+
+def exact_modes(own, names, centre, radius, u):
+    """λ and shapes, those with 1 in their own coordinate of the middle, at points u."""
+    n = own.floors
+    below = np.eye(n) - np.eye(n, k=-1)
+
+    def pencil(values):
+        k, m = values[:n], values[n:]
+        return below.T @ np.diag(k) @ below, np.diag(m)
+
+    basis = eigh(*pencil(centre))[1]
+    for row in centre + radius * u:
+        K, M = pencil(row)
+        squared, shape = eigh(K, M)
+        seen = np.linalg.solve(basis, shape)
+        yield squared, seen / np.diag(seen)
+
+
+def test_half_of_a_remainder_of_eigenpairs_would_not_do():
+    own, names, centre, radius, _ = frame_in_box(2, 0.1)
+    first = (0, 0)
+    for i, entries in (
+        (0, {"eigenvalue_block": first, "shapes": (0, 1), "modal_mass": first}),
+        (2, {"mass_times_shapes": first}),
+    ):
+        found, u = all_blocks(along(own, names, centre, radius, i)), np.array([-1.0, 1])
+        ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
+        off = {name: [] for name in entries}
+        seen = found.centre.mass.at(u[:, None])
+        for at, M, (squared, shapes) in zip(u, seen, ends, strict=True):
+            x = shapes[:, :1].T
+            exact = {
+                "eigenvalue_block": squared[None],
+                "shapes": x,
+                "modal_mass": x @ M @ x.T,
+                "mass_times_shapes": x @ M,
+            }
+            for name, entry in entries.items():
+                value = getattr(found.blocks[0], name).at(np.array([[at]]))[0]
+                off[name].append(abs(exact[name][entry] - value[entry]))
+        for name, entry in entries.items():
+            assert is_tight(np.max(off[name]), getattr(found.blocks[0], name).remainder[entry])
+
+
+def test_half_of_the_range_of_eigenvalues_would_not_do():
+    own, _, _, _, structure = frame_in_box(1, 0.1)
+    p = {name: TaylorModel.constant(x, 1) for name, x in own.parameters.items()}
+    loose = {name: p[name].widened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
+    for one in (structure, classical_structure(own, p | loose)):
+        found = all_blocks(one)
+        assert found.eigenvalue_low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
+        assert found.eigenvalue_high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
+
+
+def masses_on_springs(stiffness):
+    """Three of them beside one another, and their sum."""
+    arrays = [np.diag(row) for row in np.eye(3)]
+    return MatrixStructure(
+        dict(zip("abc", stiffness, strict=True)),
+        mass=[(1.0, np.eye(3))],
+        stiffness=list(zip("abc", arrays, strict=True)),
+        observed={"sum": np.ones(3)},
+        v0=np.ones(3),
+    )
+
+
+def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
+    """Two of three masses on springs have the same frequency."""
+    centre, time, parts = np.array([1.0, 1.0, 3.0]), np.arange(0, 22.01, 0.25), 4
+    p = TaylorModel.variables(centre, 1e-3 * centre).widened(0.03 * centre)
+    springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
+    both = springs.initial_state.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
+    level = LevelModels.from_structure(
+        replace(springs, initial_state=both), Excitation({}, time, ("velocity",))
+    )
+    bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
+    for of_side in bounds:
+        of_side.improve(np.arange(len(time)), of_side.effort(240, 100, 1.0, 0.25))
+    omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
+    fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
+    waves = np.sin(omega * fine[:, None, None]) / omega
+    start, middle = np.array([0.1, 0.1, 0])[:, None], waves[:, :, 100].sum(-1)
+    for side, column in ((-1, 0), (1, 1)):
+        most = np.maximum((1 - start) * side * waves, (1 + start) * side * waves).max(-1).sum(-1)
+        off = (most - side * middle)[parts::parts]
+        assert is_tight(off, bounds[column].upper[1:] - side * middle[parts::parts])
+    off = np.abs(middle - np.interp(fine, time, middle[::parts]))[1:].reshape(-1, parts).max(1)
+    stray = level.interpolation_error()[1:, 0]
+    assert (off <= stray).all()
+    assert (off > TIGHT * stray).any()
 
 
 def free_motion(K, ratio, q0, v0, time):
@@ -278,15 +403,14 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
     )
     structure, centre, radius = over(own, {"a": 0.05, "b": 0.05})
     time = np.linspace(0, 3, 61)
-    best = truncated_modes._with_best_weights
 
     def chosen(structure, sums, ranges):
         narrow = [
             WeightedSums(C, size if k == power else size + 1e6) for k, (C, size) in enumerate(sums)
         ]
-        return best(structure, narrow, ranges)
+        return _with_best_weights(structure, narrow, ranges)
 
-    monkeypatch.setattr(truncated_modes, "_with_best_weights", chosen)
+    monkeypatch.setattr("alphacut.frame.modes.truncated_modes._with_best_weights", chosen)
     monkeypatch.setattr(
         "alphacut.frame.modes.models.required_modes",
         lambda *_, **__: ModeSelection(1, np.zeros(9)),

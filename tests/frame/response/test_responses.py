@@ -1,0 +1,585 @@
+"""Responses of single modes to a load: by forty steps or a million, in tables, and off their chords.
+
+They agree with fifty digits or a fine march. What is said of their rounding, of errors of tables
+and of what they stray from chords between nodes, over ranges of ω, g/ω and shares and with what
+modes cancel, is never too little, and hardly more than needed.
+"""
+
+from itertools import pairwise
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, History, UnprovedError
+from alphacut.frame.response.chord_deviation import (
+    Response,
+    line_deviations,
+    load_deviation,
+    narrowed_deviation,
+)
+from alphacut.frame.response.duhamel import (
+    ERROR_OF_INTEGRALS,
+    FROM_RECURRENCE,
+    absolute_moments,
+    error_of_integrals,
+    responses_at_nodes,
+    step_integrals,
+)
+from alphacut.frame.response.load_tables import LoadTable
+from alphacut.frame.response.oscillators import Grid, Oscillators, grid_over
+from tests.frame import test_forces
+
+UNIT = 2.0**-53
+"""Relative error of one rounding."""
+TIGHT = 0.5
+"""Share of a bound that something reaches: half the bound would be passed."""
+IDLE = 0.01
+"""Share of a bound of rounding that the largest of some errors reaches at least."""
+
+
+@pytest.fixture(autouse=True)
+def fifty_digits():
+    with mp.workdps(50):
+        yield
+
+
+def exact_integrals(sigma, h):
+    """J_0 … J_3 by 50 digits: by series, or by parts where |σ h| is large."""
+    sigma, h = mp.mpc(complex(sigma)), mp.mpf(h)
+    z = sigma * h
+    if abs(z) < 20:
+        powers = [z**k / mp.factorial(k) for k in range(100)]
+        phi = [mp.fsum(power / (n + 1 + k) for k, power in enumerate(powers)) for n in range(4)]
+    else:
+        phi = [(mp.exp(z) - 1) / z]
+        for n in range(1, 4):
+            phi.append((mp.exp(z) - n * phi[-1]) / z)
+    return [value * h ** (n + 1) for n, value in enumerate(phi)]
+
+
+def error_at(z, h):
+    """Errors of the integrals at σ h = z, in units of u hⁿ⁺¹/(n + 1), and of their bound."""
+    sigma, out = complex(z) / h, np.empty(4, complex)
+    step_integrals(sigma, h, out)
+    off = [
+        float(abs(mp.mpc(complex(value)) - true))
+        for value, true in zip(out, exact_integrals(sigma, h), strict=True)
+    ]
+    bound = error_of_integrals(sigma, h)
+    scaled = [(n + 1) * x / h ** (n + 1) / UNIT for n, x in enumerate(off)]
+    return scaled, max(off[0], 2 * off[1] / h) / bound
+
+
+@pytest.mark.parametrize("low", [-8, -1, 0, 1, 3])
+def test_integrals_of_a_step_agree_with_fifty_digits(low):
+    """Both sides of the change of rule, and undamped, damped and overdamped exponents."""
+    rng, errors, shares = np.random.default_rng(low + 8), [], []
+    for _ in range(15):
+        angle = np.pi * rng.choice([0.5, rng.uniform(0.5, 1), 1])
+        size = 10 ** rng.uniform(low, low + 1 if low > -8 else -1)
+        z = 1j * size if angle == np.pi / 2 else size * np.exp(1j * angle)
+        at_change = z / size * (FROM_RECURRENCE + rng.choice([-1e-12, 1e-12]))
+        for exponent in (z, at_change):
+            scaled, share = error_at(exponent, rng.uniform(0.01, 1))
+            errors.append(scaled)
+            shares.append(share)
+    assert np.max(errors) <= ERROR_OF_INTEGRALS
+    assert IDLE <= np.max(shares) <= 1
+
+
+def exact_response(sigma, ground, time):
+    """ρ at one time by 50 digits, interval by interval."""
+    sigma, time, h = mp.mpc(complex(sigma)), mp.mpf(float(time)), mp.mpf(ground.step)
+    samples, total = [mp.mpf(float(x)) for x in ground.samples], mp.mpc(0)
+    for i, (a, b) in enumerate(pairwise(samples)):
+        low, high = i * h, min(time, (i + 1) * h)
+        if low >= time:
+            break
+        slope = (b - a) / h
+        for sign, end in ((1, high), (-1, low)):
+            value = (a + slope * (end - low)) / sigma + slope / sigma**2
+            total -= sign * mp.exp(sigma * (time - end)) * value
+    return total
+
+
+CASES = {
+    "nodes at samples": (20.0, 0.03, 0.02, 0.02),
+    "nodes between samples": (9.0, 0.02, 0.02, 0.0071),
+    "undamped, five samples a node": (14.0, 0.0, 0.02, 0.1),
+    "product above 15": (103.0, 0.03, 0.25, 0.025),
+    "product 340": (1700.0, 0.05, 0.2, 0.013),
+    "a third of a step": (5.0, 0.3, 0.3, 0.1),
+}
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_responses_are_off_by_their_rounding_at_most(case):
+    omega, quotient, step, node_step = CASES[case]
+    rng = np.random.default_rng(len(case))
+    ground = Accelerogram(step, rng.normal(size=40))
+    time = np.arange(61) * node_step
+    sigma = omega * np.array([0.3, 1.0, 1.01]) * (-quotient + 1j)
+    value, error = responses_at_nodes(sigma, ground, time, 2)
+    nodes = rng.choice(np.arange(1, 61), 8, replace=False)
+    shares = [
+        float(
+            abs(mp.mpc(complex(value[0, node, s])) - exact_response(sigma[s], ground, time[node]))
+        )
+        / error[node, s]
+        for node in nodes
+        for s in range(3)
+    ]
+    assert IDLE <= np.max(shares) <= 1
+    named = responses_at_nodes(np.tile(sigma, (8, 1)), ground, time, 2, node=nodes)
+    assert np.allclose(named[0], value[:, nodes], rtol=1e-13, atol=0)
+    assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
+
+
+RECORD = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
+LATE = History.constant(start=0.3)  # 1 s between its samples, in which the fastest decay underflows
+
+
+@pytest.mark.parametrize(("ground", "node_step"), [(RECORD, 0.0371), (RECORD, 0.05), (LATE, 0.02)])
+def test_windows_begin_at_rest(ground, node_step):
+    """What arose before a window goes on freely; the rest is the window's own."""
+    time, sigma = np.arange(41) * node_step, np.array([-0.3 + 9j, 0.4 - 20j, -30 + 2j, -2e3 + 9j])
+    length = 7
+    whole, _ = responses_at_nodes(sigma, ground, time, 0)
+    (found,), _ = responses_at_nodes(sigma, ground, time, window=length)
+    before = (np.maximum(np.arange(41) - 1, 0) // length) * length
+    free = np.exp(sigma * (time - time[before])[:, None]) * whole[0, before]
+    assert np.allclose(found + free, whole[0], atol=1e-13 * np.abs(whole).max(), rtol=1e-11)
+    assert (found[0] == 0).all()
+
+
+def test_windows_late_in_a_long_interval_of_the_load_are_exact():
+    """Up to there a growing exponent of a window's series would have grown by e⁴⁵."""
+    time, sigma = np.arange(81) * 0.02, np.array([60 + 9j])
+    (found,), _ = responses_at_nodes(sigma, LATE, time, window=4)
+    elapsed = time[1:] - time[(np.arange(80) // 4) * 4]
+    exact = np.expm1(sigma[0] * elapsed) / sigma[0]
+    late = time[1:] > 0.5
+    assert np.allclose(found[1:, 0][late], exact[late], rtol=1e-12)
+
+
+@pytest.mark.parametrize("decay", [-0.4, 0.0, 3.0])
+def test_absolute_moments_are_bounds_and_sharp(decay):
+    """Against sums over 200 parts of a sample's interval; the integral of |f| itself is exact."""
+    time, part = np.array([0.0, 0.03, 0.4, 1.0, 1.37, 1.6]), RECORD.step / 200
+    bounds = absolute_moments(decay, RECORD, time)
+    for t, found in zip(time[1:], bounds.T[1:], strict=True):
+        tau = (np.arange(round(t / part)) + 0.5) * part
+        force = np.abs(RECORD.values(t - tau))
+        true = (tau ** np.arange(5)[:, None] * np.exp(-decay * tau) * force).sum(-1) * part
+        assert (found >= true * (1 - 1e-4)).all()
+        assert found[0] <= (1.001 if decay == 0 else 1.2) * true[0]
+
+
+@pytest.mark.parametrize("sigma", [np.nan, 2e3 + 3j, -1e12 + 1j, -1 + 1e10j])
+def test_exponents_out_of_range_are_refused(sigma):
+    ground, time = Accelerogram(0.1, np.ones(20)), np.arange(5) * 0.1
+    with pytest.raises(UnprovedError, match="take a shorter step of the record"):
+        responses_at_nodes(np.array([-1 + 2j, sigma]), ground, time, 0)
+    with pytest.raises(UnprovedError, match="allowed: 1e"):
+        responses_at_nodes(np.array([[sigma]]), ground, time, 1, node=np.array([2]))
+
+
+IDLE_OF_TABLES = 1e-7
+"""Share of a bound that the largest of some errors reaches at least; the bounds add up what only
+partly comes together, such as the errors of the points of a circle."""
+
+
+def exact_jet(response, rate):
+    """R, dR/dλ and d²R/dλ² by fifty digits and differences, which leave some twenty."""
+    step = mp.mpf(10) ** -12
+    below, at, above = (response(mp.mpc(complex(rate)) + step * k) for k in (-1, 0, 1))
+    return at, (above - below) / (2 * step), (above - 2 * at + below) / step**2
+
+
+def errors_and_bounds(table, history, response, rates, nodes):
+    """Errors of R and of its derivatives at some nodes, and their bounds, shape (3, N) each."""
+    growth = max(rates.real)
+    waves = absolute_moments(-growth, history, table.time)
+    bounds = table.errors(waves, growth)[:, nodes]
+    errors = np.zeros(bounds.shape)
+    for i, node in enumerate(nodes):
+        for rate in rates:
+            found = table.response(np.array([rate]), np.array([node]))[:, 0]
+            exact = exact_jet(lambda x, n=node: response(x, table.time[n]), rate)
+            off = [float(abs(mp.mpc(complex(x)) - y)) for x, y in zip(found, exact, strict=True)]
+            errors[:, i] = np.maximum(errors[:, i], off)
+    return errors, bounds, waves[:3, nodes]
+
+
+def exact_table_response(rate, history, time):
+    """R at one time by fifty digits, interval by interval of the load."""
+    total, h, time = mp.mpc(0), mp.mpf(history.step), mp.mpf(float(time))
+    samples = [mp.mpf(float(x)) for x in history.samples]
+    at_begin, factor = mp.exp(rate * time), mp.exp(-rate * h)  # exp(λ (t − s)) at its beginning
+    for i, (a, b) in enumerate(pairwise(samples)):
+        slope, length = (b - a) / h, min(time - i * h, h)
+        if length <= 0:
+            break
+        at_end = at_begin * factor if length == h else mp.mpf(1)
+        total += at_begin * (a / rate + slope / rate**2)
+        total -= at_end * ((a + slope * length) / rate + slope / rate**2)
+        at_begin = at_end
+    return total
+
+
+TABLES = {  # midpoint, largest deviation, step of the load, of the nodes, number of nodes
+    "one window": (-0.3 + 9j, 1.0, 0.02, 0.05, 41),
+    "windows": (-0.3 + 20j, 14.0, 0.02, 0.05, 41),
+    "narrow": (-0.3 + 9j, 1e-3, 0.05, 0.05, 41),
+    "a thousand samples a step": (-1.0 + 30j, 4.0, 0.0005, 0.5, 2),
+    "three steps in a sample": (-0.5 + 6j, 3.0, 0.7, 0.2, 16),
+}
+
+
+@pytest.mark.parametrize("case", list(TABLES))
+def test_tables_miss_the_integrals_by_their_errors_at_most(case, rng):
+    midpoint, deviation, step, node_step, count = TABLES[case]
+    time = np.arange(count) * node_step
+    history = Accelerogram(step, rng.normal(size=int(time[-1] / step) + 2))
+    table = LoadTable(history, time, midpoint, deviation)
+    rates = midpoint + deviation * np.array([1.0, -1j, 0.3 - 0.5j])
+    nodes = np.unique([1, count // 2, count - 1])
+    errors, bounds, _ = errors_and_bounds(
+        table, history, lambda rate, t: exact_table_response(rate, history, t), rates, nodes
+    )
+    assert (errors <= bounds).all()
+    assert (errors.max(axis=1) >= IDLE_OF_TABLES * bounds.max(axis=1)).all()
+
+
+@pytest.mark.parametrize("hertz", [0.0, 1.3])
+def test_a_harmonic_load_is_followed_through_windows(hertz):
+    """Of exp(λ t) less exp(± iΩ t); a growing exponent of a circle grows within its window alone."""
+    history = History.harmonic(hertz, 0.4) if hertz else History.constant()
+    time, midpoint, deviation = np.arange(121) * 0.05, -0.3 + 20j, 14.0
+    table = LoadTable(history, time, midpoint, deviation)
+    omega, phase = mp.mpf(history.frequency), mp.mpf(history.phase)
+
+    def response(rate, t):
+        t = mp.mpf(float(t))
+        total = mp.mpc(0)
+        if not hertz:
+            return (mp.exp(rate * t) - 1) / rate
+        for sign in (1, -1):
+            turn = mp.mpc(0, sign) * omega
+            start = mp.exp(mp.mpc(0, sign) * phase)
+            total += sign * start * (mp.exp(turn * t) - mp.exp(rate * t)) / (turn - rate)
+        return total / mp.mpc(0, 2)
+
+    rates = midpoint + deviation * np.array([1.0, -1.0, 1j, -1j])
+    nodes = np.array([1, 20, 120])
+    errors, bounds, waves = errors_and_bounds(table, history, response, rates, nodes)
+    assert (errors <= bounds).all()
+    assert (bounds <= 1e-8 * waves.max(axis=1, keepdims=True)).all()
+
+
+def test_rounding_of_a_record_with_a_million_samples_in_a_step_is_in_the_errors():
+    """Each sample multiplies R by the same rounded exponential: errors add up with their number.
+
+    What operations for each time node would add is less than the bound, and with the exponential of
+    most machines less than the error.
+    """
+    samples = 1_000_000
+    time = np.array([0.0, 1.0])
+    history = History(1.0 / samples, np.ones(samples + 1), is_held=True)
+    midpoint, deviation = 0.7j, 0.01
+    table = LoadTable(history, time, midpoint, deviation)
+
+    def response(rate, t):
+        return (mp.exp(rate * mp.mpf(float(t))) - 1) / rate
+
+    rates = midpoint + deviation * np.array([0.0, 1.0, -1.0, 1j, -1j])
+    errors, bounds, waves = errors_and_bounds(table, history, response, rates, np.array([1]))
+    assert (errors <= bounds).all()
+    by_nodes = 2 * UNIT * (8 * len(time) + 100) * np.exp(6.0)
+    assert bounds[0, 0] > by_nodes * waves[0, 0]
+
+
+# tables over grids of ω and g/ω
+
+TWO_TONES = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200) * 0.47))
+
+
+@pytest.mark.parametrize("source", ["load", "velocity", "start"])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
+    time = np.arange(0, 3, 0.05)
+    fine = Grid(np.linspace(9.5, 10.5, 41), np.linspace(0.02, 0.035, 41))
+    for omega, quotient in ((5, 1), (1, 10), (5, 10)):  # points of the fine grid in a cell
+        coarse = Grid(fine.omega[::omega], fine.quotient[::quotient])
+        table = Oscillators(coarse, {"load": TWO_TONES}, time, {order}).responses(source, order)
+        exact = Oscillators(fine, {"load": TWO_TONES}, time, {order}).responses(source, order).value
+        at = table.value
+        for axis, (own, grid) in enumerate(
+            ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
+        ):
+            weights = np.array([np.interp(own, grid, row) for row in np.eye(len(grid))])
+            at = np.moveaxis(np.tensordot(at, weights, (axis, 0)), -1, axis)
+        off = np.abs(at - exact).max((1, 2))
+        assert (off <= table.error + 1e-14).all()
+        if (omega, quotient) != (5, 10):
+            assert (off[1:] / table.error[1:]).max() > TIGHT
+
+
+def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
+    """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
+    grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
+    oscillators = Oscillators(grid, {}, np.zeros(1), range(3))
+    zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
+    error, _ = oscillators._error(zero, fourth, 0, start=True)
+    exact = 5 * h**4 / 384
+    assert exact <= error[0] <= 3 * exact
+
+
+def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
+    grid, parts = Grid(np.linspace(9.99, 10.01, 3), np.array([0, 1e-3])), 8
+    resonant = Accelerogram(0.02, np.sin(0.2 * np.arange(400)))
+    ended = Accelerogram(0.02, np.ones(51))  # between two nodes
+    cases = [(source, resonant, 0.05) for source in ("load", "velocity", "start")]
+    for source, ground, step in (*cases, ("load", ended, 0.01)):
+        coarse = step * (np.arange(120) + 0.5)
+        time = coarse[0] + step / parts * np.arange(119 * parts + 1)
+        for order in (0, 1, 2):
+            wide = Oscillators(grid, {"load": ground}, coarse, {order}).responses(source, order)
+            fine = Oscillators(grid, {"load": ground}, time, {order}).responses(source, order).value
+            assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
+            line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
+            off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
+            assert (off <= wide.line_deviation[1:] + 1e-13).all()
+            assert (off > TIGHT * wide.line_deviation[1:]).any()
+
+
+# chords between nodes
+
+
+def test_no_history_strays_farther_from_its_chords_than_is_said(rng):
+    for _ in range(60):
+        history, time = test_forces.random_history(rng), np.arange(30) * rng.uniform(0.01, 0.2)
+        fraction = np.arange(1, 64)[:, None] / 64
+        values = history.values(time)
+        inside = history.values(time[:-1] + fraction * np.diff(time))
+        chord = values[:-1] + fraction * np.diff(values)
+        off = np.abs(inside - chord).max(0)
+        assert (off <= load_deviation(history, time)[1:] + 1e-9 * history.extremes[0]).all()
+
+
+PARTS, TIME = 40, np.linspace(0, 1.2, 25)
+LOADS = {
+    "free": None,
+    "record": History(0.035, np.random.default_rng(3).normal(size=30)),
+    "sine": History.harmonic(2.0, 0.3, start=0.13),
+    "pulse": History(0.11, np.ones(4), start=0.07),
+}
+SHARES = np.array([1.0, -2.0, 1.0])
+
+
+def off_chords(sigma, load, order, kappa):
+    """Largest distance of Re κ σ^order ρ from the chord of each step, shape (steps,)."""
+    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
+    rho = np.exp(sigma * fine[:, None])
+    if load is not None:
+        rho = responses_at_nodes(sigma, load, fine, 0)[0][0]
+    y = (kappa * sigma**order * rho).real.sum(1)
+    return np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
+
+
+def modes_that_cancel(load, width, rng):
+    """Three modes of shares 1, −2 and 1; κ = share/(iω), and up to `width` of it besides.
+
+    Returns a function to draw what a motion strays by, the bound, and that by magnitude.
+    """
+    order, quotient = int(rng.integers(3)), rng.uniform(0, 0.1)
+    omega = rng.uniform(5, 30) * np.array([1, 1.15, 1.3])
+    ends = omega[:, None] * (1 + width * np.array([-1, 1]))
+    quotients, spread = (quotient, quotient * (1 + width)), width / omega / 3
+    responses = []
+    for k, share in enumerate(SHARES):
+        sigma = grid_over(tuple(ends[k]), quotients, (4, 2)).sigma
+        kappa = share / (1j * sigma.imag[None])
+        responses.append(Response(sigma, LOADS[load], order, kappa, np.full((2, 1), spread[k])))
+    by_magnitude = np.sum([x.line_deviation(TIME) for x in responses], axis=0)
+
+    def draw():
+        w, q = ends[:, 0] + np.ptp(ends, axis=1) * rng.random(3), rng.uniform(*quotients)
+        signs = rng.choice([-1, 1], (2, 3))
+        kappa = SHARES / (1j * w) + spread * (signs[0] + 1j * signs[1])
+        return off_chords((-q + 1j) * w, LOADS[load], order, kappa)
+
+    return draw, narrowed_deviation(responses, TIME, by_magnitude)[1:, 0], by_magnitude[1:, 0]
+
+
+@pytest.mark.parametrize("width", [0.0, 0.03, 0.3])
+@pytest.mark.parametrize("load", LOADS)
+def test_modes_that_cancel_stray_as_far_as_stated(load, width, rng):
+    draw, bound, by_magnitude = modes_that_cancel(load, width, rng)
+    assert (bound <= by_magnitude).all()
+    for _ in range(10):
+        assert (draw() <= bound * (1 + 1e-6) + 1e-15).all()
+
+
+def test_bounds_of_crisp_modes_that_cancel_are_about_what_they_stray(rng):
+    ratios = []
+    for load in [*LOADS] * 4:
+        draw, bound, _ = modes_that_cancel(load, 0.0, rng)
+        ratios.append(bound.max() / draw().max())
+    # one motion's own is up to 5
+    assert np.median(ratios) < 2
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("load", LOADS)
+def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
+    """Also while a load has hardly moved it yet."""
+    sigma = grid_over((omega := rng.uniform(5, 30),) * 2, (0.05, 0.05), (4, 2)).sigma
+    kappa = 1 / (1j * sigma.imag[None])
+    response = Response(sigma, LOADS[load], order, kappa, np.zeros((2, 1)))
+    bound = response.line_deviation(TIME)[1:, 0]
+    off = off_chords(np.array([-0.05 + 1j]) * omega, LOADS[load], order, 1 / (1j * omega))
+    assert (off <= bound * (1 + 1e-9) + 1e-15).all()
+
+
+@pytest.mark.parametrize(
+    ("spread", "fall"), [((0, 0), 0), ((0, 0), 1), ((0.01, 0), 0), ((0, 0.01), 0)]
+)
+@pytest.mark.parametrize("load", LOADS)
+def test_values_off_chords_lie_in_their_ranges(load, spread, fall, rng):
+    """Over a coarse grid, near whose end κ may `fall`, or of κ that is off at one point."""
+    order, parts, kappa, is_coarse = int(rng.integers(3)), 4, 0.3 + 1j, not any(spread)
+    w, q = rng.uniform(9, 15) * np.array([1, 1.2]), rng.uniform(0, 0.05) * np.array([1, 3])
+    if not is_coarse:
+        w[1], q[1] = w[0], q[0]
+    nodes = np.linspace(TIME[0], TIME[-1], parts * (len(TIME) - 1) + 1)
+    sigma = grid_over(tuple(w), tuple(q), (2, 2)).sigma
+    off = np.array(spread)[:, None]
+    corners = np.full((1, 2, 2), kappa) * [1, 1 - fall]
+    response = Response(sigma, LOADS[load], order, corners, off)
+    low, high = (x.ravel() for x in response.off_chords(nodes, parts))
+    shares = np.linspace(0, 1, 9)
+    at = ((-(q[0] + np.ptp(q) * shares[:, None]) + 1j) * (w[0] + np.ptp(w) * shares)).ravel()
+    kappa = np.tile(kappa * (1 - fall * shares**20), 9)
+    rho = np.exp(at * nodes[:, None])
+    if LOADS[load] is not None:
+        rho = responses_at_nodes(at, LOADS[load], nodes, 0)[0][0]
+    G = at**order * rho
+    G -= np.array([np.interp(nodes, TIME, x) for x in G[::parts].T]).T
+    more = off[0] * np.abs(G.real) + off[1] * np.abs(G.imag)
+    assert (low <= ((kappa * G).real - more).min(1) + 1e-15).all()
+    assert (high >= ((kappa * G).real + more).max(1) - 1e-15).all()
+
+
+@pytest.mark.parametrize("samples_in_step", [1, PARTS])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, samples_in_step, rng):
+    """A mode strays most at a frequency between the grid's two, in which it hardly resonates.
+
+    Where the load has many samples within a step, the bound consists of what the response is off
+    the chord of the step there, and of what that may be between the frequencies. Where it has none,
+    it is made of the size of the response at the beginning of the step.
+    """
+    middle = rng.uniform(28, 32)
+    step = (TIME[1] - TIME[0]) / samples_in_step
+    samples = np.sin(middle * np.arange(0.0, TIME[-1] + step, step))
+    load = History(step, samples)
+    # at the end the response at the grid's frequencies has beaten down to almost nothing
+    width = rng.uniform(0.9, 1.05) * 2 * np.pi / (TIME[-1] * middle)
+    sigma = grid_over((middle * (1 - width), middle * (1 + width)), (0.0, 0.0), (2, 1)).sigma
+    response = Response(sigma, load, order, 1 / (1j * sigma.imag[None]), np.zeros((2, 1)))
+    bound = response.line_deviation(TIME)[1:, 0]
+    fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
+    for omega in middle * np.linspace(1 - width, 1 + width, 11):
+        sigma = np.array([1j * omega])
+        rho = responses_at_nodes(sigma, load, fine, 0)[0][0, :, 0]
+        y = (sigma**order * rho).imag / omega
+        off = np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
+        assert (off <= bound * (1 + 1e-9) + 1e-15).all()
+
+
+def test_values_off_chords_between_two_points_of_a_grid_are_in_their_range(rng):
+    """Of free oscillation, exp(i ω t) off its chord is a phase at late times, a cosine with κ.
+
+    With κ turned so that the cosine is highest between the two frequencies of the grid, where each
+    value of the grid is smaller by (h t)²/8 of it; h is the distance of the frequencies.
+    """
+    omega, parts = rng.uniform(8, 12), 4
+    nodes = rng.uniform(60, 100) + np.linspace(0.0, 0.4, parts + 1)
+    late = nodes[parts // 2]
+    h = rng.uniform(0.1, 0.3) / late
+    chord = np.interp(np.arange(parts + 1), [0, parts], [0.0, 1.0])
+
+    def off_the_chord(omega):
+        motion = np.exp(1j * omega * nodes)
+        return motion - (1 - chord) * motion[0] - chord * motion[-1]
+
+    kappa = np.exp(-1j * np.angle(off_the_chord(omega)[parts // 2]))
+    sigma = grid_over((omega - h / 2, omega + h / 2), (0.0, 0.0), (2, 1)).sigma
+    response = Response(sigma, None, 0, np.full((1, *sigma.shape), kappa), np.zeros((2, 1)))
+    low, high = response.off_chords(nodes, parts)
+    for at in omega + h * np.linspace(-0.5, 0.5, 21):
+        off = (kappa * off_the_chord(at)).real
+        assert (low[:, 0] <= off + 1e-12).all()
+        assert (off - 1e-12 <= high[:, 0]).all()
+
+
+def samples_that_vanish_on_a_grid(functionals, at_middle):
+    """Samples of a load for which complex numbers linear in them vanish, (count, N), and one not.
+
+    Of all such samples those for which the number `at_middle` (N,) is largest.
+    """
+    rows = np.concatenate([functionals.real, functionals.imag])
+    null_space = np.linalg.svd(rows)[2][len(rows) :]
+    found = null_space.T @ (null_space @ at_middle.real)
+    return found / np.abs(found).max()
+
+
+def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(rng):
+    """Nothing is read at the two frequencies of the grid: its fourth derivative alone bounds it."""
+    omega, width, parts, step = rng.uniform(15, 25), rng.uniform(0.05, 0.15), 4, TIME[1] - TIME[0]
+    ends = omega * np.array([1 - width, 1 + width])
+    sigma = grid_over(tuple(ends), (0.0, 0.0), (2, 1)).sigma
+    points = 1j * np.array([*sigma[0].imag, omega])
+    nodes = np.linspace(TIME[0], TIME[-1], parts * (len(TIME) - 1) + 1)
+    kinds = {"off the chord": [], "free in the step": []}
+    for sample in np.eye(len(TIME)):
+        load = History(step, sample)
+        rho, _ = responses_at_nodes(points, load, nodes, 2)  # with two derivatives, (3, T, 3)
+        middle = rho[:, -3] - (rho[:, -5] + rho[:, -1]) / 2
+        kinds["off the chord"].append(middle)
+        # A = ρ + a/σ + b/σ² at the beginning of the last step, with its second derivative
+        a, b = sample[-2], (sample[-1] - sample[-2]) / step
+        value = rho[0, -5] + a / points + b / points**2
+        second = rho[2, -5] + 2 * a / points**3 + 6 * b / points**4
+        kinds["free in the step"].append(np.stack([value, value, second]))
+    for kind, columns in kinds.items():
+        values = np.stack(columns, -1)  # (value, slope, curvature; points; samples)
+        on_grid = np.concatenate([values[0, :2], values[2, :2]])
+        load = History(step, samples_that_vanish_on_a_grid(on_grid, values[0, 2]))
+        kappa = np.full((1, *sigma.shape), np.exp(-1j * np.angle(values[0, 2] @ load.samples)))
+        response = Response(sigma, load, 0, kappa, np.zeros((2, 1)))
+        fine = np.linspace(TIME[-2], TIME[-1], 41)
+        rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0][0, -41:, 0]
+        off = (kappa[0, 0, 0] * (rho - np.linspace(rho[0], rho[-1], 41))).real
+        assert np.abs(off).max() > 1e-6 * np.abs(rho).max()
+        if kind == "off the chord":
+            low, high = response.off_chords(nodes, parts)
+            assert low[-3, 0] <= off[20] <= high[-3, 0]
+        else:
+            assert np.abs(off).max() <= response.line_deviation(TIME)[-1, 0]
+
+
+def test_the_bend_of_a_harmonic_force_counts_where_its_pieces_end_on_the_line(rng):
+    for _ in range(40):
+        omega = 10 ** rng.uniform(-1, 2)
+        step, count = rng.uniform(0.01, 0.45) / omega, int(rng.integers(1, 60))
+        force = History.harmonic(omega / 2 / np.pi, rng.uniform(0, 6))
+        time = np.arange(count + 1) * step
+        row = (-0.01 + 1j) * np.array([[0.01 * omega, 0.0101 * omega]])
+        sigma = np.vstack([row, row * 1.0001])
+        bound = line_deviations(sigma, force, time, (2,), is_force=True)[2][1].max()
+        fine = np.linspace(0, time[-1], 40 * count + 1)
+        chord = np.interp(fine, time, force.values(time))
+        assert bound >= np.abs(force.values(fine) - chord).max()
