@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import io
 import os
 import re
 import resource
@@ -20,6 +21,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,6 +29,7 @@ from zlib import crc32
 
 import numpy as np
 
+from alphacut import main as run_command
 from alphacut.frame import read_matrix, read_modes, read_record
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
@@ -339,15 +342,15 @@ def _volumes() -> list[Format]:
 
 
 def _texts() -> list[Format]:
-    from alphacut.case.content import load
     from alphacut.frame.records.tables import read_force_history
-    from alphacut.io.files import BadInput
 
-    def read_case(path: Path) -> object:
-        try:
-            return load(path)
-        except BadInput as error:
-            raise RefusedError("case", str(error), "") from None
+    def read_case(path: Path) -> None:
+        told = io.StringIO()
+        with redirect_stdout(told), redirect_stderr(told):
+            status = run_command(["check", str(path), "--quiet"])
+        assert "is an error of this program" not in told.getvalue()
+        if status:
+            raise RefusedError("case", told.getvalue(), "")
 
     force = "time [s],force [kN]\n" + "".join(f"{k / 10},{k % 7}\n" for k in range(50))
     circles = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n"

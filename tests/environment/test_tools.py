@@ -12,19 +12,10 @@ import scipy.io
 
 from alphacut.frame import read_matrix
 from alphacut.fuzzy import RefusedError
-from alphacut.io.quantity import parse_number
 from alphacut.rve import read_image
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "tools.md"
-
-
-def test_pint_s_yarn_count_and_gallon_are_no_moment_and_no_acceleration():
-    with pytest.raises(ValueError, match="no unit of moment"):
-        parse_number("12 kNm", "N*m")
-    assert parse_number("12 kN m", "N*m") == 12e3
-    assert parse_number("98 gal", "m/s^2") == parse_number("0.98 m/s^2", "m/s^2")
-    assert parse_number("1 g", "m/s^2") == 9.80665
 
 
 @pytest.mark.parametrize("rows", [99, 100])
@@ -107,39 +98,6 @@ with square.open_gmsh() as gmsh:
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, env=variables, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1.0", "1e-08"]
-
-
-def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option(tmp_path):
-    pytest.importorskip("alphacut.rve.fenicsx")
-    from alphacut.rve.mesh import square
-    from alphacut.rve.mesh.file import read_prisms
-    from alphacut.rve.mesh.msh import parse_msh
-    from alphacut.rve.mesh.periodicity import MeshError
-
-    with square.open_gmsh() as gmsh:
-        base = gmsh.model.occ.addRectangle(-1, -1, 0, 2, 2)
-        made = gmsh.model.occ.extrude([(2, base)], 0, 0, 1, numElements=[1], recombine=True)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [tag for dim, tag in made if dim == 3], name="matrix")
-        gmsh.option.setNumber("Mesh.ElementOrder", 2)
-        gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
-        gmsh.model.mesh.generate(3)
-        gmsh.write(str(tmp_path / "cell.msh"))
-    with pytest.raises(MeshError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
-        read_prisms(parse_msh((tmp_path / "cell.msh").read_bytes()))
-
-
-def test_a_matrix_refuses_a_place_outside_of_its_pattern():
-    pytest.importorskip("alphacut.rve.fenicsx")
-    from alphacut.rve.fenicsx import MPI, PETSc
-    from alphacut.rve.solver.numbering import Elimination
-
-    pairs = np.array([[0, 1], [2, 3]])  # two cells without a common unknown
-    matrix = Elimination(np.arange(4), pairs, range(8), 8, MPI.COMM_SELF).matrix
-    matrix.setValue(0, 3, 1.0)
-    matrix.assemble()
-    with pytest.raises(PETSc.Error):
-        matrix.setValue(0, 7, 1.0)
 
 
 def test_every_row_names_a_test_or_a_script_that_exists():

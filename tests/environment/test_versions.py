@@ -1,5 +1,6 @@
 """Debian's packages and one wheel that holds several: their versions, and HDF5 beside theirs."""
 
+import json
 import os
 import subprocess
 import sys
@@ -9,7 +10,8 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.io.provenance import versions
+from alphacut import main
+from tests.alphacut.small import CELL, written
 
 
 def test_results_and_xdmf_are_written_after_dolfinx_was_imported(tmp_path):
@@ -26,9 +28,11 @@ with h5py.File("a.h5", "w") as file:
     subprocess.run(command, check=True, cwd=tmp_path, env=os.environ | folder)
 
 
-def test_dolfinx_and_petsc4py_are_named_however_they_were_installed():
+def test_dolfinx_and_petsc4py_are_named_however_they_were_installed(tmp_path, capfd):
     import dolfinx
     import petsc4py
 
-    assert versions()["fenics-dolfinx"].removesuffix(".0") in dolfinx.__version__
-    assert versions()["petsc4py"] == petsc4py.__version__
+    assert main(["cell", str(written(tmp_path, CELL)), "--quiet", "--json", "-"]) == 0
+    versions = json.loads(capfd.readouterr().out)["versions"]
+    assert versions["fenics-dolfinx"].removesuffix(".0") in dolfinx.__version__
+    assert versions["petsc4py"] == petsc4py.__version__

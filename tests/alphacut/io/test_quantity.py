@@ -198,3 +198,11 @@ def test_common_units_are_what_pint_says(si):
         assert registry().Quantity(10**-power if power < 0 else 1, unit) == registry().Quantity(
             1 if power < 0 else 10**power, si
         )
+
+
+def test_pint_s_yarn_count_and_gallon_are_no_moment_and_no_acceleration():
+    with pytest.raises(ValueError, match="no unit of moment"):
+        parse_number("12 kNm", "N*m")
+    assert parse_number("12 kN m", "N*m") == 12e3
+    assert parse_number("98 gal", "m/s^2") == parse_number("0.98 m/s^2", "m/s^2")
+    assert parse_number("1 g", "m/s^2") == 9.80665

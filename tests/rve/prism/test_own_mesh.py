@@ -410,3 +410,16 @@ def centres(grid):
 def test_refine_is_a_bool():
     with pytest.raises(RefusedError, match="refine is 'no'; allowed: True or False"):
         MeshModel("own.msh", refine="no")
+
+
+def test_complete_quadratic_prisms_of_gmsh_are_refused_with_its_own_option(tmp_path, gmsh):
+    base = gmsh.model.occ.addRectangle(-1, -1, 0, 2, 2)
+    made = gmsh.model.occ.extrude([(2, base)], 0, 0, 1, numElements=[1], recombine=True)
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(3, [tag for dim, tag in made if dim == 3], name="matrix")
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
+    gmsh.model.mesh.generate(3)
+    gmsh.write(str(tmp_path / "cell.msh"))
+    with pytest.raises(FailedError, match=r"Prism 18.*SecondOrderIncomplete = 1"):
+        grid_of(tmp_path / "cell.msh")

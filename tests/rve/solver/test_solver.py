@@ -9,7 +9,8 @@ pytest.importorskip("alphacut.rve.fenicsx")
 from petsc4py import PETSc
 
 from alphacut.rve import Phase, PrismModel
-from alphacut.rve.fenicsx import option_is_used
+from alphacut.rve.fenicsx import MPI, option_is_used
+from alphacut.rve.solver.numbering import Elimination
 from alphacut.stochastic import HermiteMap
 
 CRISP = HermiteMap(0.5, 0, 0.5, 0)
@@ -84,3 +85,12 @@ def test_options_of_the_caller_hold_and_stay(problem):
     finally:
         database.delValue("rve_ksp_rtol")
         database.delValue("rve_pc_type")
+
+
+def test_a_matrix_refuses_a_place_outside_of_its_pattern():
+    pairs = np.array([[0, 1], [2, 3]])  # two cells without a common unknown
+    matrix = Elimination(np.arange(4), pairs, range(8), 8, MPI.COMM_SELF).matrix
+    matrix.setValue(0, 3, 1.0)
+    matrix.assemble()
+    with pytest.raises(PETSc.Error):
+        matrix.setValue(0, 7, 1.0)
