@@ -9,13 +9,12 @@ import pytest
 
 from alphacut import main
 from alphacut.case.content import load
-from alphacut.case.microstructure import PackingSection
 from alphacut.fuzzy import FailedError, Nature, RefusedError
 from alphacut.rve.fuzzy_cell import CellSamples, FuzzyCell, require_consistent
 from alphacut.stages.cell import CellProblem, require_bounds
 from alphacut.stages.modulus import solved
 from tests.alphacut.case.test_load import fraction_case
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, refusals, written
 
 MODELS = {
     "series": (),
@@ -89,12 +88,22 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
             require_bounds((outside, outside), bounds, "spheres")
 
 
+PACKING = """
+[microstructure]
+seed = 1
+[microstructure.packing]
+particles = 20
+fraction = 0.83
+smallest_radius = "1 mm"
+largest_radius = "2 mm"
+"""
+
+
 @pytest.mark.parametrize(("shape", "densest"), [("spheres", 0.58), ("cylinders", 0.82)])
-def test_a_packing_that_is_too_dense_names_the_cell_of_that_fraction(shape, densest):
-    section = PackingSection(
-        particles=20, fraction=0.83, smallest_radius="1 mm", largest_radius="2 mm"
-    )
-    with pytest.raises(RefusedError) as refused:
-        section.require_readable(spheres=shape == "spheres")
-    assert f"up to {densest}" in str(refused.value)
-    assert "set cell.fraction = 0.83" in str(refused.value)
+def test_a_packing_that_is_too_dense_names_the_cell_of_that_fraction(tmp_path, shape, densest):
+    text = fraction_case(shape, 0.3).replace("fraction = 0.3\n", "") + PACKING
+    text = text.replace('["modulus"]', '["microstructure", "modulus"]')
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    (line,) = refusals(tmp_path / "case.toml")
+    assert f"up to {densest}" in line
+    assert "set cell.fraction = 0.83" in line

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import FunctionType
 
-import numpy as np
 import pytest
 import xarray
 
@@ -14,16 +13,11 @@ import alphacut
 from alphacut import main
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import load
-from alphacut.frame import Peak
-from alphacut.frame.analyses.peaks import mirrored
-from alphacut.fuzzy import FailedError, Nature, RefusedError
-from alphacut.io.files import as_json
+from alphacut.fuzzy import FailedError
 from alphacut.io.results import ResultsFolder
-from alphacut.io.typed_json import from_document, to_document
 from alphacut.stages import envelope
 from alphacut.stages.store import RunProgress, Stage, StageResult, StageStore
-from alphacut.stages.summary import Summary
-from tests.alphacut.small import CELL, written
+from tests.alphacut.small import CELL, summary_of, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
 
@@ -104,35 +98,17 @@ def test_fingerprints_see_every_input(tmp_path):
     assert key() == key("title=other")
 
 
-def test_a_borrowed_folder_is_not_believed(tmp_path):
+def test_a_borrowed_folder_is_not_believed(tmp_path, capfd):
     folder = tmp_path / "out"
     assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
-    results = ResultsFolder.read(folder)
-    summary = Summary.read(results)
-    summary.require_run_of(results)
-    with pytest.raises(RefusedError, match="of another run"):
-        replace(summary, fingerprints={"modulus": "other"}).require_run_of(results)
+    results, summary = ResultsFolder.read(folder), summary_of(folder)
+    assert main(["report", str(folder), "--quiet"]) == 0
+    capfd.readouterr()
+    changed = json.dumps(summary | {"fingerprints": {"modulus": "other"}})
+    results.put_text("summary.json", changed)
+    assert main(["report", str(folder), "--quiet"]) == 2
+    assert "of another run" in capfd.readouterr().err
     for text in ("", "[" * 100_000, '{"case": 1}'):
         (folder / "summary.json").write_text(text)
-        with pytest.raises(RefusedError, match="is changed"):
-            Summary.read(ResultsFolder.read(folder))
-
-
-def test_peaks_pass_through_json_with_their_infinite_bounds():
-    """An unknown bound never excludes a peak: of "max q1" the least one may be −∞."""
-    first = [np.array([x]) for x in (1.0, 3.0, 0.0, 2.0, 0.5, 1.5)]
-    second = [np.array([x]) for x in (2.0, np.inf, 0.0, -np.inf, -np.inf, np.inf)]
-    largest = Peak(np.zeros(1), *second, Nature.ATTAINED, side="max")
-    peaks = {
-        "q1": Peak(np.zeros(1), *first, Nature.GUARANTEED),
-        "max q1": largest,
-        "min q1": mirrored(largest),
-    }
-    document = json.loads(as_json(to_document(peaks)))
-    again = from_document(dict[str, Peak], document)
-    for name, peak in peaks.items():
-        assert {**vars(again[name])} == {**vars(peak)}, name
-    # of a least value unknown bounds lie on the other side
-    assert (again["min q1"].lower[0], again["min q1"].upper[0]) == (-np.inf, -2.0)
-    assert again["min q1"].reached[0] == np.inf
-    assert again["min q1"].outwards.max_peak_bounds == again["max q1"].max_peak_bounds
+        assert main(["report", str(folder), "--quiet"]) == 2
+        assert "is changed" in capfd.readouterr().err
