@@ -75,21 +75,18 @@ def hashin_shtrikman(fractions: Array, phases: Sequence[AnyPhase], *, space: boo
     return np.swapaxes(np.array(bounds), 0, 1)
 
 
-def mori_tanaka(fraction: Array, phases: Sequence[AnyPhase], *, space: bool = False) -> Array:
-    """Return K and G of round fibres or spheres by Mori and Tanaka (1973), in Pa, shape (2, …).
+def mori_tanaka(fraction: Array, phases: Sequence[AnyPhase]) -> Array:
+    """Return plane-strain K and G of round fibres by Mori and Tanaka (1973), in Pa, shape (2, …).
 
-    These are the bounds of Hashin and Shtrikman with the matrix as reference, exact for few
-    particles.
+    These are the bounds of Hashin and Shtrikman with the matrix as reference, exact for few fibres.
 
     Args:
-        fraction: Fraction of the particles, of any shape (…).
-        phases: Isotropic matrix and particle, in this order.
-        space: Whether the particles are spheres and K is that of three dimensions; else they are
-            fibres, and K is that of plane strain.
+        fraction: Fraction of the fibres, of any shape (…).
+        phases: Isotropic matrix and fibre, in this order.
     """
-    bulk, shear = _bulk_and_shear(phases, space)
+    bulk, shear = _bulk_and_shear(phases, space=False)
     fractions = np.stack([1 - fraction, fraction])
-    bulk_term, shear_term = _reference_terms(bulk[0], shear[0], space)
+    bulk_term, shear_term = _reference_terms(bulk[0], shear[0], space=False)
     mean_bulk = _mean_with(bulk, fractions, bulk_term)
     return np.array([mean_bulk, _mean_with(shear, fractions, shear_term)])
 
