@@ -10,7 +10,7 @@ from numba._dispatcher import compute_fingerprint
 import alphacut.base.kernels
 from alphacut.frame import DualProof, Proof, envelope
 from alphacut.fuzzy import Interval
-from tests.frame.bounds.test_parts import spring
+from tests.frame.bounds.test_branch_and_bound import soil_spring
 
 ROOMS = Path(alphacut.base.kernels.__file__).parents[1]
 
@@ -52,7 +52,7 @@ def test_threads_of_proofs_bring_no_new_type_of_argument(calls, method):
     """Debian's Numba ends the process where two threads bring the same new type at once."""
     motion = {"duration": 2.0, "step": 0.1, "alpha": (0,), "relative": True}
     fuzzy = {"s": Interval(0.5, 2.0)}
-    found = envelope(spring(), fuzzy, method=method, progress=False, **motion)
+    found = envelope(soil_spring(), fuzzy, method=method, progress=False, **motion)
     assert found.facts["parts"] > 1
     assert len(calls.known) >= 3
     assert calls.first_in_threads == []
