@@ -3,11 +3,14 @@
 import gc
 import os
 import sys
+import threading
 from collections.abc import Mapping
 
 
 def main(program: str = "alphacut", names: Mapping[str, str] | None = None) -> int:
     """Run the command line of this process, which is the program's own; return its exit status.
+
+    A `check` that finds no problem ends the process itself, at once.
 
     Args:
         program: The program's name, for messages.
@@ -15,8 +18,8 @@ def main(program: str = "alphacut", names: Mapping[str, str] | None = None) -> i
             left out.
     """
     # Imports make objects that stay. To look through them for garbage takes .05 s with Python's own
-    # threshold of 2,000 objects or fewer.
-    gc.set_threshold(20_000)
+    # threshold of 2,000 objects or fewer, and .04 s with 20,000.
+    gc.set_threshold(100_000)
     # Pydantic, which commands on cases import, looks for plugins in every installed distribution,
     # and checks each schema that it makes itself: that takes .1 s, and no command needs either.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
@@ -27,7 +30,15 @@ def main(program: str = "alphacut", names: Mapping[str, str] | None = None) -> i
     commands = COMMANDS
     if names is not None:
         commands = {name: COMMANDS[known] for name, known in names.items()}
-    return run(program=program, commands=commands)
+    status = run(program=program, commands=commands)
+    # Python frees every object and module at its end, which takes .06 s. A `check` that found no
+    # problem has flushed and closed what it wrote. Work is left only to MPI, other threads, and the
+    # libraries that parts of a run are timed with.
+    is_check = sys.argv[1:2] == ["check"] and status == 0
+    has_work_left = "mpi4py" in sys.modules or "--time" in sys.argv or threading.active_count() > 1
+    if is_check and not has_work_left:
+        os._exit(status)
+    return status
 
 
 if __name__ == "__main__":

@@ -25,6 +25,9 @@ ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Levels α by default, those of the paper."""
 DEFAULT_TOLERANCE = 1e-3
 """Error that is wanted by default, as a fraction of the peak of each output (conventional)."""
+MAX_PARAMETERS = 6
+"""Most inputs of a branch and bound: tensors of third derivatives grow with the cube of their
+number."""
 AT_REST = 1e-9
 """Peak of an output, as a fraction of what the energy of the response permits, up to which the
 output is taken to be moved by rounding alone. Rounding is some units ε (ω_max/ω₁)² of this peak."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from time import perf_counter
-from typing import Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, on_one_blas_thread
 from alphacut.base.errors import require, require_choice
+from alphacut.base.places import object_at
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
@@ -18,12 +19,6 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
-from alphacut.frame.methods.auto import Auto
-from alphacut.frame.methods.dual import DualProof
-from alphacut.frame.methods.graph_follower import GraphFollower
-from alphacut.frame.methods.improved_follower import ImprovedFollower
-from alphacut.frame.methods.proof import Proof
-from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import evaluate, has_matrices, require_modal_order
 from alphacut.frame.structures.model import StructureModel
@@ -31,9 +26,46 @@ from alphacut.frame.structures.storey import yields
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
 from alphacut.fuzzy import FuzzyNumber
 
-Method = Auto | Proof | DualProof | GraphFollower | ImprovedFollower | Sampled
+if TYPE_CHECKING:
+    from alphacut.frame.methods.auto import Auto
+    from alphacut.frame.methods.dual import DualProof
+    from alphacut.frame.methods.graph_follower import GraphFollower
+    from alphacut.frame.methods.improved_follower import ImprovedFollower
+    from alphacut.frame.methods.proof import Proof
+    from alphacut.frame.methods.sampled import Sampled
+
+Method: TypeAlias = "Auto | Proof | DualProof | GraphFollower | ImprovedFollower | Sampled"
 """How an envelope is computed, with its options as fields."""
-METHODS: dict[str, type[Method]] = {method.name: method for method in get_args(Method)}
+
+
+class MethodClasses(Mapping[str, "type[Method]"]):
+    """Classes of methods by name, each imported when it is looked up: the proofs take .05 s."""
+
+    PLACES: ClassVar = {
+        "auto": "auto:Auto",
+        "proof": "proof:Proof",
+        "dual": "dual:DualProof",
+        "graph-follower": "graph_follower:GraphFollower",
+        "improved-graph-follower": "improved_follower:ImprovedFollower",
+        "quasi-monte-carlo": "sampled:Sampled",
+    }
+    """Module in `alphacut.frame.methods` and class of each method."""
+
+    def __getitem__(self, name: str) -> type[Method]:
+        """Return the class of a method."""
+        found: type[Method] = object_at(f"alphacut.frame.methods.{self.PLACES[name]}")
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        """Return an iterator over the names."""
+        return iter(self.PLACES)
+
+    def __len__(self) -> int:
+        """Return the number of methods."""
+        return len(self.PLACES)
+
+
+METHODS = MethodClasses()
 """The methods by the words that a case file has for them."""
 
 
@@ -88,6 +120,10 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
+    from alphacut.frame.methods.graph_follower import GraphFollower
+    from alphacut.frame.methods.improved_follower import ImprovedFollower
+    from alphacut.frame.methods.proof import Proof
+
     start = perf_counter()
     problem = _build_problem(model, inputs, method, duration, step, alpha, integrator, **options)
     chosen = problem.method
@@ -177,13 +213,13 @@ def _build_problem(
         method = "auto" if has_matrices(model) else "improved-graph-follower"
     chosen = _chosen_method(method, options)
     # The response of columns that yield has kinks as a function of the parameters.
-    needs_derivatives = isinstance(chosen, Proof | DualProof | GraphFollower | ImprovedFollower)
-    is_possible = not (yields(model) and needs_derivatives)
+    takes_kinks = chosen.name in ("auto", "quasi-monte-carlo")
+    is_possible = takes_kinks or not yields(model)
     allowed = "auto or quasi-monte-carlo where columns yield"
     require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
         # Proofs hold for the exact response.
-        is_exact = yields(model) or isinstance(chosen, Auto | Proof | DualProof)
+        is_exact = yields(model) or chosen.name in ("auto", "proof", "dual")
         integrator = "exact" if is_exact and has_matrices(model) else "midpoint"
     cuts = boxes(inputs, alpha)
     flow = make_flow(model, cuts.names, duration, step, integrator)
@@ -206,7 +242,8 @@ def _chosen_method(method: Method | str, options: Mapping[str, Any]) -> Method:
     """
     if not isinstance(method, str):
         allowed = f"{', '.join(METHODS)}, or an object as Proof()"
-        require(isinstance(method, Method), "method", value=repr(method), allowed=allowed)
+        is_method = isinstance(method, tuple(METHODS.values()))
+        require(is_method, "method", value=repr(method), allowed=allowed)
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method
@@ -252,9 +289,10 @@ def require_envelope(
     if isinstance(first_steps, LinearFlow):
         first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
     first_steps.values(problem.flow.boxes.probes)
-    if isinstance(problem.method, Proof | DualProof):
+    if problem.method.name in ("proof", "dual"):
+        proof = cast("Proof | DualProof", problem.method)
         with refusing():
-            problem.method.forecast(exact_flow(flow), problem.flow.boxes)
+            proof.forecast(exact_flow(flow), problem.flow.boxes)
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:

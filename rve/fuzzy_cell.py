@@ -17,9 +17,7 @@ import numpy as np
 from alphacut.base.arrays import Array, on_one_blas_thread
 from alphacut.base.errors import FailedError, checked_number, require, require_choice
 from alphacut.base.extras import extra_named
-from alphacut.fuzzy import Crisp, FuzzyNumber, General, Knowledge, propagate
-from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.propagation import CampaignOptions
+from alphacut.fuzzy import Crisp, FuzzyNumber, Knowledge
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.claimed import widest_cut
@@ -41,6 +39,9 @@ from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
     import xarray
+
+    from alphacut.fuzzy.plans.design import Plan
+    from alphacut.fuzzy.propagation import CampaignOptions
 
 SUFFIXES = {PLANE_STRAIN: "", FREE: "_free"}
 """What is added to the name of a constant along x and y, by its definition."""
@@ -314,6 +315,9 @@ def fuzzy_stiffness(
         CampaignError: Samples failed; the others are in the store.
         FailedError: A coarser model contradicts guaranteed bounds.
     """
+    # Plans of samples take time to import, and an image has none.
+    from alphacut.fuzzy import General, propagate
+
     if average is not None:
         require_average(average)
     cell = FuzzyCell.of(radius, phases, inputs)

@@ -211,10 +211,11 @@ def _require_unclipped(values: Array, borders: tuple[float, ...], sound: Mask) -
     Raises:
         RefusedError: A class is clipped.
     """
-    # The median over 5 × 5 pixels takes noise off the classes.
+    # The median over 5 × 5 pixels takes noise off the classes. It is the pixel's own class where
+    # these pixels have one class alone.
     labels = np.searchsorted(borders, values, side="right")
     noisy = labels.astype(float)
-    for place, (median,) in _ranks(noisy, np.ones_like(sound), 5, (0.5,)):
+    for place, (median,) in _ranks(noisy, ~_interior(labels, reach=2), 5, (0.5,)):
         labels[place] = median
     interior = _interior(labels, reach=3) & sound
     classes = [values[interior & (labels == k)] for k in range(len(borders) + 1)]

@@ -186,7 +186,17 @@ def test_a_case_is_checked_without_what_takes_longer_to_import_than_to_use():
     """Two motions of a building, and records of a suite with their spectral accelerations."""
     slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy", "alphacut.rve.image.study"}
     slow |= {"alphacut.commands.foresee", "alphacut.commands.pipeline", "sympy", "h5py"}
+    slow |= {"alphacut.frame.methods.proof", "alphacut.frame.methods.dual", "sqlite3"}
+    slow |= {"multiprocessing", "joblib", "jinja2"}
     commands = [["check", f"cases/{case}.toml", "--quiet"] for case in ("building", "suite")]
     modules = modules_after(f"from alphacut import main; assert not any(map(main, {commands}))")
     assert "alphacut.frame.dynamics.flow" in modules
+    assert not slow & modules
+
+
+def test_a_picture_is_checked_without_plans_of_samples_and_rare_formats():
+    command = ["check", "cases/composite.toml", "--quiet"]
+    modules = modules_after(f"from alphacut import main; assert not main({command})")
+    assert {"alphacut.rve.image.study", "PIL.PngImagePlugin"} <= modules
+    slow = {"alphacut.stages.modulus", "alphacut.fuzzy.propagation", "PIL.TiffImagePlugin"}
     assert not slow & modules

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-import secrets
-import shutil
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -82,6 +79,11 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
             of the disk is free.
         OSError: The place cannot be written for another reason.
     """
+    # Commands that write no file spare these modules, which take time to import.
+    import secrets
+    import shutil
+    import tempfile
+
     path = Path(path)
     if is_special(path) and follow_links:
         with tempfile.TemporaryDirectory() as folder:

@@ -46,7 +46,8 @@ def opened_picture(path: Path) -> Iterator[Image]:
         OSError: The file cannot be opened, or has another format.
     """
     # Other formats that Pillow knows may be programs, such as PostScript.
-    formats = ("BMP", "GIF", "JPEG", "JPEG2000", "PNG", "PPM", "TIFF", "WEBP")
+    # Pillow knows the first five at once; for the others it imports all of its formats, in .04 s.
+    formats = ("BMP", "GIF", "JPEG", "PNG", "PPM", "JPEG2000", "TIFF", "WEBP")
     # memory of a pixel while it is read: Pillow's four bytes, a copy of them, and a float
     bytes_per_pixel = 16
 

@@ -13,7 +13,7 @@ from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import require_envelope
 from alphacut.frame.structures.linear import histories
-from alphacut.stages.cell import CellProblem
+from alphacut.stages.cell import CellProblem, require_levels
 from alphacut.stages.envelope import tasks
 from alphacut.stages.foreseen import possible_materials, structure_as_computed
 
@@ -67,8 +67,6 @@ def _require_material(content: Content) -> ImageStudy | None:
     """
     has_motion = "envelope" in content.stages
     if has_motion and not content.has_stated_modulus:
-        from alphacut.stages.modulus import require_levels
-
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.image_cell is not None:
         fits = all(content.image_cell.is_solid) or not has_motion

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from difflib import get_close_matches
@@ -137,6 +136,8 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
     existing = path if folder else path.parent
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
+    import tempfile  # takes time, and most commands name no file
+
     reason = ""
     try:
         tempfile.TemporaryFile(dir=existing).close()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self, TypedDict, cast
 
-from alphacut.base.errors import FailedError, RefusedError
+from alphacut.base.errors import FailedError, RefusedError, require
 from alphacut.case.cell import CellContent
 from alphacut.case.material import (
     Mesh,
@@ -358,3 +358,10 @@ def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> No
     if tolerance is not None and total > tolerance * (1 + 1e-9):
         what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"
         raise FailedError(what, "method auto reaches it")
+
+
+def require_levels(alpha: tuple[float, ...], key: str) -> None:
+    """Refuse levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
+    # A fuzzy number needs its support and its core; the highest level alone is a crisp number.
+    complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
+    require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")

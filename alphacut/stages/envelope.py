@@ -23,7 +23,7 @@ from alphacut.frame.analyses.peaks import (
     peaks,
     tightest,
 )
-from alphacut.frame.bounds.model_error import MAX_PARAMETERS
+from alphacut.frame.boxes import MAX_PARAMETERS
 from alphacut.frame.structures.quantities import Output, output_of
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say

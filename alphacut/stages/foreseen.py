@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.case.content import Content
+from alphacut.case.material import (
+    Mesh,
+    MeshedCell,
+    ModulusSection,
+    RadiusMapSection,
+    RoundCell,
+    ThetaSection,
+)
 from alphacut.case.structure import Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.rve.result.loss_factors import loss_factors
+from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages.cell import CellProblem
+from alphacut.stochastic import FractionMap
 
 MOST_TIMED_STEPS = 16_000
 """Steps of a motion beyond which `check` looks at its beginning alone."""
@@ -54,7 +65,8 @@ def foreseen_material(content: Content) -> Material | None:
     # A period, or whether a time step is fine enough, is judged by two digits: an error of E of
     # 1e-4 is far below that.
     section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-    result = replace(CellProblem.of(content), modulus=section).solve()
+    problem = CellProblem.of(content)
+    result = _solved(problem.radius, problem.cell, problem.mesh, section)
     loss = None
     if content.has_material_damping:
         # The case states one loss factor for each phase: of its Young's modulus, at a real ν. Then
@@ -64,6 +76,17 @@ def foreseen_material(content: Content) -> Material | None:
     if content.has_stated_modulus:
         return Material(loss=loss)
     return Material(Crisp(result.modulus), loss)
+
+
+@lru_cache(maxsize=1)  # `check` asks for the material of its case twice
+def _solved(
+    radius: RadiusMapSection | ThetaSection | FractionMap,
+    cell: RoundCell | MeshedCell,
+    mesh: Mesh,
+    modulus: ModulusSection,
+) -> HomogenisedStiffness:
+    """Return the stiffness of a cell as `CellProblem.solve` does, which nobody changes."""
+    return CellProblem(radius, cell, mesh, modulus).solve()
 
 
 def foreseen_structure(content: Content) -> Structure | None:

@@ -31,7 +31,7 @@ from alphacut.rve.fuzzy_cell import (
     fuzzy_stiffness,
 )
 from alphacut.rve.result.engineering_constants import NAMES
-from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit
+from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit, require_levels
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
@@ -268,13 +268,6 @@ def stage(problem: CellProblem) -> Stage[ModulusResult]:
     packages = ("stochastic", "rve", "fuzzy")
     run = partial(compute, problem)
     return Stage("modulus", inputs, packages, ModulusResult, run, has_samples=True)
-
-
-def require_levels(alpha: tuple[float, ...], key: str) -> None:
-    """Refuse levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
-    # A fuzzy number needs its support and its core; the highest level alone is a crisp number.
-    complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
-    require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
 
 def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:

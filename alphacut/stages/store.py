@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from alphacut.base.arrays import on_one_blas_thread
@@ -232,6 +231,8 @@ class StageStore:
             return results
         stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
         # Results are written as they come, so that an interrupted run keeps the finished ones.
+        from tempfile import TemporaryDirectory  # takes time to import, as below
+
         for future in as_completed(stage_of_future):
             stage = stage_of_future[future]
             with _naming_dead_workers(stage.name), TemporaryDirectory() as scratch:
@@ -294,6 +295,8 @@ class StageStore:
             FailedError: A worker process died. Whatever the stage raises leaves this function as
                 well.
         """
+        from tempfile import TemporaryDirectory
+
         LOG.info("stage %s is computed", stage.name)
         folder = self.folder
         with _naming_dead_workers(stage.name), TemporaryDirectory() as temporary:

@@ -35,8 +35,6 @@ from alphacut.frame.response.load_tables import Direct, LoadTables
 ROUNDING = 1e-9
 """Bound of the relative rounding of norms and of integrals over a load: a million terms of some
 operations each have less."""
-MAX_PARAMETERS = 6
-"""Most parameters: tensors of third derivatives grow with the cube of their number."""
 
 
 def proved_error(model: ModalModel) -> Array:

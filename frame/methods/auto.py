@@ -16,7 +16,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -24,18 +24,20 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.frame.bounds.box_proof import refusing
-from alphacut.frame.bounds.model_error import MAX_PARAMETERS
-from alphacut.frame.boxes import DEFAULT_TOLERANCE, UnitFlow
+from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.yielding import YieldingFlow
-from alphacut.frame.methods.dual import DualProof
 from alphacut.frame.methods.improved_follower import ImprovedFollower, PassBounds
-from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import PeakSearch
 from alphacut.frame.numbers import WIDE
 from alphacut.frame.result import Ends, Envelope
 
+if TYPE_CHECKING:
+    from alphacut.frame.methods.dual import DualProof
+    from alphacut.frame.methods.proof import Proof
+
+# The proofs are imported where they are made: that takes .05 s, which a check of a case spares.
 LOG = logging.getLogger(__name__)
 
 FEW_INPUTS = 4
@@ -150,6 +152,8 @@ class Auto:
             flow: The response over the boxes of the inputs.
             reasons: Reasons why a proof is not possible are appended to this list, in place.
         """
+        from alphacut.frame.methods.proof import Proof
+
         # A proof looks at 1000 boxes for each bound on average (tuned: more hardly close gaps).
         proof = Proof(None, self.tolerance, boxes=1000, workers=self.workers)
         dual = self._dual(flow)
@@ -186,6 +190,8 @@ class Auto:
         Args:
             flow: The response over the boxes of the inputs.
         """
+        from alphacut.frame.methods.dual import DualProof
+
         dual = DualProof(workers=self.workers)
         if self.magnitudes:
             dual = replace(dual, below=1.0)

@@ -30,7 +30,6 @@ from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
 from alphacut.frame.bounds.kernel import call_examine
 from alphacut.frame.bounds.model_error import (
-    MAX_PARAMETERS,
     direct_error_in_steps,
     largest_growth,
     proved_error,
@@ -38,7 +37,7 @@ from alphacut.frame.bounds.model_error import (
     response_parts,
 )
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
-from alphacut.frame.boxes import DEFAULT_TOLERANCE, Boxes, UnitFlow
+from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modes.damped import require_dissipation

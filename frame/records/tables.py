@@ -474,8 +474,9 @@ def _read_columns(
             uneven; the step is not from 4e-5 s to below 0.5 s; or the samples have another peak
             than a line above them states.
     """
+    numbers = None
     if table.head:  # without one, the last row of a series of numbers may be a short one
-        table.numbers()
+        numbers = table.numbers()
     index = 1
     heads = table.column_heads
     name = ""
@@ -493,7 +494,8 @@ def _read_columns(
         unit = table.columns[index].unit
     if cure := _cure_of_head(table, table.columns[index], unit=unit):
         raise table.refusal(cure)
-    numbers = table.numbers()
+    if numbers is None:
+        numbers = table.numbers()
     remarks: list[str] = []
     if has_times:
         step, remarks = _step_and_remarks(table, stated_step=step)

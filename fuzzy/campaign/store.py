@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import json
 import os
-import sqlite3
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +26,10 @@ from alphacut.base.errors import FailedError, path_of, require
 from alphacut.base.kept_files import is_regular, read_regular
 from alphacut.fuzzy.campaign.call import Layout, Sample, named_point
 
+if TYPE_CHECKING:
+    import sqlite3
+
+# SQLite is imported by the first store: many a campaign keeps no samples.
 Identity = Mapping[str, object]
 """What a sample depends on besides its inputs, as JSON has it."""
 _APPLICATION = 0x616C7068  # application id in the head of each store: "alph" in ASCII
@@ -124,6 +127,8 @@ class Store:
 
     def _connect(self) -> sqlite3.Connection:
         """Return a connection that waits a minute for another campaign's write."""
+        import sqlite3
+
         return sqlite3.connect(self.path, timeout=60.0)
 
     def _read(self) -> bool:
@@ -138,6 +143,8 @@ class Store:
             sqlite3.DatabaseError: The file cannot be accessed (it is locked, its disk is full, it
                 may not be read or written), which is no damage.
         """
+        import sqlite3
+
         schema = "select sql from sqlite_master where sql is not null"
         samples = f"select {', '.join(Row._fields)} from sample"
         try:
@@ -220,6 +227,8 @@ class Store:
     @contextmanager
     def _reported(self) -> Iterator[None]:
         """Context manager that turns errors of SQLite into a `FailedError` with a cure."""
+        import sqlite3
+
         try:
             yield
         except sqlite3.Error as error:

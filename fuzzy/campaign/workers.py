@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
@@ -72,6 +71,9 @@ def _processes(workers: int) -> Executor:
     """
     # Unlike the executor of the standard library, loky's sends functions by value where another
     # process cannot import them, such as lambdas.
+    # Both modules take time to import, and one process needs neither.
+    from multiprocessing import get_context
+
     from joblib.externals.loky import ProcessPoolExecutor
 
     threads = Path("/proc/self/task")
