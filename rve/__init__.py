@@ -18,6 +18,7 @@ from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effect
 if TYPE_CHECKING:
     from alphacut.rve.engineering import constants
     from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
+    from alphacut.rve.image.model import solve_image
     from alphacut.rve.image.study import (
         FuzzyImageStiffness,
         GreyImage,
@@ -41,6 +42,7 @@ __all__ = [
     "PrismModel", "ProductSpace", "ReferenceBounds", "SeriesModel", "SlicesModel", "SpheresModel",
     "StressCurve", "VoigtPhase", "constants", "effective_modulus", "fuzzy_image_stiffness",
     "fuzzy_stiffness", "image_fields", "loss_factors", "read_image", "reference_bounds",
+    "solve_image",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
@@ -63,6 +65,7 @@ AT_FIRST_USE = {
     "loss_factors": "result.loss_factors",
     "read_image": "image.study",
     "reference_bounds": "result.reference_bounds",
+    "solve_image": "image.model",
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""
 

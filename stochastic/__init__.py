@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from alphacut.stochastic.particles.packings import Packings, pack
     from alphacut.stochastic.particles.particles import Particles
     from alphacut.stochastic.particles.radius_distributions import LogNormalRadii, MeasuredRadii
+    from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 __all__ = [
+    "DISCS",
+    "SPHERES",
     "FittedRadiusMap",
     "FractionMap",
     "HermiteMap",
@@ -34,12 +37,14 @@ __all__ = [
     "require_map",
 ]
 AT_FIRST_USE = {
+    "DISCS": "particles.shapes",
     "FittedRadiusMap": "microstructure",
     "FractionMap": "fraction_map",
     "LogNormalRadii": "particles.radius_distributions",
     "MeasuredRadii": "particles.radius_distributions",
     "Packings": "particles.packings",
     "Particles": "particles.particles",
+    "SPHERES": "particles.shapes",
     "fit_radius_map": "microstructure",
     "pack": "particles.packings",
     "read_particles": "particles.measured",

@@ -345,6 +345,12 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
         RefusedError: The arrays are not alike, or hold negative numbers or NaN, or none but 0 and
             infinity; or a setting is not allowed.
         FailedError: The solver does not converge.
+
+    Example:
+        >>> stiff = np.array([[40e9, 20e9], [20e9, 20e9]])  # one pixel of four is stiffer
+        >>> low, high = solve_image(stiff, stiff / 2).bounds.young()
+        >>> [round(float(end) / 1e9, 2) for end in (low, high)]  # GPa
+        [28.91, 29.03]
     """
     shape = np.shape(bulk)
     is_grid = shape == np.shape(shear) and len(shape) in (2, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,6 @@ from scipy.optimize import minimize
 
 from alphacut.frame import Accelerogram, Exact, LagrangianFlow, LinearFlow, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber, Interval, Nature
-from alphacut.fuzzy.sets.boxes import corners
 
 POINTS = 1000
 """Random points of a box, beside its corners."""
@@ -93,8 +93,8 @@ def reached(flow, inputs, rng: np.random.Generator, alpha=0.0, points=POINTS):
     nodes, the highest among them.
     """
     low, high = np.array([number.cut(alpha) for number in inputs.values()]).T
-    half = corners(low, high)
-    half = rng.permutation(half)[:POINTS]
+    corners = list(itertools.product(*zip(low, high, strict=True)))
+    half = rng.permutation(corners)[:POINTS]
     tried = np.vstack([rng.uniform(low, high, (points, len(low))), half])
     parts = [flow.values(chunk) for chunk in np.array_split(tried, -(-len(tried) // 200))]
     values = np.concatenate(parts)

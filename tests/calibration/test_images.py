@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from alphacut.rve.image.model import solve_image
+from alphacut.rve import solve_image
 from tests.calibration.declared import Calibration, free_seed
 
 REFINEMENTS = (2, 4, 8)

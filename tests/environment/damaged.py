@@ -31,7 +31,7 @@ import numpy as np
 
 from alphacut import main as run_command
 from alphacut.frame import read_matrix, read_modes, read_record
-from alphacut.fuzzy import RefusedError
+from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve import read_image
 from alphacut.stochastic import read_particles
 from tests.frame.records import samples
@@ -367,7 +367,6 @@ def _meshes() -> list[Format]:
     try:
         from alphacut.rve.mesh import square
         from alphacut.rve.mesh.file import read_grid
-        from alphacut.rve.mesh.periodicity import MeshError
     except ImportError:  # without DOLFINx
         return []
 
@@ -381,7 +380,7 @@ def _meshes() -> list[Format]:
     def read(path: Path) -> object:
         try:
             return read_grid(path)
-        except MeshError as error:
+        except FailedError as error:
             raise RefusedError("mesh", str(error), "") from None
 
     return [

@@ -61,7 +61,7 @@ def test_loss_factors_follow_from_the_phases_or_the_inputs():
 
 def test_spheres_of_a_fraction_lie_between_the_reference_bounds():
     phases = [Phase(20e9, 0.3), Phase(80e9, 0.2)]
-    from alphacut.stochastic.particles.shapes import SPHERES
+    from alphacut.stochastic import SPHERES
 
     [cell] = SpheresModel().solve(FractionMap(0.2, SPHERES), phases[0], phases[1:])
     assert cell.fractions == pytest.approx([0.8, 0.2], rel=1e-12)

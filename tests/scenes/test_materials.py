@@ -10,7 +10,7 @@ import xarray
 from PIL import Image
 
 from alphacut import main
-from alphacut.rve.image.model import solve_image
+from alphacut.rve import solve_image
 from alphacut.rve.image.phases import PhaseModuli
 from alphacut.stages.modulus import fuzzy_loss
 from tests.scenes.test_cases import overlapping_cuts

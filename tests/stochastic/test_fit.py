@@ -9,11 +9,10 @@ import pytest
 from scipy import integrate
 
 from alphacut.fuzzy import FailedError, RefusedError
-from alphacut.stochastic import HermiteMap, TruncatedNormal, microstructure
+from alphacut.stochastic import DISCS, SPHERES, HermiteMap, TruncatedNormal, microstructure
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, PBox, SlopeEnds, least_pbox, slope_band
 from alphacut.stochastic.microstructure import RadiusLimits, fit_map
-from alphacut.stochastic.particles.shapes import DISCS, SPHERES
 
 LAW = TruncatedNormal()
 TRUE = HermiteMap(0.13, 0.3, 0.87, 0.5)

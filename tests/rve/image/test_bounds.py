@@ -16,11 +16,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from alphacut.fuzzy import FailedError, RefusedError
-from alphacut.rve import Phase, SpheresModel
+from alphacut.rve import Phase, SpheresModel, solve_image
 from alphacut.rve.image.bounds import StiffnessBounds, hill_mean, inverse_below, residual_above
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.losses import energy_fractions, mean_loss
-from alphacut.rve.image.model import ImageModel, solve_image, usual_division
+from alphacut.rve.image.model import ImageModel, usual_division
 from alphacut.rve.image.phases import (
     ModuliImages,
     ModuliInterval,
