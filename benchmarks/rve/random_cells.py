@@ -34,6 +34,8 @@ from alphacut.stochastic import HermiteMap
 
 NOISE = 1e-10  # of the truth, relative
 MOST_MEDIAN = 10.0
+FINEST = 0.1
+"""Size of elements below which no finer mesh is tried, whose memory grows with the square."""
 TIGHT = ("E", "ν", "C11 + C12", "C11 − C12", "C33", "s11", "s12")
 """Quantities whose declared errors are not to be far above the true ones."""
 
@@ -146,10 +148,16 @@ def judged_entries(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> It
 
 
 def solved(model: PrismModel, cell: Cell) -> HomogenisedStiffness:
-    """The cell by prisms, on a finer mesh where the one drawn folds over."""
+    """The cell by prisms, on a finer mesh where the one drawn folds over.
+
+    Raises:
+        FoldedMeshError: It folds over on a mesh below `FINEST` as well.
+    """
     try:
         return model.solve(cell.radius_map, cell.matrix, [cell.inclusion])[0]
     except FoldedMeshError:
+        if model.mesh_size < FINEST:
+            raise
         return solved(replace(model, mesh_size=model.mesh_size / 2), cell)
 
 
