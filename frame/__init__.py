@@ -6,8 +6,9 @@ Example:
     (['exact', 'midpoint'], 6)
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from alphacut.base.first_use import at_first_use
 
 if TYPE_CHECKING:
     from alphacut.frame.analyses.decision import Decision, decide
@@ -118,9 +119,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name, which is imported at its first use: all of them take .1 s."""
 
-
-def __getattr__(name: str) -> Any:
-    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
-    if name in AT_FIRST_USE:
-        return getattr(import_module(f"alphacut.frame.{AT_FIRST_USE[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = at_first_use(__name__, AT_FIRST_USE)

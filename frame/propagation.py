@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from pkgutil import resolve_name
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, on_one_blas_thread
 from alphacut.base.errors import require, require_choice
-from alphacut.base.places import object_at
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
@@ -53,7 +53,7 @@ class MethodClasses(Mapping[str, "type[Method]"]):
 
     def __getitem__(self, name: str) -> type[Method]:
         """Return the class of a method."""
-        found: type[Method] = object_at(f"alphacut.frame.methods.{self.PLACES[name]}")
+        found: type[Method] = resolve_name(f"alphacut.frame.methods.{self.PLACES[name]}")
         return found
 
     def __iter__(self) -> Iterator[str]:

@@ -1,9 +1,9 @@
 """Fuzzy inputs through any model: α-cuts, methods of search, bounds."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from alphacut.base.errors import FailedError, RefusedError
+from alphacut.base.first_use import at_first_use
 from alphacut.fuzzy.sets.numbers import (
     Crisp,
     FuzzyNumber,
@@ -48,9 +48,4 @@ AT_FIRST_USE = {
 """Module of each exported name that is imported at its first use, since a case file needs fuzzy
 numbers alone. Campaigns, with SQLite and processes, take .04 s of processor time."""
 
-
-def __getattr__(name: str) -> Any:
-    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
-    if name in AT_FIRST_USE:
-        return getattr(import_module(f"alphacut.fuzzy.{AT_FIRST_USE[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = at_first_use(__name__, AT_FIRST_USE)

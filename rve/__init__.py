@@ -8,9 +8,9 @@ Example:
     ([[0.01, 0.01, 0.0], [0.0, 0.0, 0.02]], 0.01)
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from alphacut.base.first_use import at_first_use
 from alphacut.rve.cell.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
 from alphacut.rve.cell.outline import Ellipse
 from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effective_modulus
@@ -69,9 +69,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""
 
-
-def __getattr__(name: str) -> Any:
-    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
-    if name in AT_FIRST_USE:
-        return getattr(import_module(f"alphacut.rve.{AT_FIRST_USE[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = at_first_use(__name__, AT_FIRST_USE)

@@ -1,8 +1,8 @@
 """From particles to the random radius of the cell: law of θ, radius map, quadrature in θ."""
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from alphacut.base.first_use import at_first_use
 from alphacut.stochastic.radius_map import HermiteMap, RadiusMap, require_map
 from alphacut.stochastic.theta.distribution import ThetaDistribution, TruncatedNormal
 from alphacut.stochastic.theta.quadrature import ThetaRule, gauss_rule
@@ -51,9 +51,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name that is imported at its first use."""
 
-
-def __getattr__(name: str) -> Any:
-    """Return an exported name of `AT_FIRST_USE` (PEP 562)."""
-    if name in AT_FIRST_USE:
-        return getattr(import_module(f"alphacut.stochastic.{AT_FIRST_USE[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = at_first_use(__name__, AT_FIRST_USE)

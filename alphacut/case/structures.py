@@ -7,11 +7,11 @@ entry here.
 from __future__ import annotations
 
 from functools import cache
+from pkgutil import resolve_name
 from typing import Any, TypeVar, cast
 
 from pydantic import create_model
 
-from alphacut.base.places import object_at
 from alphacut.case.cell import CellContent
 
 C = TypeVar("C", bound=CellContent)
@@ -61,7 +61,7 @@ def _whole_case(
     for name, place in structures:
         kind: Any = object
         if built:
-            kind = object_at(place) | None
+            kind = resolve_name(place) | None
         fields[name] = (kind, None)  # the type of the field, and its default
     # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest.
     bases: Any = (content, create_model("Structures", __base__=CellContent, **fields))

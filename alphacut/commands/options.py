@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
-from alphacut.base.places import object_at
 from alphacut.io.files import as_json, suggestion
 from alphacut.rve.interruption import uninterrupted
 from alphacut.stochastic.particles.csv_columns import text_of
@@ -44,7 +44,7 @@ class Command:
         with uninterrupted():
             if "case" in options:  # a file that is not there is refused before that
                 text_of(Path(options.case))
-            function = object_at(f"alphacut.commands.{self.place}")
+            function = resolve_name(f"alphacut.commands.{self.place}")
         status: int = function(options, out)
         return status
 
