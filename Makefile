@@ -29,7 +29,7 @@ quick:
 	$(IN) python -m pytest -q --quick tests/$(ROOM) $(PYTEST)
 
 test-slow:
-	$(IN) python -m pytest -m slow --timeout 3000 $(PYTEST)
+	$(IN) python -m pytest -m slow -n $(WORKERS) --dist worksteal --timeout 3000 $(PYTEST)
 
 coverage:
 	@mkdir -p build
