@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from alphacut.frame.analyses.peaks import Peak, peaks
     from alphacut.frame.analyses.probability import Probability, probability
     from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
-    from alphacut.frame.analyses.spectral import spectral_acceleration
     from alphacut.frame.analyses.suites import SuitePeaks, over_records
     from alphacut.frame.analyses.tolerances import Tolerances, tolerances
     from alphacut.frame.calculus.unproved import UnprovedError
@@ -39,6 +38,10 @@ if TYPE_CHECKING:
     from alphacut.frame.records.history import Accelerogram, History
     from alphacut.frame.records.suite import read_record, read_suite
     from alphacut.frame.result import Envelope
+    from alphacut.frame.spectra.response_spectrum import (
+        response_spectrum,
+        spectral_acceleration,
+    )
     from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
     from alphacut.frame.structures.loads import Force
     from alphacut.frame.structures.material_damping import damping_from_loss
@@ -56,8 +59,8 @@ __all__ = [
     "Sensitivity", "StoreyFrame", "SuitePeaks", "Tolerances", "UnprovedError",
     "damping_from_loss", "decide", "envelope", "fragility", "identify", "incremental",
     "measured_mode", "over_records", "peaks", "pendulum", "probability", "read_matrix",
-    "read_modes", "read_record", "read_suite", "require_envelope", "sensitivity",
-    "spectral_acceleration", "tolerances",
+    "read_modes", "read_record", "read_suite", "require_envelope", "response_spectrum",
+    "sensitivity", "spectral_acceleration", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -113,8 +116,9 @@ AT_FIRST_USE = {
     "read_record": "records.suite",
     "read_suite": "records.suite",
     "require_envelope": "propagation",
+    "response_spectrum": "spectra.response_spectrum",
     "sensitivity": "analyses.sensitivity",
-    "spectral_acceleration": "analyses.spectral",
+    "spectral_acceleration": "spectra.response_spectrum",
     "tolerances": "analyses.tolerances",
 }
 """Module of each exported name, which is imported at its first use: all of them take .1 s."""

@@ -22,11 +22,11 @@ from alphacut.base.number_text import (
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored, with_combined
-from alphacut.frame.analyses.spectral import spectral_acceleration
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import arias_fractions
+from alphacut.frame.spectra.response_spectrum import spectral_acceleration
 from alphacut.frame.structures.linear import LinearSystem, has_matrices, nominal_modes
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of

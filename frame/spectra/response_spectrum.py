@@ -1,0 +1,149 @@
+"""Response spectrum of a record, by the exact response of oscillators to piecewise linear loads."""
+
+from __future__ import annotations
+
+from math import factorial, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.frame.records.history import Accelerogram
+
+Complex = NDArray[np.complex128]
+READINGS = 40
+"""Readings of the displacement in a period. The peak of a sine that is read at n points per period
+is too low by at most 1 - cos(π / n), which is 0.3 % for n = 40."""
+MIN_PERIOD = 1e-4
+"""Shortest period above 0, in s: the time rises as the step of the record over the period."""
+SERIES = [1 / factorial(k + 2) for k in reversed(range(16))]
+"""Coefficients of z^15 … z^0 in (exp(z) - 1 - z)/z². The next term is below 1e-20 for |z| ≤ 1/2."""
+
+
+def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float = 0.05) -> Array:
+    """Return the spectral pseudo-acceleration Sa = ω² max |u| of a record at many periods.
+
+    The displacement u of a linear oscillator relative to the ground follows from
+    u'' + 2 ζ ω u' + ω² u = -a(t), from rest. It is computed exactly for the piecewise linear record
+    a(t), and one period of free vibration after the record is included. The peak is read at 40 or
+    more times a period, which misses at most 0.3 % of it.
+
+    Args:
+        ground: Ground acceleration a(t).
+        periods: Undamped natural periods 2π/ω, in s, in any order and shape. At the period 0 the
+            spectrum is the largest ground acceleration.
+        damping: Damping ratio ζ, from 0 to 0.999.
+
+    Returns:
+        Sa in m/s², in the shape of the periods.
+
+    Raises:
+        RefusedError: A period is neither 0 nor from 0.0001 s on, the damping ratio is not such a
+            number, or the accelerogram is held for ever or multiplied with a sine.
+
+    Example:
+        >>> from alphacut.frame import Accelerogram, response_spectrum
+        >>> pulse = Accelerogram(0.01, [0.0, 3.0, 0.0])
+        >>> response_spectrum(pulse, [0.0, 0.1, 1.0]).round(2).tolist()
+        [3.0, 1.69, 0.17]
+    """
+    ratio = checked_number("damping", damping, least=0, most=0.999)
+    is_sampled = not ground.is_held and not ground.frequency
+    require(is_sampled, "ground", "held or multiplied with a sine", "a record that ends")
+    try:
+        shaped = np.asarray(periods, float)
+    except (TypeError, ValueError):
+        raise RefusedError("periods", repr(periods), "numbers of seconds") from None
+    is_allowed = (shaped == 0) | ((shaped >= MIN_PERIOD) & np.isfinite(shaped))
+    wrong = shaped[~is_allowed].tolist()
+    require(not wrong, "periods", wrong[:1], f"0 s, and periods from {MIN_PERIOD:g} s on")
+
+    found = np.full(shaped.shape, ground.extremes[0])
+    oscillates = shaped > 0
+    if oscillates.any():
+        found[oscillates] = _pseudo_accelerations(ground, 2 * pi / shaped[oscillates], ratio)
+    return found
+
+
+def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
+    """Return the spectral pseudo-acceleration of a record at one period, in m/s².
+
+    It is that of `response_spectrum`.
+
+    Args:
+        ground: Ground acceleration.
+        period: Undamped natural period, in s, positive.
+        ratio: Damping ratio, from 0 to 0.999.
+
+    Raises:
+        RefusedError: The period is not a positive, finite number, or the damping ratio is not such
+            a number.
+    """
+    checked_number("period", period, positive=True)
+    return float(response_spectrum(ground, period, ratio))
+
+
+class _Advance(NamedTuple):
+    """How the states y of oscillators advance by a time τ within a step h of the record.
+
+    y(t + τ) = `decay` y(t) - `constant` a - `ramp` Δa, where a is the sample of the record at t and
+    Δa the difference of the next sample from it. Each field has the shape of the oscillators.
+    """
+
+    decay: Complex
+    constant: Complex
+    ramp: Complex
+
+    @classmethod
+    def of(cls, roots: Complex, time: float, step: float) -> _Advance:
+        """Return the coefficients for oscillators with the roots λ, after a time τ = `time`.
+
+        With z = λ τ they are exp(z), τ φ1 and (τ²/h) φ2, where φ2 = (exp(z) - 1 - z)/z² and
+        φ1 = (exp(z) - 1)/z = 1 + z φ2.
+        """
+        z = roots * time
+        # For small |z| the differences cancel, and the power series of φ2 takes their place.
+        is_small = np.abs(z) < 0.5
+        divisor = np.where(is_small, 1.0, z)
+        second = np.where(is_small, np.polyval(SERIES, z), (np.exp(z) - 1 - z) / divisor**2)
+        first = 1 + z * second
+        ramp = np.asarray(time**2 / step * second, complex)
+        return cls(1 + z * first, time * first, ramp)
+
+
+def _pseudo_accelerations(ground: Accelerogram, omega: Array, ratio: float) -> Array:
+    """Return ω² max |u| of oscillators with the angular frequencies `omega`, shape (oscillators,).
+
+    With the root λ = ω (-ζ + i √(1 - ζ²)) of the characteristic polynomial and its conjugate λ*,
+    y = u' - λ* u satisfies y' = λ y - a(t), and u = Im y / Im λ.
+    """
+    roots: Complex = np.asarray(omega * complex(-ratio, sqrt(1 - ratio**2)), complex)
+    samples = ground.samples
+    step = ground.step
+    differences = np.diff(samples)
+    # States y at the samples, shape (samples, oscillators).
+    whole = _Advance.of(roots, step, step)
+    states = np.zeros((len(samples), len(roots)), complex)
+    states[1:] -= np.multiply.outer(samples[:-1], whole.constant)
+    states[1:] -= np.multiply.outer(differences, whole.ramp)
+    for k in range(1, len(samples)):
+        states[k] += whole.decay * states[k - 1]
+
+    largest = np.zeros(len(roots))
+    for k in range(len(roots)):
+        root = roots[[k]]
+        period = float(2 * pi / omega[k])
+        substeps = max(1, int(np.ceil(step * READINGS / period)))
+        at_samples = states[:, k].copy()
+        for j in range(substeps):
+            part = _Advance.of(root, j * step / substeps, step)
+            inside = part.decay * at_samples[:-1]
+            inside -= part.constant * samples[:-1] + part.ramp * differences
+            largest[k] = max(largest[k], np.abs(inside.imag).max())
+        # Free vibration from the last sample on.
+        times = np.arange(0.0, period + step / substeps, step / substeps)
+        free = np.exp(root * times) * at_samples[-1]
+        largest[k] = max(largest[k], np.abs(free.imag).max())
+    return np.asarray(omega**2 * largest / roots.imag)

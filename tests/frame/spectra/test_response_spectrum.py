@@ -1,0 +1,82 @@
+"""Response spectrum of a record, against a dense integration and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from alphacut.frame import (
+    Accelerogram,
+    StoreyFrame,
+    over_records,
+    response_spectrum,
+    spectral_acceleration,
+)
+from alphacut.fuzzy import Interval, RefusedError
+
+
+@pytest.mark.parametrize("period", [0.05, 0.3, 2.0])
+def test_peaks_are_those_of_a_dense_integration(period):
+    samples = np.random.default_rng(8).normal(size=61)
+    ground, omega, ratio = Accelerogram(0.02, samples), 2 * np.pi / period, 0.05
+
+    def rate(t, y):
+        load = np.interp(t, 0.02 * np.arange(61), samples, right=0.0)
+        return [y[1], -load - 2 * ratio * omega * y[1] - omega**2 * y[0]]
+
+    times = np.linspace(0, 1.2 + period, 4001)
+    step = min(0.002, period / 50)
+    motion = solve_ivp(rate, (0, times[-1]), [0, 0], t_eval=times, rtol=1e-9, max_step=step)
+    exact = omega**2 * abs(motion.y[0]).max()
+    assert spectral_acceleration(ground, period, ratio) == pytest.approx(exact, rel=4e-3)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.05, 0.7])
+def test_a_sudden_constant_acceleration_overshoots_by_its_damping(ratio):
+    """The peak is 1 + exp(-π ζ/√(1 - ζ²)) times the static one, however long the period."""
+    periods = np.geomspace(2e-3, 0.8, 30).reshape(5, 6)
+    exact = 2.5 * (1 + np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)))
+    found = response_spectrum(Accelerogram(0.05, [2.5] * 40), periods, ratio)
+    assert found == pytest.approx(np.full((5, 6), exact), rel=4e-3)
+
+
+def test_a_record_that_is_short_for_the_period_is_an_impulse():
+    """A triangle of area 0.02 m/s gives the velocity 0.02 m/s, hence the peak ω 0.02 m/s later."""
+    triangle = Accelerogram(0.01, [0.0, 2.0, 0.0])
+    found = response_spectrum(triangle, [50.0, 200.0], 0.0)
+    assert found == pytest.approx(2 * np.pi / np.array([50.0, 200.0]) * 0.02, rel=1e-3)
+
+
+def test_the_spectrum_begins_with_the_largest_ground_acceleration():
+    samples = np.random.default_rng(3).normal(size=50)
+    samples[0] = 0.0  # a jump would overshoot at any period
+    ground, peak = Accelerogram(0.02, samples), np.abs(samples).max()
+    assert response_spectrum(ground, [0.3, 0.0])[1] == peak
+    assert response_spectrum(ground, 1e-4) == pytest.approx(peak, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"periods": [0.1, -1.0]}, r"periods is \[-1.0\]; allowed: 0 s, and"),
+        ({"periods": ["long"]}, "periods is .*numbers of seconds"),
+        ({"damping": 1.0}, "damping is 1.0"),
+        ({"ground": Accelerogram.harmonic(1.0)}, "ground is held"),
+    ],
+)
+def test_what_has_no_spectrum_is_one_line(wrong, message):
+    right = {"ground": Accelerogram(0.02, np.ones(3)), "periods": 0.3}
+    with pytest.raises(RefusedError, match=message):
+        response_spectrum(**(right | wrong))
+
+
+@pytest.mark.parametrize("period", [0.0, -1.0, np.nan, np.inf])
+def test_periods_are_positive_numbers(period):
+    with pytest.raises(RefusedError, match="period is"):
+        spectral_acceleration(Accelerogram(0.02, np.ones(3)), period, 0.05)
+
+
+def test_a_period_that_no_structure_has_is_refused_before_it_takes_minutes():
+    frame = StoreyFrame((50e3,), stiffness=(0.09,), dampers=(0.0,), damper_placement="storey")
+    record = Accelerogram(0.02, np.ones(40))
+    with pytest.raises(RefusedError, match=r"first natural period .* as t and MN/m"):
+        over_records(frame, {"m1": Interval(49e3, 51e3)}, [record], duration=20.0, step=0.02)
