@@ -10,7 +10,15 @@ from benchmarks.public.data import MissingPackageError
 from benchmarks.public.row import Row
 
 PAGE = Path(__file__).parents[2].joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
-SLOW = ("paper", "opensees_verification", "structdyn_chopra")
+SLOW = (
+    "coated_sphere",
+    "glass_fibres",
+    "nist_elastic",
+    "opensees_verification",
+    "paper",
+    "square_inclusion",
+    "structdyn_chopra",
+)
 
 
 @pytest.mark.parametrize(
