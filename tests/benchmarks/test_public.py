@@ -11,7 +11,9 @@ from benchmarks.public.row import Row
 
 PAGE = Path(__file__).parents[2].joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
 SLOW = (
+    "ansys_verification",
     "coated_sphere",
+    "code_aster_chains",
     "glass_fibres",
     "nist_elastic",
     "opensees_verification",
