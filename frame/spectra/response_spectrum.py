@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, checked_number, require
+from alphacut.base.errors import checked_number, require, require_numbers
 from alphacut.frame.records.history import Accelerogram
 
 Complex = NDArray[np.complex128]
@@ -52,18 +52,16 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
     ratio = checked_number("damping", damping, least=0, most=0.999)
     is_sampled = not ground.is_held and not ground.frequency
     require(is_sampled, "ground", "held or multiplied with a sine", "a record that ends")
-    try:
-        shaped = np.asarray(periods, float)
-    except (TypeError, ValueError):
-        raise RefusedError("periods", repr(periods), "numbers of seconds") from None
-    is_allowed = (shaped == 0) | ((shaped >= MIN_PERIOD) & np.isfinite(shaped))
-    wrong = shaped[~is_allowed].tolist()
-    require(not wrong, "periods", wrong[:1], f"0 s, and periods from {MIN_PERIOD:g} s on")
-
+    require_numbers("periods", np.asarray(periods))
+    shaped = np.asarray(periods, float)
+    oscillates = shaped != 0
+    positive = shaped[oscillates]
+    smallest = positive.min(initial=np.inf)
+    allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
+    require(smallest >= MIN_PERIOD, "periods", f"{smallest:g} s", allowed)
     found = np.full(shaped.shape, ground.extremes[0])
-    oscillates = shaped > 0
-    if oscillates.any():
-        found[oscillates] = _pseudo_accelerations(ground, 2 * pi / shaped[oscillates], ratio)
+    if positive.size:
+        found[oscillates] = _pseudo_accelerations(ground, 2 * pi / positive, ratio)
     return found
 
 
@@ -120,30 +118,24 @@ def _pseudo_accelerations(ground: Accelerogram, omega: Array, ratio: float) -> A
     y = u' - λ* u satisfies y' = λ y - a(t), and u = Im y / Im λ.
     """
     roots: Complex = np.asarray(omega * complex(-ratio, sqrt(1 - ratio**2)), complex)
-    samples = ground.samples
     step = ground.step
-    differences = np.diff(samples)
-    # States y at the samples, shape (samples, oscillators).
+    # After the last sample the load is zero for one period, as |u| may be largest there.
+    zeros = np.zeros(int(np.ceil(2 * pi / omega.min() / step)))
+    starts = np.append(ground.samples[:-1], zeros)
+    differences = np.append(np.diff(ground.samples), zeros)
+    # States y at the beginning of each step, shape (steps, oscillators).
     whole = _Advance.of(roots, step, step)
-    states = np.zeros((len(samples), len(roots)), complex)
-    states[1:] -= np.multiply.outer(samples[:-1], whole.constant)
-    states[1:] -= np.multiply.outer(differences, whole.ramp)
-    for k in range(1, len(samples)):
-        states[k] += whole.decay * states[k - 1]
+    loads = np.outer(starts, whole.constant) + np.outer(differences, whole.ramp)
+    states = np.zeros_like(loads)
+    for k in range(len(starts) - 1):
+        states[k + 1] = whole.decay * states[k] - loads[k]
 
     largest = np.zeros(len(roots))
     for k in range(len(roots)):
-        root = roots[[k]]
-        period = float(2 * pi / omega[k])
-        substeps = max(1, int(np.ceil(step * READINGS / period)))
-        at_samples = states[:, k].copy()
+        substeps = int(np.ceil(READINGS * step * omega[k] / (2 * pi)))
+        at_steps = states[:, k].copy()
         for j in range(substeps):
-            part = _Advance.of(root, j * step / substeps, step)
-            inside = part.decay * at_samples[:-1]
-            inside -= part.constant * samples[:-1] + part.ramp * differences
+            part = _Advance.of(roots[[k]], j * step / substeps, step)
+            inside = part.decay * at_steps - part.constant * starts - part.ramp * differences
             largest[k] = max(largest[k], np.abs(inside.imag).max())
-        # Free vibration from the last sample on.
-        times = np.arange(0.0, period + step / substeps, step / substeps)
-        free = np.exp(root * times) * at_samples[-1]
-        largest[k] = max(largest[k], np.abs(free.imag).max())
     return np.asarray(omega**2 * largest / roots.imag)

@@ -57,8 +57,8 @@ def test_the_spectrum_begins_with_the_largest_ground_acceleration():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"periods": [0.1, -1.0]}, r"periods is \[-1.0\]; allowed: 0 s, and"),
-        ({"periods": ["long"]}, "periods is .*numbers of seconds"),
+        ({"periods": [0.1, -1.0]}, "periods is -1 s; allowed: 0 s, and"),
+        ({"periods": ["long"]}, "periods is 'long'; allowed: finite numbers"),
         ({"damping": 1.0}, "damping is 1.0"),
         ({"ground": Accelerogram.harmonic(1.0)}, "ground is held"),
     ],
