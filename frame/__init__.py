@@ -38,10 +38,13 @@ if TYPE_CHECKING:
     from alphacut.frame.records.history import Accelerogram, History
     from alphacut.frame.records.suite import read_record, read_suite
     from alphacut.frame.result import Envelope
+    from alphacut.frame.spectra.asce7 import asce7_multi_period, asce7_two_period
+    from alphacut.frame.spectra.eurocode8 import eurocode8_spectrum
     from alphacut.frame.spectra.response_spectrum import (
         response_spectrum,
         spectral_acceleration,
     )
+    from alphacut.frame.spectra.target import TargetSpectrum, read_spectrum
     from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
     from alphacut.frame.structures.loads import Force
     from alphacut.frame.structures.material_damping import damping_from_loss
@@ -51,16 +54,17 @@ if TYPE_CHECKING:
     from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Decision", "DualProof", "Envelope",
-    "Exact", "Force", "Fragility", "GraphFollower", "History", "Identified", "ImprovedFollower",
-    "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow",
-    "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction",
-    "Predictions", "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks",
-    "Sensitivity", "StoreyFrame", "SuitePeaks", "Tolerances", "UnprovedError",
-    "damping_from_loss", "decide", "envelope", "fragility", "identify", "incremental",
+    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Decision", "DualProof", "Envelope", "Exact",
+    "Force", "Fragility", "GraphFollower", "History", "Identified", "ImprovedFollower",
+    "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow", "MatrixStructure",
+    "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction", "Predictions",
+    "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks", "Sensitivity", "StoreyFrame",
+    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError",
+    "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
+    "eurocode8_spectrum", "fragility", "identify", "incremental",
     "measured_mode", "over_records", "peaks", "pendulum", "probability", "read_matrix",
-    "read_modes", "read_record", "read_suite", "require_envelope", "response_spectrum",
-    "sensitivity", "spectral_acceleration", "tolerances",
+    "read_modes", "read_record", "read_spectrum", "read_suite", "require_envelope",
+    "response_spectrum", "sensitivity", "spectral_acceleration", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -98,11 +102,15 @@ AT_FIRST_USE = {
     "Sensitivity": "analyses.sensitivity",
     "StoreyFrame": "structures.storey",
     "SuitePeaks": "analyses.suites",
+    "TargetSpectrum": "spectra.target",
     "Tolerances": "analyses.tolerances",
     "UnprovedError": "calculus.unproved",
+    "asce7_multi_period": "spectra.asce7",
+    "asce7_two_period": "spectra.asce7",
     "damping_from_loss": "structures.material_damping",
     "decide": "analyses.decision",
     "envelope": "propagation",
+    "eurocode8_spectrum": "spectra.eurocode8",
     "fragility": "analyses.fragility",
     "identify": "identification.identify",
     "incremental": "analyses.incremental",
@@ -114,6 +122,7 @@ AT_FIRST_USE = {
     "read_matrix": "structures.read_matrix",
     "read_modes": "identification.read_modes",
     "read_record": "records.suite",
+    "read_spectrum": "spectra.target",
     "read_suite": "records.suite",
     "require_envelope": "propagation",
     "response_spectrum": "spectra.response_spectrum",

