@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from alphacut.frame.analyses.peaks import Peak, peaks
     from alphacut.frame.analyses.probability import Probability, probability
     from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
+    from alphacut.frame.analyses.spectral_scaling import ScaledSuite, scale_suite
     from alphacut.frame.analyses.suites import SuitePeaks, over_records
     from alphacut.frame.analyses.tolerances import Tolerances, tolerances
     from alphacut.frame.calculus.unproved import UnprovedError
@@ -58,13 +59,13 @@ __all__ = [
     "Force", "Fragility", "GraphFollower", "History", "Identified", "ImprovedFollower",
     "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow", "MatrixStructure",
     "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction", "Predictions",
-    "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks", "Sensitivity", "StoreyFrame",
-    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError",
+    "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity",
+    "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError",
     "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
-    "eurocode8_spectrum", "fragility", "identify", "incremental",
-    "measured_mode", "over_records", "peaks", "pendulum", "probability", "read_matrix",
-    "read_modes", "read_record", "read_spectrum", "read_suite", "require_envelope",
-    "response_spectrum", "sensitivity", "spectral_acceleration", "tolerances",
+    "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode", "over_records",
+    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
+    "read_suite", "require_envelope", "response_spectrum", "scale_suite", "sensitivity",
+    "spectral_acceleration", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -99,6 +100,7 @@ AT_FIRST_USE = {
     "RefutedError": "identification.identify",
     "Sampled": "methods.sampled",
     "ScaledPeaks": "analyses.incremental",
+    "ScaledSuite": "analyses.spectral_scaling",
     "Sensitivity": "analyses.sensitivity",
     "StoreyFrame": "structures.storey",
     "SuitePeaks": "analyses.suites",
@@ -126,6 +128,7 @@ AT_FIRST_USE = {
     "read_suite": "records.suite",
     "require_envelope": "propagation",
     "response_spectrum": "spectra.response_spectrum",
+    "scale_suite": "analyses.spectral_scaling",
     "sensitivity": "analyses.sensitivity",
     "spectral_acceleration": "spectra.response_spectrum",
     "tolerances": "analyses.tolerances",

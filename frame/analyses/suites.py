@@ -150,11 +150,7 @@ def scaled_records(
     require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
     require(duration > 0, "duration", value=f"{duration:g} s", allowed="above 0 s")
     checked_number("step", step, positive=True)
-    require(len(suite) > 0, "suite", value=None, allowed="one record or more")
-    # Results of records are told apart by the names.
-    names = [record.name or f"record {number}" for number, record in enumerate(suite, start=1)]
-    repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
-    require(not repeated, "suite", value=repeated, allowed="a name of its own for each record")
+    names = record_names(suite)
     mode = nominal_mode(model)
     # Towers have periods of about 10 s. A longer one than 1000 s is a mistake in a unit.
     what = f"a first natural period of {mode.period:.4g} s"
@@ -194,6 +190,20 @@ def scaled_records(
         warnings += _warnings(name, record, facts, peak=ground.extremes[0])
         scaled.append(ScaledRecord(name, ground, facts, tuple(warnings)))
     return tuple(scaled)
+
+
+def record_names(suite: Sequence[Accelerogram]) -> list[str]:
+    """Return the names of records, "record 1" and so on of those without one.
+
+    Raises:
+        RefusedError: There is no record, or two have the same name, by which results are told
+            apart.
+    """
+    require(len(suite) > 0, "suite", value=None, allowed="one record or more")
+    names = [record.name or f"record {number}" for number, record in enumerate(suite, start=1)]
+    repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
+    require(not repeated, "suite", value=repeated, allowed="a name of its own for each record")
+    return names
 
 
 def short_record_warnings(name: str, length: float, period: float) -> list[str]:

@@ -21,16 +21,19 @@ class MeanRule(NamedTuple):
     """What a code asks of the mean of the spectra of a suite of records.
 
     Args:
-        clause: Code and clause.
+        clause: Code and clause; empty if nothing is asked for.
         floor: Smallest ratio of the mean to the target over a range of periods.
-        floor_at_zero: The same at the period 0; 0 if the code asks for nothing there.
+        floor_at_zero: The same at the period 0.
         records: Smallest number of records.
     """
 
-    clause: str
-    floor: float
-    floor_at_zero: float
-    records: int
+    clause: str = ""
+    floor: float = 0.0
+    floor_at_zero: float = 0.0
+    records: int = 1
+
+
+NO_RULE = MeanRule()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,7 +51,8 @@ class TargetSpectrum:
         damping: Damping ratio that it belongs to.
         falls_from: Periods T_C and T_D of codes, in s; none for a table.
         minimum: Smallest value, in m/s².
-        rule: What the code asks of the mean spectrum of a suite; None if it asks for nothing.
+        rule: What the code asks of the mean spectrum of a suite. A floor at 0 belongs to the first
+            period, which is 0 for codes.
 
     Raises:
         RefusedError: The periods do not rise, an acceleration is not positive, or there are not as
@@ -68,7 +72,7 @@ class TargetSpectrum:
     damping: float = 0.05
     falls_from: tuple[float, ...] = ()
     minimum: float = 0.0
-    rule: MeanRule | None = None
+    rule: MeanRule = NO_RULE
 
     def __post_init__(self) -> None:
         """Check periods and accelerations, and store them as arrays."""

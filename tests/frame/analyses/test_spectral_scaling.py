@@ -1,0 +1,73 @@
+"""Records scaled to a target: known factors, floors between the periods compared, refusals."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import (
+    Accelerogram,
+    StoreyFrame,
+    TargetSpectrum,
+    eurocode8_spectrum,
+    read_suite,
+    response_spectrum,
+    scale_suite,
+)
+from alphacut.fuzzy import RefusedError
+
+SUITE = read_suite("cases/suite/record-200[1-4].AT2", baseline="mean")
+
+
+def own_spectrum(record, factor):
+    """The spectrum of a record itself as a target, from 0.05 s to 4 s."""
+    periods = np.geomspace(0.05, 4.0, 800)
+    return TargetSpectrum(periods, factor * response_spectrum(record, periods))
+
+
+@pytest.mark.parametrize("fit", ["record", "suite", "period"])
+def test_a_record_reaches_its_own_spectrum_by_the_factor_it_was_divided_by(fit):
+    scaled = scale_suite(SUITE[:1], own_spectrum(SUITE[0], 2.5), 0.8, fit=fit)
+    assert scaled.factors["record-2001"] == pytest.approx(2.5, rel=2e-3)
+    assert np.array_equal(scaled.suite[0].samples, scaled.factors["record-2001"] * SUITE[0].samples)
+
+
+@pytest.mark.parametrize(("fit", "ag", "period"), [("record", 2.5, 0.5), ("suite", 1.0, 1.5)])
+def test_the_mean_keeps_the_floors_of_en_1998_between_the_periods_compared(fit, ag, period):
+    target = eurocode8_spectrum(ag, "C")
+    scaled = scale_suite(SUITE, target, period, fit=fit)
+    periods = np.linspace(0.2 * period, 2 * period, 400)
+    mean = np.mean([response_spectrum(record, periods) for record in scaled.suite], axis=0)
+    peak = np.mean([record.extremes[0] for record in scaled.suite])
+    least, at_zero = (mean / target(periods)).min(), peak / target(0.0)
+    assert least > 0.9 * 0.995
+    assert at_zero >= 1 - 1e-12
+    # One of the floors is reached, since both suites had to be raised.
+    assert min(least / 0.9, at_zero) < 1.005
+    assert "the floor at T = " in scaled.words()
+    assert (len(set(scaled.factors.values())) == 1) == (fit == "suite")
+
+
+def test_at_a_period_each_record_has_the_value_of_the_target():
+    frame = StoreyFrame([50e3], stiffness=[8e6], damping_ratio=0.05)
+    period = 2 * np.pi * np.sqrt(50e3 / 8e6)
+    target = eurocode8_spectrum(2.0, "B", damping=0.03)
+    scaled = scale_suite(SUITE, target, frame, fit="period")
+    sizes = [response_spectrum(record, period, 0.03) for record in scaled.suite]
+    assert sizes == pytest.approx([float(target(period))] * 4)
+    assert [row["Sa/target at T1"] for row in scaled.records()] == pytest.approx([1.0] * 5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"period": 2.5}, r"period is .* those of the elastic spectrum .* 0 … 4 s"),
+        ({"period": 0.0}, "period is 0"),
+        ({"fit": "best"}, "fit is best; allowed: record, suite, period"),
+        ({"over": (1.5, 2.0)}, "over is"),
+        ({"suite": [Accelerogram(0.01, np.zeros(9))]}, "zero throughout"),
+    ],
+)
+def test_what_cannot_be_scaled_is_one_line(wrong, message):
+    right = {"suite": SUITE, "target": eurocode8_spectrum(2.0, "B"), "period": 0.5}
+    with pytest.raises(RefusedError, match=message) as error:
+        scale_suite(**(right | wrong))
+    assert "\n" not in str(error.value)
