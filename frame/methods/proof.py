@@ -250,7 +250,7 @@ class Proof:
         # halvings are distributed among the inputs in proportion to their fractions of the error.
         log2_excess = np.log2(excess) + (max_degree - model.degree) * np.log2(decay)
         halvings = max(1.0, np.ceil(log2_excess / (max_degree + 1)))
-        are_affordable = halvings / (fractions**2).sum() <= np.log2(self.parts)
+        are_affordable = halvings <= np.log2(self.parts) * (fractions**2).sum()
         if not are_affordable:
             return BisectionError(what, cure)
         return GapError(what, cure, int(fractions.argmax()))

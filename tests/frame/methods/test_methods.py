@@ -262,3 +262,18 @@ def test_the_text_of_an_envelope_has_its_bounds_at_all_times(proofs):
     low, high = line.partition(": ")[2].partition(",")[0].replace("−", "-").split(" … ")
     assert float(low) == pytest.approx(found.lower[0, :, 0].min() - 0.25, rel=1e-4)
     assert float(high) == pytest.approx(found.upper[0, :, 0].max() + 0.25, rel=1e-4)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_structure_without_uncertainty_is_proved_where_modes_cancel():
+    """Far from the lowest storey the modes cancel, and no input adds to the error that is left."""
+    line = StoreyFrame(
+        masses=[0.1] * 16,
+        stiffness=[2500.0] * 16,
+        dampers=[1.0] * 15 + [10.0],
+        q0=[4e-4] * 16,
+        outputs=("shear16", "shear12", "shear9"),
+    )
+    bounds = envelope(line, {"m1": 0.1}, "proof", duration=0.05, step=0.01, alpha=(0.0,))
+    assert bounds.nature == Nature.GUARANTEED
+    assert (bounds.upper - bounds.lower).max() < 1e-3 * np.abs(bounds.upper).max()
