@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from alphacut.frame import Envelope, envelope
+from alphacut.frame import Envelope, Proof, envelope
 from alphacut.frame.bounds.box import over_box
 from alphacut.frame.boxes import boxes
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -16,33 +16,34 @@ from alphacut.fuzzy import FuzzyNumber
 Range = tuple[float, float]
 
 
-def motion(structure: LinearSystem, duration: float, step: float) -> Envelope:
+def motion(
+    structure: LinearSystem, duration: float, step: float, gap: float | None = None
+) -> Envelope:
     """Return the motion of a structure with its nominal parameters, guaranteed at time nodes.
 
     Args:
         structure: A linear structure that the proofs of `envelope` cover.
         duration: In s, a multiple of `step`.
         step: Distance of the time nodes, in s.
+        gap: Width of bounds that is allowed, as a fraction of the peak of each output.
 
     Raises:
         ValueError: The motion is not guaranteed.
     """
     name, value = next(iter(structure.parameters.items()))
-    found = envelope(structure, {name: value}, duration=duration, step=step, alpha=(0.0,))
+    method = None if gap is None else Proof(gap=gap, tolerance=gap)
+    found = envelope(structure, {name: value}, method, duration=duration, step=step, alpha=(0.0,))
     if not np.isfinite(found.proved.upper).all():
         raise ValueError(f"no proof: {'; '.join(found.notes)}")
     return found
 
 
-def outputs_at(structure: LinearSystem, time: float, steps: int = 10) -> dict[str, Range]:
-    """Return proved bounds of each output at one time, by its name.
+def outputs_at(structure: LinearSystem, time: float, gap: float | None = None) -> dict[str, Range]:
+    """Return proved bounds of each output at one time in s, by its name.
 
-    Args:
-        structure: As `motion` takes it.
-        time: In s.
-        steps: Number of time steps until then; no bound depends on it.
+    Structure and `gap` are those of `motion`.
     """
-    ends = motion(structure, time, time / steps).proved
+    ends = motion(structure, time, time / 10, gap).proved
     last = zip(ends.lower[0, -1].tolist(), ends.upper[0, -1].tolist(), strict=True)
     return dict(zip(structure.outputs, last, strict=True))
 

@@ -20,6 +20,7 @@ SLOW = (
     "paper",
     "square_inclusion",
     "structdyn_chopra",
+    "transmission_line",
 )
 
 
