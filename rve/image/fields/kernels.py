@@ -271,10 +271,11 @@ def _fill_strips(
         for a in range(n):
             row = field[u, (z + a) % nz, y % ny]
             for f in range(n):
-                for x in range(nx - f):
-                    shifted[a, f, x] = row[x + f]
-                for x in range(f):
-                    shifted[a, f, nx - f + x] = row[x]
+                shift = f % nx  # a row of one voxel is its own neighbour
+                for x in range(nx - shift):
+                    shifted[a, f, x] = row[x + shift]
+                for x in range(shift):
+                    shifted[a, f, nx - shift + x] = row[x]
             for k in range(n - dx):
                 out = lines[a, k * nx : (k + 1) * nx]
                 _add_combination(out, nx, n, 1.0, tables[2, dx, k], shifted[a])
@@ -366,10 +367,11 @@ def _add_forces(
             by_mode = lines[a].reshape(n, nx)
             for f in range(n):
                 _add_combination(shifted[a, f], nx, n - dx, 1.0, tables[2, dx, :, f], by_mode)
-                for x in range(nx - f):
-                    row[x + f] += shifted[a, f, x]
-                for x in range(f):
-                    row[x] += shifted[a, f, nx - f + x]
+                shift = f % nx  # as in `_fill_strips`
+                for x in range(nx - shift):
+                    row[x + shift] += shifted[a, f, x]
+                for x in range(shift):
+                    row[x] += shifted[a, f, nx - shift + x]
 
 
 @fast

@@ -131,7 +131,7 @@ def test_the_preconditioner_inverts_one_material_to_single_precision(stress, rng
 @pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
 def test_kernels_do_what_the_elements_matrices_do(stress, rng):
     element = element_of((0.7, 2.0, 1.0), stress=stress)
-    for shape in ((2, 3, 4), (5, 2, 7)):
+    for shape in ((2, 3, 4), (5, 2, 7), (3, 4, 1)):
         trace, deviator = rng.uniform(0.1, 2, (2, *shape))
         operator = Operator(element, trace, deviator)
         fields = rng.normal(size=(2, element.unknowns, *shape))
