@@ -10,6 +10,8 @@ Units are in, lb and s, of VM182 m, kg and s.
 * *VM74*: a mass of .5 on a spring of 200 under an impulse of 10, with dashpots of 0 and 14.
 * *VM75*: the same under a force of 200 from t = 0 on, with dashpots of 0 and 10.
 * *VM89*: masses of .5 and 1, joined by a spring of 800, and each to a wall by one of 200.
+* *VM91*: a pendulum, a mass of .5 on a rod of 100, let go 60 beside and 80 below its pivot under a
+  gravity of 386; T = 3.28284 is its period there.
 * *VM182*: a mass of 2 on a spring of 16, and on it one of 2 by a spring of 6, which a force of 50
   pushes for 1.8 s.
 """
@@ -21,7 +23,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from alphacut.frame import Force, History, MatrixStructure, StoreyFrame
+from alphacut.frame import Force, History, MatrixStructure, StoreyFrame, pendulum
+from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.linear import LinearSystem
 from benchmarks.frame.proved import eigenvalues, mapped, outputs_at
 from benchmarks.public.row import Row
@@ -32,6 +35,8 @@ SOURCE = (
     " first numbers behind `*VFILL,VALUE`; they name W. T. Thomson, *Vibration Theory and"
     " Applications*, and R. K. Vierck, *Vibration Analysis*"
 )
+PERIOD = 3.28284
+"""Of the pendulum of VM91, in s."""
 
 
 def oscillator(dashpot: float, *loads: Force) -> StoreyFrame:
@@ -68,6 +73,21 @@ def displacement(
         yield Row(f"{case}: {name} at {time:g} s", number, found, 7, unit, cut, remark)
 
 
+def swing() -> Iterator[Row]:
+    """Way of the pendulum from its start to the lowest point and to the other side."""
+    steps = 1000  # in a quarter of the period
+    swinging = pendulum(
+        mass=0.5, length=100.0, damping=0.0, gravity=386.0, phi0=math.atan2(60.0, 80.0)
+    )
+    flow = make_flow(swinging, (), PERIOD / 2, PERIOD / 4 / steps, "midpoint")
+    angle = flow.values(np.zeros((1, 0)))[0][:, swinging.outputs.index("phi")]
+    aside, up = 100 * np.sin(angle) - 60, 80 - 100 * np.cos(angle)
+    remark = f"midpoint rule, {4 * steps} steps in a period"
+    yield Row("VM91: ux at T/4", "-60", float(aside[steps]), 5, "in", remark=remark)
+    yield Row("VM91: uy at T/4", "-20", float(up[steps]), 5, "in", remark=remark)
+    yield Row("VM91: ux at T/2", "-120", float(aside[-1]), 5, "in", remark=remark)
+
+
 def rows() -> Iterator[Row]:
     """Enclose frequencies and displacements."""
     yield from frequencies("VM45", StoreyFrame(masses=[0.006477], stiffness=[48.0]), "13.701")
@@ -86,6 +106,7 @@ def rows() -> Iterator[Row]:
     yield from displacement("VM75, dashpot 10", oscillator(10.0, push), 0.2, "1.1531")
     chain = plane([0.5, 1.0], [[1000.0, -800.0], [-800.0, 1000.0]])
     yield from frequencies("VM89", chain, "2.5814", "8.3263")
+    yield from swing()
     pushed = StoreyFrame(
         masses=[2.0, 2.0],
         stiffness=[16.0, 6.0],
