@@ -137,7 +137,11 @@ def motion_text(
             text += "".join(f"warning: {line}\n" for line in short)
     text += "".join(f"warning: {line}\n" for line in load_end_warnings(content, structure))
     if content.records is not None:
+        from alphacut.stages.suite import scaled_suite
+
         text += records_text(content.records, records, nominal_mode(linear))
+        if (scaled := scaled_suite(content.records, structure)) is not None:
+            text += str(scaled)
         # Of a linear structure peaks under records are found with time nodes of their own, finer
         # than the step of the case. Where columns yield, the step must be fine enough for the
         # strongest record.

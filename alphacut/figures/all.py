@@ -14,13 +14,14 @@ from alphacut.figures.style import figure_style, save
 from alphacut.frame import Fragility
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
+from alphacut.stages.suite import scaled_suite
 from alphacut.stages.summary import Results
 
 
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
-    Names are "modulus", "image", "update-inputs", the key of each answered question,
+    Names are "modulus", "image", "update-inputs", "spectra", the key of each answered question,
     "fragility-curves", and "envelope-STUDY-OUTPUT" for each drawn output of a study. Figures of the
     paper have "figNUMBER-" before the name.
 
@@ -34,6 +35,10 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         yield "image", material.image(results.image.arrays)
     if results.learned is not None and not results.learned.is_refuted:
         yield "update-inputs", answers.identified_inputs(results.learned)
+    if results.suite is not None and results.content.records and results.structure:
+        scaled = scaled_suite(results.content.records, results.structure)
+        if scaled is not None:
+            yield "spectra", answers.draw_spectra(scaled)
     for key, answer in results.answers.items():
         yield key, answers.DRAWINGS[key](answer)
         if isinstance(answer, Fragility) and answer.increments:  # of a frame that yields

@@ -13,9 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from alphacut.base.arrays import Array
+from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
-from alphacut.frame import Decision, Fragility, LearnedInputs, Probability, Tolerances
+from alphacut.frame import (
+    Decision,
+    Fragility,
+    LearnedInputs,
+    Probability,
+    ScaledSuite,
+    Tolerances,
+)
 from alphacut.frame.analyses.decision import LimitDecision, degree_text
 from alphacut.frame.analyses.fragility import LimitFragility
 from alphacut.fuzzy.result import Ends
@@ -251,6 +259,32 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
     axes.set_title(part.words.replace("^2", "²"))
     axes.set_ylabel("fraction of records")
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+
+
+def draw_spectra(scaled: ScaledSuite) -> Figure:
+    """Draw spectra of scaled records, their mean and median, the target, and the floor of the mean.
+
+    The periods are those that were compared. In SVG the curves of records show their names.
+
+    Args:
+        scaled: The scaled records, with their spectra at T1, at the periods compared, and at 0.
+    """
+    periods = scaled.periods[1:-1]
+    spectra = scaled.spectra[:, 1:-1] / STANDARD_GRAVITY
+    goal = scaled.target(periods) / STANDARD_GRAVITY
+    figure, axes = plt.subplots()
+    for name, spectrum in zip(scaled.factors, spectra, strict=True):
+        axes.plot(periods, spectrum, color=GREY, lw=0.6, gid=f"{style.HOVER}{name}")
+    axes.plot(periods, spectra.mean(axis=0), color=INK, lw=1.5, label="mean")
+    axes.plot(periods, np.median(spectra, axis=0), color=BLUE, lw=1.2, ls="--", label="median")
+    axes.plot(periods, goal, color=ORANGE, lw=1.8, label="target")
+    if floor := scaled.target.rule.floor:
+        axes.plot(periods, floor * goal, **FIT, label=f"{floor:.0%} of it")
+    axes.axvline(scaled.periods[0], color=INK, lw=0.5, ls=":", label="T1")
+    axes.set(title=scaled.target.name, xlabel="period T (s)", ylim=(0.0, None))
+    axes.set_ylabel("pseudo-acceleration Sa (g)")
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
 
 
 def draw_incremental(answer: Fragility) -> Figure:

@@ -10,7 +10,7 @@ from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Peak, SuitePeaks
+from alphacut.frame import Accelerogram, Peak, ScaledSuite, SuitePeaks, scale_suite
 from alphacut.frame.analyses.fragility import incremental_analyses, increments_of
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
 from alphacut.frame.analyses.limits import limits_by_name
@@ -43,9 +43,10 @@ def suite_records(
         RefusedError: The structure is not linear, a record is zero throughout, or a response lasts
             no whole number of steps.
     """
+    scaled = scaled_suite(section, structure)
     records = scaled_records(
         structure.model,
-        [recording.accelerogram(section.baseline) for recording in section.recordings],
+        _corrected(section) if scaled is None else scaled.suite,
         duration=envelope.duration,
         step=envelope.step,
         scale=section.scale.value,
@@ -56,6 +57,35 @@ def suite_records(
     for record in records:
         envelope.require_steps(f"envelope.duration of {record.name}", record.duration)
     return records
+
+
+def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite | None:
+    """Return the corrected records scaled to the target spectrum of a case; None without one.
+
+    Args:
+        section: Recordings, baseline correction, and the target spectrum.
+        structure: The structure, whose first mode determines the range of periods.
+
+    Raises:
+        RefusedError: The target does not cover the range, a record is zero throughout, or the
+            structure is not linear.
+    """
+    spectrum = section.spectrum
+    if spectrum is None:
+        return None
+    return scale_suite(
+        _corrected(section),
+        spectrum.target,
+        structure.model,
+        fit=spectrum.fit,
+        over=spectrum.over,
+        floor=spectrum.floor,
+    )
+
+
+def _corrected(section: RecordsSection) -> list[Accelerogram]:
+    """Return the records after their baseline correction."""
+    return [recording.accelerogram(section.baseline) for recording in section.recordings]
 
 
 def linear_model(structure: Structure) -> LinearSystem:

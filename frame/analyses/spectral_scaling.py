@@ -80,9 +80,10 @@ class ScaledSuite(Answer):
         rule = self.target.rule
         text = f"The target is the {self.target}. {self.governs}."
         if rule.clause:
+            at_zero = " (at T = 0 all of it)" if rule.floor_at_zero else ""
             text += (
-                f" {rule.clause} asks for a mean of {rule.floor:.0%} of the target or more, of"
-                f" {rule.floor_at_zero:.0%} at T = 0, and for {rule.records} records or more."
+                f" {rule.clause} asks for {rule.records} records or more, whose mean is at least"
+                f" {rule.floor:.0%} of the target{at_zero}."
             )
         return text
 

@@ -25,8 +25,8 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
 
     The displacement u of a linear oscillator relative to the ground follows from
     u'' + 2 ζ ω u' + ω² u = -a(t), from rest. It is computed exactly for the piecewise linear record
-    a(t), and one period of free vibration after the record is included. The peak is read at 40 or
-    more times a period, which misses at most 0.3 % of it.
+    a(t) (Nigam, Jennings 1969), and one period of free vibration after the record is included. The
+    peak is read at 40 or more times a period, which misses at most 0.3 % of it.
 
     Args:
         ground: Ground acceleration a(t), of which the samples count alone.

@@ -7,10 +7,17 @@ import pandas as pd
 import pytest
 
 from alphacut import main
+from alphacut.base.number_text import text_table
 from alphacut.case.content import load
-from alphacut.figures.answers import draw_incremental
-from alphacut.figures.style import save
-from alphacut.frame import Fragility, spectral_acceleration
+from alphacut.figures.answers import draw_incremental, draw_spectra
+from alphacut.figures.style import figure_style, save
+from alphacut.frame import (
+    Fragility,
+    eurocode8_spectrum,
+    read_suite,
+    scale_suite,
+    spectral_acceleration,
+)
 from alphacut.io.typed_json import from_document
 from alphacut.stages.suite import suite_records
 from tests.alphacut.small import refusals, summary_of, summary_of_run
@@ -68,6 +75,35 @@ def test_records_are_scaled_to_a_measure(tmp_path, scale, measure, value):
         assert record.measures["Sa(T1)"] == pytest.approx(size)
 
 
+SPECTRUM = """[records.spectrum]
+ground_acceleration = "0.2 g"
+ground_type = "B"
+[envelope]"""
+
+
+def test_records_are_scaled_to_a_spectrum_as_in_python(tmp_path, capsys):
+    path = written(tmp_path, QUICKER.replace("[envelope]", SPECTRUM))
+    assert main(["run", str(path), "--quiet", "--out", str(tmp_path / "out")]) == 0
+    summary = summary_of(tmp_path / "out")
+    assert "figures/spectra.svg" in summary["figures"]
+    suite = read_suite([tmp_path / "one.csv", tmp_path / "two.csv"])
+    scaled = scale_suite(suite, eurocode8_spectrum(0.2 * 9.80665, "B"), PERIOD)
+    for record in scaled.suite:
+        measures = summary["records"]["by_record"][record.name]["measures"]
+        assert measures["PGA"] == pytest.approx(record.extremes[0])
+    # The factors of `check` are those of the answer.
+    main(["check", str(path)])
+    table = text_table(*scaled.table())
+    assert table in capsys.readouterr().out
+    with figure_style():
+        (axes,) = draw_spectra(scaled).axes
+    lines = {line.get_label(): line for line in axes.lines}
+    mean = scaled.spectra.mean(axis=0)[1:-1]
+    assert lines["mean"].get_ydata() == pytest.approx(mean / 9.80665)
+    assert lines["90% of it"].get_ydata() == pytest.approx(0.9 * lines["target"].get_ydata())
+    assert min(lines["mean"].get_ydata() / lines["90% of it"].get_ydata()) >= 1 - 1e-9
+
+
 def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
     records = records_of(tmp_path)
     free = 1.58 + 5 * PERIOD
@@ -85,6 +121,10 @@ def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
         ("[records]", "[records]\nscale = 0", "a factor above 0"),
         ("[records]", '[records]\nscale = "PGV = 1 m/s"', "a factor above 0"),
         ('[records]\nfiles = ["one.csv", "two.csv"]', "", "nothing moves the frame"),
+        ("[envelope]", SPECTRUM.replace('"B"', '"F"'), "ground_type is F; allowed: A, B, C, D, E"),
+        ("[envelope]", "[records.spectrum]\n[envelope]", "one of ground_acceleration, values"),
+        ("[envelope]", f"scale = 2\n{SPECTRUM}", "scale is beside [records.spectrum]"),
+        ("[envelope]", SPECTRUM.replace("[env", "over = [0.2, 20.0]\n[env"), "0 … 4 s"),
     ],
 )
 def test_what_makes_no_suite_is_one_line(tmp_path, old, new, message):
