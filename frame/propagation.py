@@ -120,7 +120,7 @@ def envelope(
         >>> str(bounds.nature)
         'guaranteed'
     """
-    from alphacut.frame.methods.graph_follower import GraphFollower
+    from alphacut.frame.methods.graph_follower import GraphFollower, with_ascents
     from alphacut.frame.methods.improved_follower import ImprovedFollower
     from alphacut.frame.methods.proof import Proof
 
@@ -135,11 +135,18 @@ def envelope(
     is_cheap = isinstance(flow.flow, LinearFlow) and len(flow.boxes.names) <= 4
     if is_cheap and isinstance(chosen, GraphFollower | ImprovedFollower):
         proof = Proof(gap=chosen.tolerance / 4, boxes=1000)
+    proved: Envelope | None = None
     with progress_reporter(progress) as tick:
-        bounds = chosen.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
-        bounds = with_step_error(bounds, flow, steps)
+        method_progress = tick
         if proof:
-            bounds = _with_proof(bounds, flow, proof, subprogress(tick, 0.5, 1.0))
+            proved = _proved(flow, proof, subprogress(tick, 0.0, 0.5))
+            method_progress = subprogress(tick, 0.5, 1.0)
+        bounds = chosen.run(flow, method_progress)
+        if proved is None and isinstance(chosen, GraphFollower):
+            bounds = with_ascents(bounds, flow)
+        bounds = with_step_error(bounds, flow, steps)
+        if proved:
+            bounds = _with_proof(bounds, flow, proved)
         # Between the nodes proofs state a bound; for other methods some trajectories give an
         # estimate.
         bounds = with_node_deviation(bounds, flow)
@@ -295,22 +302,13 @@ def require_envelope(
             proof.forecast(exact_flow(flow), problem.flow.boxes)
 
 
-def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """Add guaranteed bounds of the exact response to an envelope from trajectories.
+def _proved(over: UnitFlow, proof: Proof, tick: Progress) -> Envelope | None:
+    """Return guaranteed bounds of the exact response of a linear structure, or None.
 
     Args:
-        followed: The envelope, whose bounds are estimated or attained.
-        over: The response for which it was computed, of a linear structure, over the boxes of the
-            inputs.
-        proof: The method of the proof, which is run here.
+        over: The response over the boxes of the inputs.
+        proof: The method of the proof. If it fails with an `UnprovedError`, None is returned.
         tick: Called with the completed fraction.
-
-    Returns:
-        A copy with the guaranteed bounds as `outer`, their addition between the time nodes as
-        `between`, and as `error` the larger distance of each end from the guaranteed bound and from
-        the attained value of the proof. The facts "gap" and "estimated_error" are those of the
-        proof and of this error. If the proof fails with an `UnprovedError`, the envelope is
-        returned as it is.
 
     Raises:
         FailedError: The proof contradicts attained values.
@@ -318,9 +316,25 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
-        proved = proof.run(exact, tick)
+        return proof.run(exact, tick)
     except UnprovedError:
-        return followed
+        return None
+
+
+def _with_proof(followed: Envelope, over: UnitFlow, proved: Envelope) -> Envelope:
+    """Add guaranteed bounds of the exact response to an envelope from trajectories.
+
+    Args:
+        followed: The envelope, whose bounds are estimated or attained.
+        over: The response over the boxes of the inputs, for which it was computed.
+        proved: Guaranteed bounds for the same boxes, with attained values.
+
+    Returns:
+        A copy with the guaranteed bounds as `outer`, their addition between the time nodes as
+        `between`, and as `error` the larger distance of each end from the guaranteed bound and from
+        the attained value of the proof. The facts "gap" and "estimated_error" are those of the
+        proof and of this error.
+    """
     # The true bounds lie between the guaranteed bounds (`proved.proved`) and the attained values
     # (`proved.attained`). The error is the larger one of the distances from both.
     ends = np.stack([followed.lower, followed.upper])  # (lower or upper, levels, times, outputs)

@@ -99,6 +99,30 @@ def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(proofs, k
     assert (np.abs(found.upper - true.upper) <= found.error + 1e-12).all()
 
 
+@pytest.mark.parametrize(
+    ("masses", "stiffness", "q0", "step"),
+    [
+        ((2e4, 1.5e4, 1e4), (8e6, 6e6, 5e6), (0.01, 0.02, 0.03), 0.304),
+        ((1e4, 2e4, 3e4), (5e6, 7e6, 9e6), (0.0, 0.02, 0.03), 0.448),
+    ],
+)
+def test_a_graph_follower_declares_the_basins_that_it_misses_between_distant_nodes(
+    masses, stiffness, q0, step
+):
+    """Nodes half of a period apart share no basins, and five inputs have no proof."""
+    system = StoreyFrame(masses, stiffness=stiffness, q0=q0, outputs=("q3", "base_shear"))
+    names = ("k1", "k2", "k3", "m1", "m2")
+    inputs = {x: Interval(0.9 * system.parameters[x], 1.1 * system.parameters[x]) for x in names}
+    motion = {**MOTION, "duration": 20 * step, "step": step, "alpha": (0,), "integrator": "exact"}
+    found = envelope(system, inputs, frame.GraphFollower(tolerance=1e-3), **motion)
+    further = envelope(system, inputs, frame.ImprovedFollower(1e-3), **motion)
+    peak = np.abs(further.upper).max((0, 1))
+    missed = np.maximum(found.lower - further.lower, further.upper - found.upper)
+    assert found.nature is Nature.ESTIMATED
+    assert (missed.max((0, 1)) > 0.05 * peak).any()  # so that there is something to declare
+    assert (missed <= found.error + 1e-9 * peak).all()
+
+
 def test_auto_takes_a_proof_else_the_follower_and_says_why():
     follower = "improved-graph-follower"
     stiff = CHAIN.stiffness[0][1]
