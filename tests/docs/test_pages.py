@@ -15,6 +15,7 @@ from tests.alphacut.small import replaced
 ROOT = Path(__file__).parents[2]
 DEAR = ("own_law_and_outline", "product_space_cell")  # demos
 QUICKER = {
+    "bone": {"(24, 16, 16)": "(12, 8, 8)"},
     "data": {"range(1000)": "range(20)"},
     "random_inputs": {"random_base2(8)": "random_base2(4)"},
     "tutorial": {
