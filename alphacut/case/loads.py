@@ -316,8 +316,6 @@ class SpectrumSection(Section):
     """a factor of each record or of the suite, by least squares; or the target's value at T1"""
     over: tuple[float, float] = (0.2, 2.0)
     """range of periods that are fitted, over T1"""
-    floor: Annotated[float, Quantity(minimum=0)] | None = None
-    """least ratio of the mean to the target in the range, unless the code's 0.9; 0 of a file"""
 
     @property
     def target(self) -> TargetSpectrum:

@@ -275,12 +275,11 @@ def draw_spectra(scaled: ScaledSuite) -> Figure:
     figure, axes = plt.subplots()
     for name, spectrum in zip(scaled.factors, spectra, strict=True):
         axes.plot(periods, spectrum, color=GREY, lw=0.6, gid=f"{style.HOVER}{name}")
-    axes.plot(periods, spectra.mean(axis=0), color=INK, lw=1.5, label="mean")
-    axes.plot(periods, np.median(spectra, axis=0), color=BLUE, lw=1.2, ls="--", label="median")
-    axes.plot(periods, goal, color=ORANGE, lw=1.8, label="target")
-    if floor := scaled.target.rule.floor:
-        axes.plot(periods, floor * goal, **FIT, label=f"{floor:.0%} of it")
-    axes.axvline(scaled.periods[0], color=INK, lw=0.5, ls=":", label="T1")
+    axes.plot(periods, spectra.mean(axis=0), color=INK, label="mean")
+    axes.plot(periods, np.median(spectra, axis=0), color=BLUE, ls="--", label="median")
+    axes.plot(periods, goal, color=ORANGE, label="target")
+    floor = scaled.target.rule.floor
+    axes.plot(periods, floor * goal, **FIT, label=f"{floor:.0%} of it")
     axes.set(title=scaled.target.name, xlabel="period T (s)", ylim=(0.0, None))
     axes.set_ylabel("pseudo-acceleration Sa (g)")
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -79,7 +79,6 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
         structure.model,
         fit=spectrum.fit,
         over=spectrum.over,
-        floor=spectrum.floor,
     )
 
 

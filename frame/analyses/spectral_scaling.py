@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import Table
-from alphacut.frame.analyses.answer import Answer, Record, table_of
+from alphacut.frame.analyses.answer import Answer, Record
 from alphacut.frame.analyses.suites import nominal_mode, record_names
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.spectra.response_spectrum import response_spectrum
@@ -33,7 +33,7 @@ class ScaledSuite(Answer):
     """Records scaled to a target spectrum.
 
     Args:
-        target: The target, with the floors of the mean that were kept.
+        target: The target.
         factors: Factors of the records by name.
         governs: Sentence on what the factors are fitted to, and what raised them.
         periods: Periods in s: T1, those compared with the target, and at last 0, shape (P,).
@@ -53,39 +53,40 @@ class ScaledSuite(Answer):
 
     def table(self) -> Table:
         """Return `records` as texts; numbers have four digits."""
+        records = self.records()
         rows = []
-        for row in self.records():
-            texts = [f"{x:.4g}" if isinstance(x, float) else x or "" for x in row.values()]
-            rows.append(dict(zip(row, texts, strict=True)))
-        return table_of(rows)
+        for name, *numbers in map(dict.values, records):
+            rows.append((str(name), *(f"{x:.4g}" for x in numbers)))
+        return Table(tuple(records[0]), rows)
 
     def records(self) -> list[Record]:
-        """Return a row of numbers for each record, and one for the mean of the spectra.
+        """Return a row of numbers for each record, and one for the mean of factors and spectra.
 
         The columns are the record, its factor, its largest ground acceleration, and its spectrum
         over the target: at T1, and the smallest and the largest ratio over the range of periods.
         """
-        goal = self.target(self.periods[:-1])
-        spectra = dict(zip(self.factors, self.spectra, strict=True))
-        rows: list[Record] = []
-        for name, spectrum in {**spectra, "mean": self.spectra.mean(axis=0)}.items():
-            ratios = spectrum[:-1] / goal
-            row: Record = {"record": name, "factor": self.factors.get(name)}
-            row |= {"PGA [m/s^2]": float(spectrum[-1]), "Sa/target at T1": float(ratios[0])}
-            rows.append(row | {"least": float(ratios.min()), "greatest": float(ratios.max())})
-        return rows
+        factors = list(self.factors.values())
+        spectra = np.vstack([self.spectra, self.spectra.mean(axis=0)])
+        ratios = spectra[:, :-1] / self.target(self.periods[:-1])
+        columns = {
+            "factor": np.append(factors, np.mean(factors)),
+            "PGA [m/s^2]": spectra[:, -1],
+            "Sa/target at T1": ratios[:, 0],
+            "least": ratios.min(axis=1),
+            "greatest": ratios.max(axis=1),
+        }
+        names = enumerate([*self.factors, "mean"])
+        return [{"record": x} | {t: float(c[k]) for t, c in columns.items()} for k, x in names]
 
     def words(self) -> str:
         """Return sentences on the target, what governs, and what the code asks for."""
         rule = self.target.rule
-        text = f"The target is the {self.target}. {self.governs}."
-        if rule.clause:
-            at_zero = " (at T = 0 all of it)" if rule.floor_at_zero else ""
-            text += (
-                f" {rule.clause} asks for {rule.records} records or more, whose mean is at least"
-                f" {rule.floor:.0%} of the target{at_zero}."
-            )
-        return text
+        at_zero = " (at T = 0 all of it)" if rule.floor_at_start else ""
+        return (
+            f"The target is the {self.target}. {self.governs}. {rule.clause} asks for"
+            f" {rule.records} records or more, whose mean is at least {rule.floor:.0%} of the"
+            f" target{at_zero}."
+        )
 
 
 def scale_suite(
@@ -95,13 +96,13 @@ def scale_suite(
     *,
     fit: str = "record",
     over: tuple[float, float] = (0.2, 2.0),
-    floor: float | None = None,
 ) -> ScaledSuite:
     """Scale the records of a suite to a target spectrum.
 
     The spectra of the records are those for the damping ratio of the target. The factors of the
     fit minimise the sum of (ln Sa - ln target)² over the periods. If the mean of the spectra is
-    then below a floor of the code, all factors are raised alike until it is not.
+    then below 90 % of the target, or below all of it at T = 0 where the rule of the target says so,
+    all factors are raised alike until it is not.
 
     Args:
         suite: Records, see `read_suite`.
@@ -110,8 +111,6 @@ def scale_suite(
         fit: "record" for a factor of each record, "suite" for one of all, both over a range of
             periods; "period" for the target's value at T1, without floors.
         over: Ends of the range of periods, over T1.
-        floor: Smallest ratio of the mean to the target in the range; by default that of the code,
-            0.9 for elastic spectra of EN 1998-1 and for ASCE 7-22, and none for tables.
 
     Returns:
         Factors and spectra; the scaled records are `suite`, for `over_records` and others.
@@ -134,10 +133,6 @@ def scale_suite(
     checked_number("period", period, positive=True)
     low, high = over
     require(0 < low <= 1 <= high, "over", over, "multiples of T1 below and above 1, as (0.2, 2)")
-    if floor is not None:
-        rule = target.rule._replace(floor=checked_number("floor", floor, least=0))
-        target = replace(target, rule=rule)
-
     compared = period * np.append(1.0, np.geomspace(low, high, COUNT))
     goal = target(compared)
     periods = np.append(compared, 0.0)
@@ -152,10 +147,9 @@ def scale_suite(
         fitted = logarithms[:, 0]
     factors = np.exp(fitted)
 
-    # The floors of the mean, at T = 0 of codes, over the mean of the spectra.
-    floors = np.append(
-        target.rule.floor * goal, target.rule.floor_at_zero * target.accelerations[0]
-    )
+    # The floors of the mean, the last one at T = 0, over the mean of the spectra.
+    rule = target.rule
+    floors = np.append(rule.floor * goal, rule.floor_at_start * target.accelerations[0])
     demands = floors / np.mean(factors[:, np.newaxis] * spectra, axis=0)
     governs = FITS[fit]
     if fit != "period" and demands.max() > 1:

@@ -13,7 +13,7 @@ PERIODS = [
     0.4, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.5, 10.0,
 ]  # fmt: skip
 """Periods of 11.4.5.1, in s."""
-MEAN_RULE = MeanRule("ASCE 7-22, 16.2.2 and 16.2.3.2", floor=0.9, records=11)
+MEAN_RULE = MeanRule("ASCE 7-22, 16.2.2 and 16.2.3.2", records=11)
 
 
 def asce7_multi_period(accelerations: Array) -> TargetSpectrum:

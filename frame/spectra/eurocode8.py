@@ -27,7 +27,7 @@ SHAPES = {
 }
 """Tables 3.2 (type 1) and 3.3 (type 2), by ground type: the soil factor S, and the periods T_B, T_C
 and T_D in s, from which on the spectrum is constant, falls as 1/T, and falls as 1/T²."""
-MEAN_RULE = MeanRule("EN 1998-1:2004, 3.2.3.1.2(4)", floor=0.9, floor_at_zero=1.0, records=3)
+MEAN_RULE = MeanRule("EN 1998-1:2004, 3.2.3.1.2(4)", floor_at_start=1.0)
 
 
 def eurocode8_spectrum(

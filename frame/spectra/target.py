@@ -21,19 +21,19 @@ class MeanRule(NamedTuple):
     """What a code asks of the mean of the spectra of a suite of records.
 
     Args:
-        clause: Code and clause; empty if nothing is asked for.
+        clause: Code and clause.
         floor: Smallest ratio of the mean to the target over a range of periods.
-        floor_at_zero: The same at the period 0.
+        floor_at_start: The same at the first period of the target, which is 0 in codes.
         records: Smallest number of records.
     """
 
-    clause: str = ""
-    floor: float = 0.0
-    floor_at_zero: float = 0.0
-    records: int = 1
+    clause: str = "The practice of EN 1998-1 and ASCE 7-22"
+    floor: float = 0.9
+    floor_at_start: float = 0.0
+    records: int = 3
 
 
-NO_RULE = MeanRule()
+PRACTICE = MeanRule()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,8 +51,7 @@ class TargetSpectrum:
         damping: Damping ratio that it belongs to.
         falls_from: Periods T_C and T_D of codes, in s; none for a table.
         minimum: Smallest value, in m/s².
-        rule: What the code asks of the mean spectrum of a suite. A floor at 0 belongs to the first
-            period, which is 0 for codes.
+        rule: What is asked of the mean spectrum of a suite.
 
     Raises:
         RefusedError: The periods do not rise, an acceleration is not positive, or there are not as
@@ -72,19 +71,18 @@ class TargetSpectrum:
     damping: float = 0.05
     falls_from: tuple[float, ...] = ()
     minimum: float = 0.0
-    rule: MeanRule = NO_RULE
+    rule: MeanRule = PRACTICE
 
     def __post_init__(self) -> None:
         """Check periods and accelerations, and store them as arrays."""
         for key in ("periods", "accelerations"):
             require_numbers(key, getattr(self, key))
             object.__setattr__(self, key, np.asarray(getattr(self, key), float))
-        count = len(self.periods)
-        rises = count > 1 and bool((np.diff(self.periods, prepend=-1e-300) > 0).all())
-        require(rises, "periods", self.periods, "two or more rising periods from 0 s on")
-        fits = len(self.accelerations) == count and bool((self.accelerations > 0).all())
-        allowed = f"{count} positive values, one for each period"
-        require(fits, "accelerations", self.accelerations, allowed)
+        periods, sizes = self.periods, self.accelerations
+        rises = bool((np.diff(periods, prepend=-1e-300) > 0).all())
+        fits = 1 < len(periods) == len(sizes) and rises and bool((sizes > 0).all())
+        allowed = "two or more rising periods from 0 s on, a positive acceleration for each"
+        require(fits, "spectrum", f"{periods} s, {sizes} m/s^2", allowed)
 
     def __call__(self, periods: ArrayLike) -> Array:
         """Return the spectral acceleration in m/s² at periods in s, in their shape.
@@ -94,7 +92,8 @@ class TargetSpectrum:
         """
         values = np.asarray(periods, float)
         outside = values[~((values >= self.periods[0]) & (values <= self.periods[-1]))]
-        require(not outside.size, "period", f"{outside} s", f"those of the {self}")
+        cure = "compare fewer periods, or give a longer spectrum"
+        require(not outside.size, "period", f"{outside} s", f"those of the {self}", cure)
         found = np.interp(values, self.periods, self.accelerations)
         for corner in self.falls_from:
             found = found * corner / np.maximum(values, corner)
