@@ -86,13 +86,16 @@ def test_a_level_set_that_takes_no_arrays_is_refused(function, words):
 
 def test_minres_is_told_the_norm_that_it_takes_and_takes_it():
     pytest.importorskip("alphacut.rve.fenicsx")
+    from petsc4py import PETSc
+
     radius, phases = HermiteMap(0.2, 0.1, 0.8, 0.1), (rve.Phase(20e9), [rve.Phase(80e9)])
     options = {"mesh_size": 1.0, "layers": 1, "estimate": False}
     minres = {"ksp_type": "minres"}
-    with pytest.raises(RefusedError, match="say -rve_ksp_norm_type preconditioned"):
-        rve.PrismModel(**options, petsc=minres).solve(radius, *phases)
-    norm = {"ksp_norm_type": "preconditioned"}
-    [result] = rve.PrismModel(**options, petsc={**minres, **norm}).solve(radius, *phases)
+    if PETSc.Sys.getVersion() < (3, 25):  # which takes the norm that is set by default
+        with pytest.raises(RefusedError, match="say -rve_ksp_norm_type preconditioned"):
+            rve.PrismModel(**options, petsc=minres).solve(radius, *phases)
+        minres["ksp_norm_type"] = "preconditioned"
+    [result] = rve.PrismModel(**options, petsc=minres).solve(radius, *phases)
     [right] = rve.PrismModel(**options).solve(radius, *phases)
     assert result.modulus == pytest.approx(right.modulus, rel=1e-6)
 

@@ -1,6 +1,7 @@
 """The product-space model on several MPI ranks gives what it gives on one."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -71,8 +72,9 @@ except FailedError as error:
 
 def run(ranks, *command):
     started = subprocess.Popen(
-        # a rank that waits for another one leaves it the core
-        ["mpirun", "--mca", "mpi_yield_when_idle", "1", "-n", str(ranks), sys.executable, *command],
+        ["mpirun", "-n", str(ranks), sys.executable, *command],
+        # a rank of Open MPI that waits for another one leaves it the core
+        env=os.environ | {"OMPI_MCA_mpi_yield_when_idle": "1"},
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
