@@ -18,6 +18,7 @@ QUICKER = {
     "bone": {"(24, 16, 16)": "(12, 8, 8)"},
     "data": {"range(1000)": "range(20)"},
     "random_inputs": {"random_base2(8)": "random_base2(4)"},
+    "rock": {"SIDE = 20": "SIDE = 10"},
     "tutorial": {
         "inputs, progress=False": "inputs, alpha=(0, 1), progress=False",
         "duration=5.0": "alpha=(0, 1), duration=1.0",
