@@ -20,6 +20,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import compiled
 
 
+@cache
 def count(d: int, degree: int) -> int:
     """Return the number of monomials of one degree in d variables."""
     if d == 0:
@@ -173,9 +174,9 @@ def convolve(
             _add_matrix_products(_writable(a), _writable(b), at, out)
             return out
         if bilinear == np.multiply:
-            a_flat = np.broadcast_to(a, (len(a), *shape)).reshape(len(a), -1)
-            b_flat = np.broadcast_to(b, (len(b), *shape)).reshape(len(b), -1)
-            _add_products(_writable(a_flat), _writable(b_flat), at, out.reshape(len(out), -1))
+            a_flat = _writable(_rows(a, shape))
+            b_flat = _writable(_rows(b, shape))
+            _add_products(a_flat, b_flat, at, out.reshape(len(out), -1))
             return out
     # Each coefficient of the shorter factor is multiplied by all of the longer one. Their products
     # have different places, since x y = x z only if y = z: so the sum by indices misses none.
@@ -190,7 +191,16 @@ def convolve(
 
 def _writable(a: Array) -> Array:
     """Return an array, or a copy if it is read-only, of which Numba would compile a new kernel."""
-    return np.require(a, requirements="W")
+    return a if a.flags.writeable else a.copy()
+
+
+def _rows(coefficients: Array, shape: tuple[int, ...]) -> Array:
+    """Return coefficients, broadcast to a shape, as rows: shape (monomials, entries)."""
+    rows = coefficients
+    if coefficients.shape[1:] != shape:
+        rows = np.empty((len(coefficients), *shape), coefficients.dtype)
+        rows[...] = coefficients
+    return rows.reshape(len(rows), -1)
 
 
 def product_part(

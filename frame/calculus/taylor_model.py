@@ -124,30 +124,30 @@ class TaylorModel:
             return self.parts[degree]
         return zero_part(self.inputs, degree, self.shape, self.parts[0].dtype)
 
-    def part_magnitudes(self) -> list[Array]:
-        """Return a bound over the box of the magnitude of each homogeneous part.
+    @cached_property
+    def part_magnitudes(self) -> tuple[Array, ...]:
+        """Bound over the box of the magnitude of each homogeneous part.
 
         Since |u_i| ≤ 1, the sum of the magnitudes of its coefficients bounds a part. A factor
         covers the rounding of that sum, of the sum of all bounds and of the few products that
         callers form with it.
 
-        Returns:
-            One array for each degree from 0 on, each of the shape of the array of functions. The
-            remainder is not in them.
+        There is one array for each degree from 0 on, each of the shape of the array of functions.
+        The remainder is not in them.
         """
         roundings_of_callers = len(self.parts) + 4
-        return [
+        return tuple(
             np.abs(part).sum(0) * (1 + gamma(len(part) + roundings_of_callers))
             for part in self.parts
-        ]
+        )
 
     def magnitude(self) -> Array:
         """Return a bound of |f| over the box, shape V."""
-        return np.asarray(sum(self.part_magnitudes()) + self.remainder)
+        return np.asarray(sum(self.part_magnitudes) + self.remainder)
 
     def deviation(self) -> Array:
         """Return a bound over the box of |f − p(0)|, where p(0) is `value`, shape V."""
-        return np.asarray(sum(self.part_magnitudes()[1:]) + self.remainder)
+        return np.asarray(sum(self.part_magnitudes[1:]) + self.remainder)
 
     def bounds(self) -> tuple[Array, Array]:
         """Return a lower and an upper bound of real functions over the box, each of shape V."""
@@ -280,7 +280,7 @@ class TaylorModel:
 
     def truncated(self, order: int) -> TaylorModel:
         """Return the model to a lower order; bounds of the higher parts go into the remainder."""
-        remainder = np.asarray(self.remainder + sum(self.part_magnitudes()[order + 1 :]))
+        remainder = np.asarray(self.remainder + sum(self.part_magnitudes[order + 1 :]))
         return TaylorModel(self.parts[: order + 1], remainder, self.inputs, order)
 
     def on_subbox(self, low: Array, high: Array) -> TaylorModel:
@@ -305,7 +305,7 @@ class TaylorModel:
         # each derivative is a sum of d terms; |midpoint| + radius ≤ 1, so that no term of the
         # shifted polynomial exceeds the bound of the part that it came from
         roundings = (len(self.parts) + 1) * (self.inputs + 4)
-        rounding = gamma(roundings) * np.sum(self.part_magnitudes(), 0)
+        rounding = gamma(roundings) * np.sum(self.part_magnitudes, 0)
         return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
 
     def shifted_parts(self, point: Array) -> list[Array]:
@@ -466,7 +466,7 @@ class TaylorModel:
         `count` rounded operations without cancellation, so that its error is at most γ_count =
         count u / (1 − count u) of it, with the unit roundoff u.
         """
-        of_coefficients = gamma(count) * np.sum(self.part_magnitudes(), 0)
+        of_coefficients = gamma(count) * np.sum(self.part_magnitudes, 0)
         return self.widened(of_coefficients + gamma(count + 3) * self.remainder)
 
     def _as_model(self, other: TaylorModel | ArrayLike) -> TaylorModel:
@@ -494,7 +494,7 @@ class TaylorModel:
         magnitude = np.abs(factor)
         remainder = np.asarray(bilinear(self.remainder, magnitude)) * (1 + gamma(terms + 2))
         # |fl(x·y) − x·y| ≤ γ_n |x|·|y| for sums of n products (Higham 2002, section 3.1)
-        products = bilinear(np.sum(self.part_magnitudes(), 0), magnitude)
+        products = bilinear(np.sum(self.part_magnitudes, 0), magnitude)
         rounding = gamma(terms + COMPLEX_ROUNDINGS) * products
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
         return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
@@ -655,7 +655,7 @@ def _padded(part: Array, ndim: int) -> Array:
     missing = max(ndim - (part.ndim - 1), 0)
     if not missing:  # as in most products, of which there are many
         return part
-    return np.expand_dims(part, tuple(range(1, 1 + missing)))
+    return part.reshape(len(part), *(1,) * missing, *part.shape[1:])
 
 
 def _product(
@@ -675,8 +675,8 @@ def _product(
     """
     order = max(a.order, b.order)
     ndim = max(a.remainder.ndim, b.remainder.ndim)
-    a_magnitudes = a.part_magnitudes()
-    b_magnitudes = b.part_magnitudes()
+    a_magnitudes = a.part_magnitudes
+    b_magnitudes = b.part_magnitudes
     # |f g − p q| ≤ |f − p| |g| + |p| |g − q|
     remainder = bilinear(a.remainder, np.asarray(sum(b_magnitudes)) + b.remainder)
     remainder = remainder + bilinear(np.asarray(sum(a_magnitudes)), b.remainder)
@@ -686,12 +686,12 @@ def _product(
     inner = 1  # products in each entry of `bilinear`
     if bilinear == matmul:
         inner = a.shape[-1]
+    b_padded = [_padded(y, ndim) for y in b.parts]
     for i, x in enumerate(a.parts):
-        for j, y in enumerate(b.parts):
+        x_padded = _padded(x, ndim)
+        for j, y_padded in enumerate(b_padded):
             omitted_fraction = 1.0  # of the product of two parts, by the polynomial
             if i + j <= order:
-                x_padded = _padded(x, ndim)
-                y_padded = _padded(y, ndim)
                 parts[i + j] += convolve(x_padded, y_padded, (i, j), a.inputs, bilinear)
                 # a monomial of degree i + j splits in at most binomial(i + j, i) ways into factors
                 # of degree i and j, whose products are summed, and i + j + 1 such parts are added

@@ -315,11 +315,11 @@ class LinearFlow(Flow):
         ):
             x = states[:, half]
             row = rows.value[0, :, half]
-            energy += np.einsum("ti,ij,tj->t", x, matrix, x, optimize=True)
+            energy += np.einsum("ti,ti->t", x @ matrix, x)
             # A pseudo-inverse serves, since free unknowns make K singular: they store no energy,
             # and an output on them has no bound from it.
             inverse = np.linalg.pinv(matrix, hermitian=True)
-            squared_size += np.einsum("oi,ij,oj->o", row, inverse, row, optimize=True)
+            squared_size += np.einsum("oi,oi->o", row @ inverse, row)
         largest_energy = max(float(energy.max()), 0.0)
         return np.asarray(np.sqrt(np.maximum(squared_size, 0.0) * largest_energy))
 

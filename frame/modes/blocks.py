@@ -453,7 +453,8 @@ def _norm_of_terms(terms: Array, is_square: Mask) -> float:
     values, vectors = np.linalg.eigh(terms[is_nonzero])
     of_square = is_square[is_nonzero, np.newaxis]
     magnitudes = np.where(of_square, np.maximum(-values, 0.0), np.abs(values))
-    total = np.einsum("aij,aj,akj->ik", vectors, magnitudes, vectors, optimize=True)
+    weighted = magnitudes[:, np.newaxis, :] * vectors
+    total = np.tensordot(weighted, vectors, ((0, 2), (0, 2)))  # Σ_αj v_ij |λ_j| v_kj
     return float(np.linalg.norm(total, 2))
 
 

@@ -141,8 +141,10 @@ def modes_at(
     entry_roundings = system.entry_roundings
     participation = {}
     for name, v in patterns.items():
-        value = np.einsum("sik,sij,sj->sk", shapes, M, v, optimize=True)
-        magnitude = np.einsum("sik,sij,sj->sk", np.abs(shapes), np.abs(M), np.abs(v), optimize=True)
+        impulse = np.einsum("sij,sj->si", M, v)
+        value = np.einsum("sik,si->sk", shapes, impulse)
+        impulse_magnitude = np.einsum("sij,sj->si", np.abs(M), np.abs(v))
+        magnitude = np.einsum("sik,si->sk", np.abs(shapes), impulse_magnitude)
         error = gamma(2 * n + 2 * entry_roundings) * magnitude
         participation[name] = RoundedValues(value, error)
 
@@ -424,8 +426,8 @@ def _superposition_error(
 
     G = modes.stiffness_error[point]
     F = modes.mass_error[point]
-    error += np.einsum("sj,sjk,sk->s", r, G * divided_differences, c, optimize=True)
-    error += np.einsum("sj,sjk,sk->s", r * e, F, c, optimize=True)
+    error += np.einsum("sj,sj->s", r, np.einsum("sjk,sk->sj", G * divided_differences, c))
+    error += np.einsum("sj,sj->s", r * e, np.einsum("sjk,sk->sj", F, c))
 
     # Terms of second order, with the norms φ of F and b of B ≤ G/(1 − φ).
     phi = np.linalg.norm(F, axis=(1, 2))

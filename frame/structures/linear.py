@@ -468,7 +468,9 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     total = mass * 0.0
     for k in np.unique(number):
         f = _divided_differences(omega, number == k)
-        pairs = np.einsum("sikj,asik,bskj->absij", f.second, first, first, optimize=True)
+        # two products without a search for their order, which takes longer
+        weighted = f.second * first[..., np.newaxis]
+        pairs = np.einsum("asikj,bskj->absij", weighted, first)
         bend = f.first * second + pairs + pairs.swapaxes(0, 1)
         value = np.where(number == k, 2 * omega, 0.0)[:, None] * shapes
         function = Jet.of(

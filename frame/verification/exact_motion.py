@@ -228,9 +228,13 @@ class _ScaledSystem:
         flow[: 2 * n, : 2 * n] = self.matrix * substep
         flow[n : 2 * n, 2 * n] = push / scale * substep
         turn = history.frequency * substep
-        rotation = np.kron(np.eye(2), [[0, turn], [-turn, 0]])  # d/dt of sin θ and cos θ
-        rise = np.eye(4, k=2)  # g rises by r
-        flow[2 * n :, 2 * n :] = rotation + rise
+        # d/dt of g sin θ, g cos θ, r sin θ and r cos θ, where g rises by r
+        flow[2 * n :, 2 * n :] = [
+            [0, turn, 1, 0],
+            [-turn, 0, 0, 1],
+            [0, 0, 0, turn],
+            [0, 0, -turn, 0],
+        ]
         exact_step = expm(flow)[: 2 * n]
         states = _recursion(exact_step[:, : 2 * n], start, load @ exact_step[:, 2 * n :].T)
 
