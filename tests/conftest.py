@@ -1,6 +1,7 @@
 """What all tests share: random numbers whose seed a failure tells, and shipped cases run once."""
 
 import fcntl
+import gc
 import hashlib
 import io
 import json
@@ -31,6 +32,17 @@ def pytest_collection_modifyitems(config, items):
             and not runs & set(item.fixturenames)
             and not hasattr(item.module, "subprocess")
         ]
+
+
+def pytest_collection():
+    """Collects no garbage while tests are collected, who all stay."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """Spares the garbage collector the objects that stay."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.base.extras import EXTRAS
-from tests.environment.house import ROOT, folder_of_package, top_folder, trees
+from tests.environment.house import ROOT, files_in, folder_of_package, tree
 
 MAY_IMPORT = {
     "base": set(),
@@ -37,10 +37,10 @@ def module_of(file: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def uses(tree: ast.AST, known: set[str]) -> set[str]:
-    """Modules of this project that a tree imports, anywhere: lazily or for types alone as well."""
+def uses(module: ast.AST, known: set[str]) -> set[str]:
+    """Modules of this project that a module imports, anywhere: lazily or for types alone as well."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -53,10 +53,8 @@ def uses(tree: ast.AST, known: set[str]) -> set[str]:
 @cache
 def graph() -> dict[str, set[str]]:
     """The modules of the five packages that each of them imports."""
-    packages = {
-        module_of(file): tree for file, tree in trees().items() if top_folder(file) in MAY_IMPORT
-    }
-    return {name: uses(tree, set(packages)) - {name} for name, tree in packages.items()}
+    packages = {module_of(file): tree(file) for file in files_in(*MAY_IMPORT)}
+    return {name: uses(module, set(packages)) - {name} for name, module in packages.items()}
 
 
 def wrong_directions(imports: dict[str, set[str]]) -> set[tuple[str, str]]:

@@ -31,7 +31,7 @@ def test_a_random_problem_said_otherwise_gives_no_contradiction(kind):
     relations = [x for x in of.relations if "processes" not in x.name]
     chosen = [relations[k] for k in chance.permutation(len(relations))[:3]]
     problem = of.drawn(chance)
-    quicker = {"workers": 1, "nodes": 20}
+    quicker = {"workers": 1, "nodes": 10}
     problem |= {name: value for name, value in quicker.items() if name in problem}
     found = dict(of.checked(problem, chance, chosen))
     assert not {name: lines for name, lines in found.items() if lines}

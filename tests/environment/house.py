@@ -24,15 +24,20 @@ def top_folder(file: Path) -> str:
 
 
 @cache
-def trees() -> dict[Path, ast.Module]:
-    """Syntax trees of all Python files of the project."""
-    files = {path.resolve() for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")}
-    return {file: ast.parse(file.read_text(encoding="utf-8")) for file in sorted(files)}
+def tree(file: Path) -> ast.Module:
+    """Syntax tree of a Python file."""
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@cache
+def files() -> list[Path]:
+    """All Python files of the project."""
+    return sorted({path.resolve() for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")})
 
 
 def files_in(*folders: str) -> list[Path]:
     """Python files in folders of the project, by their names at the top."""
-    return [file for file in trees() if top_folder(file) in folders]
+    return [file for file in files() if top_folder(file) in folders]
 
 
 def kinds_of_lines(text: str) -> Counter[str]:

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from alphacut import main
-from tests.environment.house import PACKAGES, files_in, trees
+from tests.environment.house import PACKAGES, files_in, tree
 
 ANY = 18  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
 
@@ -20,10 +20,10 @@ def uses_any(node: ast.expr | None) -> bool:
     )
 
 
-def signatures_with_any(tree: ast.Module) -> list[str]:
+def signatures_with_any(module: ast.Module) -> list[str]:
     """Names of public functions and methods that take or give Any."""
     names = []
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
             args = node.args
             every = [*args.posonlyargs, *args.args, *args.kwonlyargs, args.vararg, args.kwarg]
@@ -34,7 +34,7 @@ def signatures_with_any(tree: ast.Module) -> list[str]:
 
 
 def test_no_public_signature_has_any():
-    assert sum(len(signatures_with_any(trees()[file])) for file in files_in(*PACKAGES)) <= ANY
+    assert sum(len(signatures_with_any(tree(file))) for file in files_in(*PACKAGES)) <= ANY
 
 
 def test_help_fits_on_one_screen(monkeypatch, capsys):
@@ -55,6 +55,6 @@ def test_help_fits_on_one_screen(monkeypatch, capsys):
 
 def test_assertions_only_tell_mypy_a_type():
     for file in files_in(*PACKAGES):
-        for node in filter(lambda x: isinstance(x, ast.Assert), ast.walk(trees()[file])):
+        for node in filter(lambda x: isinstance(x, ast.Assert), ast.walk(tree(file))):
             text = ast.unparse(node.test)
             assert text.endswith("is not None") or text.startswith("isinstance("), (file, text)

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from alphacut.base.extras import EXTRAS
-from tests.environment.house import FOLDERS, PACKAGES, ROOT, files_in, trees
+from tests.environment.house import FOLDERS, PACKAGES, ROOT, files, files_in, tree
 
 SAME = (
     "distributed dolfinx gmsh hypothesis jinja2 matplotlib meshio mpi4py numba numpy pint "
@@ -82,8 +82,8 @@ def imports_of(tree: ast.Module) -> set[str]:
 
 def foreign_imports(*folders: str) -> set[str]:
     """Names that files of the project, or of folders, import and that neither it nor Python has."""
-    files = files_in(*folders) if folders else trees()
-    names = set().union(*(imports_of(trees()[file]) for file in files))
+    chosen = files_in(*folders) if folders else files()
+    names = set().union(*(imports_of(tree(file)) for file in chosen))
     return names - sys.stdlib_module_names - set(FOLDERS) - LOCAL
 
 

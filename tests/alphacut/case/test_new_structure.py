@@ -22,8 +22,8 @@ spring = "[3.6, 4, 4.4] MN/m"
 [envelope]
 fuzzy = ["mass", "spring"]
 alpha = [0, 1]
-duration = "1 s"
-step = "0.01 s"
+duration = "0.4 s"
+step = "0.02 s"
 [decision]
 limits = ["q1 <= 9 mm"]
 """

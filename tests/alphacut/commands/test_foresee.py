@@ -85,7 +85,7 @@ def test_as_many_studies_are_foreseen_as_a_run_takes(tmp_path, ran):
 
 def test_scales_of_tolerances_are_foreseen_within_a_factor_of_two(tmp_path, monkeypatch):
     scales, envelope = [], tolerances.envelope
-    case = written(tmp_path, TWO_FLOORS)
+    case = written(tmp_path, TWO_FLOORS, **{'"2 s"': '"1 s"'})
     found = foreseen(case)
     monkeypatch.setattr(
         tolerances, "envelope", lambda *x, **given: scales.append(0) or envelope(*x, **given)

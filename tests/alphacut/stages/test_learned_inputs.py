@@ -21,7 +21,7 @@ frequency_deviation = 0.01
 [envelope]
 fuzzy = ["k", "zeta"]
 alpha = [0.05, 1]
-duration = "1 s"
+duration = "0.5 s"
 step = "0.02 s"
 """
 QUESTIONS = """

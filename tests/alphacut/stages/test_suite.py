@@ -173,7 +173,7 @@ def test_what_is_unusual_in_a_record_is_a_warning(tmp_path):
 
 
 def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
-    summary = summary_of_run(written(tmp_path))
+    summary = summary_of_run(written(tmp_path, QUICKER))
     answer, records = summary["fragility"]["limits"]["drift1"], summary["records"]["by_record"]
     assert answer["nature"] == "guaranteed"
     head, rows = from_document(Fragility, summary["fragility"]).table()
@@ -197,7 +197,7 @@ def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
 
 
 def test_the_mean_over_records_lies_between_means_of_ends(tmp_path, capsys):
-    path, out = written(tmp_path), tmp_path / "out"
+    path, out = written(tmp_path, QUICKER), tmp_path / "out"
     limits = 'limits = ["mean drift1 <= 9 mm"]'
     path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
     asked = ["--set", "frame.outputs=['drift1', 'a1']"]
@@ -295,7 +295,7 @@ def test_curves_of_a_demand_have_their_record_and_are_drawn_once_with_all_limits
 
 
 def test_a_run_without_shares_and_questions_has_a_page(tmp_path):
-    text = CASE.partition("[fragility]")[0].replace("stages", "shares = false\nstages")
+    text = QUICKER.partition("[fragility]")[0].replace("stages", "shares = false\nstages")
     summary = summary_of_run(written(tmp_path, text))
     assert "fingerprints" not in summary
     assert main(["report", str(tmp_path / "out"), "--quiet"]) == 0

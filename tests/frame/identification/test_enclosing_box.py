@@ -90,7 +90,8 @@ def test_a_limit_that_structures_of_the_box_exceed_is_undecided(learned, found, 
     never = [Limit(name, 1.01 * peak.upper[0]) for name, peak in peaks(found).items()]
     assert decide(found, never).limits["drift1"].verdict == "not exceeded"
     assert BOX in str(decide(found, never))
-    scale = tolerances(FRAME, learned.inputs, never, most=1.0, duration=DURATION, step=STEP)
+    motion = {"duration": DURATION, "step": STEP}
+    scale = tolerances(FRAME, learned.inputs, never, most=1.0, precision=0.1, **motion)
     assert 0 < scale.kept < 1  # as the prior's support is wider than the box
     assert scale.clear is None
     assert scale.passed is None

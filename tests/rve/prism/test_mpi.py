@@ -19,6 +19,8 @@ from alphacut.stochastic import HermiteMap
 pytestmark = pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
 
 ROOT = Path(__file__).parents[3]
+FEW, ALL = 2, 5
+"""Numbers of the models of prisms that are solved, from the first on, beside one of a level set."""
 MODELS = """
 import numpy as np
 from mpi4py import MPI
@@ -35,7 +37,7 @@ for layers, radius_map, options in (
     (3, radii, {"modulus_range": (75e9, 85e9)}),
     (3, radii, {"petsc": {"level_pc_type": "gamg", "ksp_rtol": "1e-12"}}),
     (172, radii, {"estimate": False}),  # PETSc takes the parts of one rank in 2 goes, of the other in 3
-):
+)[:count]:
     size = 0.4 if layers > 5 else 0.5
     model = PrismModel(size, layers, parallel=True, **options)
     solved.append(model.solve(radius_map, Phase(20e9), [Phase(78e9), Phase(80e9)])[1])
@@ -86,36 +88,41 @@ def run(ranks, *command):
     return printed
 
 
-@pytest.fixture(scope="module")
-def alone():
-    names = {}
+@cache
+def alone(count):
+    """Results of the models in this process."""
+    names = {"count": count}
     exec(MODELS, names)
     return names["results"]
 
 
-@pytest.fixture(scope="module")
-def several():
-    """Function from a number of ranks to what they print, for whom one run does."""
-    return cache(lambda ranks: run(ranks, "-c", ON_ALL_RANKS))
+@cache
+def several(ranks, count):
+    """What a number of ranks prints."""
+    return run(ranks, "-c", f"count = {count}\n{ON_ALL_RANKS}")
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_any_number_of_ranks_gives_the_same_means_iterations_and_errors(alone, several, ranks):
+@pytest.mark.parametrize(
+    ("ranks", "count"),
+    [(2, FEW), *(pytest.param(ranks, ALL, marks=pytest.mark.slow) for ranks in (2, 3))],
+)
+def test_any_number_of_ranks_gives_the_same_means_iterations_and_errors(ranks, count):
     """Of models whose cells Gmsh meshes: it can be imported on the first rank alone."""
-    for one, many in zip(alone, json.loads(several(ranks).splitlines()[0]), strict=True):
+    found = json.loads(several(ranks, count).splitlines()[0])
+    for one, many in zip(alone(count), found, strict=True):
         assert many[0] == pytest.approx(one[0], rel=1e-10, abs=2e-8)
         assert many[1:3] == [list(one[1]), one[2]]
         assert many[3] == pytest.approx(one[3], rel=1e-5, nan_ok=True)
         assert many[4] == pytest.approx(one[4], rel=1e-12)
 
 
-def test_a_refusal_on_the_first_rank_ends_all(several):
-    assert several(2).split()[-2:] == ["refused", "refused"]
+def test_a_refusal_on_the_first_rank_ends_all():
+    assert several(2, FEW).split()[-2:] == ["refused", "refused"]
 
 
-def test_solvers_of_earlier_samples_are_freed_on_all_ranks(several):
+def test_solvers_of_earlier_samples_are_freed_on_all_ranks():
     """PETSc keeps what Python drops on several ranks until all clean up together."""
-    counts = re.findall(r"Rank 0:: Total entries: (\d+)", several(2))
+    counts = re.findall(r"Rank 0:: Total entries: (\d+)", several(2, FEW))
     assert len(counts) == 3
     assert len(set(counts)) == 1, counts
 
