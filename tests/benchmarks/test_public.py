@@ -12,6 +12,7 @@ from benchmarks.public.row import Row
 PAGE = Path(__file__).parents[2].joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
 SLOW = (
     "ansys_verification",
+    "clamped_bar",
     "coated_sphere",
     "code_aster_chains",
     "glass_fibres",
