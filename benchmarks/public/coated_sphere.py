@@ -3,8 +3,9 @@
 A sphere of radius .2 (G = 5, Lamé's λ = 4) in a spherical shell of radius .4 (G = 3, λ = 2) stands
 in a periodic cube of side 1 (G = 1). With λ = 3.63867684478 the cube's own bulk modulus is that of
 coated spheres (Hashin 1962): then all around the shell is strained evenly, and the cell has the
-same bulk modulus. It is the lower bound of Hashin and Shtrikman (1963) for a mixture with one part
-of the sphere to seven of the shell. There are no units.
+same bulk modulus, λ + 2/3 G. It is the lower bound of Hashin and Shtrikman (1963) for a mixture
+with one part of the sphere to seven of the shell. The source computes 4.305067 on a grid of 64³.
+There are no units.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Equal volumes of clay (K = 21, G = 7 GPa) and calcite (K = 76.8, G = 32 GPa); bounds of the bulk
 modulus of an isotropic mixture. The source's comments give them for 50 : 50, though its test then
-asks with other fractions, and to ±50.
+asks with other fractions, and for agreement to 50 GPa.
 """
 
 from __future__ import annotations

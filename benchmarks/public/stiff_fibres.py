@@ -2,8 +2,8 @@
 
 Round fibres (E = 50, ν = .3) stand in a matrix (E = 1, ν = .45), with a volume fraction of .6, and
 axis 3 along the fibres. The source's numbers are of finite elements. Its C3333, which hardly
-depends on the arrangement, is that of a fraction of .5990, as of chords that cut the circle. At
-that fraction the other four constants are the source's as well, as the last rows show.
+depends on the arrangement, is that of a fraction of .5990: chords of a mesh cut off a part of the
+circle. At that fraction the other four constants are the source's as well, as the last rows show.
 """
 
 from __future__ import annotations

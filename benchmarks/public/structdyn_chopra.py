@@ -122,7 +122,6 @@ def rows() -> Iterator[Row]:
         outputs_at(oscillator, 1.0)["q1"],
         unit="m",
         digits=12,
-        remark="proved",
     )
     frame = yielding_frame()
     exact = envelope(frame, {"k1": 1e7}, duration=2.0, step=STEP, alpha=(0.0,)).upper[0, -1, 0]

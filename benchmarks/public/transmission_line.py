@@ -3,8 +3,8 @@
 Twenty cells, each of an inductance of .1 nH and a resistance of 1 Ω in line, 10 Ω in the first one,
 and a capacitance of .4 pF to earth. The voltage at the head of the line is between .99 and 1.01 V.
 At the start each voltage is between −.201 and .201 V and each current between −1 and 1 mA, each for
-itself. Charges through the cells are displacements of a frame of twenty floors: masses are
-inductances, springs reciprocals of capacitances, and their forces voltages.
+itself. The line is computed as a frame of twenty floors: displacements are the charges through the
+cells, masses their inductances, springs the reciprocals of the capacitances, and forces voltages.
 
 CORA encloses all motions in the 50th time step of 1 ps, where also the voltage at the head may vary
 in time, resistances by 1 % and capacitances by .25 %. Here is the exact range after 50 ps where all
