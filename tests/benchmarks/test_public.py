@@ -9,7 +9,9 @@ from benchmarks.public.__main__ import NAMES, Benchmark, main
 from benchmarks.public.data import MissingPackageError
 from benchmarks.public.row import Row
 
-PAGE = Path(__file__).parents[2].joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT.joinpath("docs/public-benchmarks.md").read_text(encoding="utf-8")
+README = ROOT.joinpath("README.md").read_text(encoding="utf-8")
 SLOW = (
     "ansys_verification",
     "clamped_bar",
@@ -43,6 +45,13 @@ def test_the_page_has_each_benchmark_and_no_other():
     beginnings = [Benchmark(name).text([]) for name in NAMES]
     assert len(re.findall("^## ", PAGE, re.M)) == len(beginnings)
     assert [text for text in beginnings if text not in PAGE] == []
+
+
+def test_the_readme_quotes_the_page():
+    table = README.split("| published by |")[1].split("\n\n")[0]
+    numbers = re.findall(r"(\| [^|]*\d[^|]* \| \[.*\][^|]* \|)$", table, re.M)
+    assert len(numbers) == 3
+    assert all(pair in PAGE for pair in numbers)
 
 
 @pytest.mark.parametrize(
