@@ -97,17 +97,10 @@ for filling, of_segmentation in results.items():
 
 
 # %%
-def material(bulk: float, shear: float) -> Phase:
-    """The phase of given K and G."""
-    return Phase(
-        9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)
-    )
-
-
 def classical(is_quartz: np.ndarray) -> dict[str, np.ndarray]:
     """Hashin–Shtrikman bounds in GPa of K, G and the P-wave modulus, filled with bitumen."""
     fractions = [1 - is_quartz.mean(), is_quartz.mean()]
-    phases = [material(*FILLINGS["bitumen"]), material(*SOLID)]
+    phases = [Phase.of_bulk_and_shear(*moduli) for moduli in (FILLINGS["bitumen"], SOLID)]
     found = reference_bounds(phases, fractions=fractions, space=True)
     bulk, shear = np.array(found.bulk), np.array(found.shear)
     return {"K": bulk / 1e9, "G": shear / 1e9, "M_z": (bulk + 4 / 3 * shear) / 1e9}

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
+from typing import Self
 
 import numpy as np
 
@@ -64,6 +65,23 @@ class Phase:
         if not -1 < self.poisson < 0.5:
             raise RefusedError("Poisson's ratio", f"{self.poisson:g}", "values inside (-1, 0.5)")
         require_loss(self.loss)
+
+    @classmethod
+    def of_bulk_and_shear(cls, bulk: float, shear: float) -> Self:
+        """Return the material of a bulk modulus K of three dimensions and a shear modulus G.
+
+        Args:
+            bulk: K in Pa, positive.
+            shear: G in Pa, positive; a fluid is no phase of this kind.
+
+        Raises:
+            RefusedError: K or G is no positive, finite number, or G/K is so small that Poisson's
+                ratio is 1/2 to rounding.
+        """
+        k = checked_number("bulk modulus", bulk, positive=True)
+        g = checked_number("shear modulus", shear, positive=True)
+        # E = 9 K G/(3 K + G) and ν = (3 K − 2 G)/(2 (3 K + G)) of an isotropic solid.
+        return cls(9 * k * g / (3 * k + g), (3 * k - 2 * g) / (6 * k + 2 * g))
 
     @property
     def stiffness(self) -> Array:

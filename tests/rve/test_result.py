@@ -45,6 +45,17 @@ def rotated(stiffness, angle):
     return back.transpose(0, 2, 1) @ stiffness @ back
 
 
+def test_a_phase_of_bulk_and_shear_has_them():
+    quartz = Phase.of_bulk_and_shear(37e9, 44e9)
+    assert quartz.bulk_and_shear == pytest.approx([37e9, 44e9], rel=1e-14)
+    assert (quartz.modulus, quartz.poisson) == pytest.approx((94.535e9, 0.0742), rel=1e-3)
+    for moduli, key in (((37e9, 0.0), "shear modulus"), ((np.inf, 44e9), "bulk modulus")):
+        with pytest.raises(RefusedError, match=key):
+            Phase.of_bulk_and_shear(*moduli)
+    with pytest.raises(RefusedError, match="Poisson's ratio"):
+        Phase.of_bulk_and_shear(37e9, 1e-8)
+
+
 def test_an_isotropic_plane_is_the_same_in_every_direction_and_by_every_average():
     angles = np.linspace(0, np.pi, 7)
     turned = rotated(MATRIX.stiffness, angles)
