@@ -139,7 +139,7 @@ section = scans["dense"].values[:, SHAPE[1] // 2]
 shown = slice_axes.imshow(section, "gray", extent=extent, origin="lower", vmin=200, vmax=800)
 is_open = np.where(filled.is_open[:, SHAPE[1] // 2], 1.0, np.nan)
 slice_axes.imshow(is_open, "autumn", extent=extent, origin="lower", vmin=0, vmax=2)
-slice_axes.set(title="dense bone; orange: open", xlabel="x (mm)", ylabel="z (mm)")
+slice_axes.set(title="orange: bone or pore", xlabel="x (mm)", ylabel="z (mm)")
 figure.colorbar(shown, ax=slice_axes, label="grey value", shrink=0.8)
 
 labels = ["bone\nsparse", "stiffness\nsparse", "bone\ndense", "stiffness\ndense"]
@@ -149,7 +149,8 @@ for offset, (source, values) in enumerate(
     heights = [*values["sparse"], *values["dense"]]
     bar_axes.bar(np.arange(4) + 0.4 * offset, heights, 0.38, label=source)
 bar_axes.set_xticks(np.arange(4) + 0.2, labels)
-bar_axes.set(title="change by 0.5 % of threshold, empty pores", ylabel="change (%)")
+title = "change by 0.5 % of threshold, empty pores"
+bar_axes.set(title=title, ylabel="change (%)", ylim=(0, 11.5))  # the legend stands above the bars
 bar_axes.legend(frameon=False)
 
 for place, axis in enumerate(("E_x", "E_y", "E_z")):
