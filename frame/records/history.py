@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -229,3 +229,8 @@ class Accelerogram(History):
     key: ClassVar[str] = "accelerogram"
     name: str = field(default="", kw_only=True)
     remarks: tuple[str, ...] = field(default=(), kw_only=True, repr=False)
+
+    def has_times_of(self, other: Accelerogram) -> bool:
+        """Return whether two accelerograms differ in their samples alone, of which both have n."""
+        same_samples = replace(other, samples=self.samples)
+        return len(self.samples) == len(other.samples) and self.identity == same_samples.identity

@@ -23,11 +23,14 @@ class Force:
         amplitude: In N, of a storey frame the nominal value of its parameter "F" and the floor; of
             a structure from matrices a number, the name of a parameter or a function of them.
         history: f; None for an impulse at t = 0, whose amplitude is in N s ("J" and the floor).
+        is_inertial: Whether it is the inertia force −M ι a(t) of a component of ground motion, made
+            by the structure itself.
     """
 
     at: int | Array
     amplitude: Factor | str | float
     history: History | None
+    is_inertial: bool = False
 
 
 def distinct_histories(forces: Sequence[Force]) -> list[History]:

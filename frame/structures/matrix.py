@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from math import inf, isfinite
@@ -66,7 +66,10 @@ class MatrixStructure(LinearSystem):
             the modes. Empty for none.
         row_factors: Factor of an output's row by the output's name, as that of a member force; 1
             where none is given.
-        loads: Forces on unknowns that have mass.
+        loads: Forces on unknowns that have mass. The inertia forces of `components` are added to
+            them.
+        components: Further components of the ground motion beside `ground`: pairs (accelerogram,
+            influence vector (n,)). All components have the same step and number of samples.
 
     Raises:
         RefusedError: A name or unit is out of alphabet, a shape is wrong, a number not finite, a
@@ -94,6 +97,7 @@ class MatrixStructure(LinearSystem):
     ratios: Sequence[str | float] = ()
     row_factors: Mapping[str, Factor | str | float] = field(default_factory=dict)
     loads: Sequence[Force] = ()
+    components: Sequence[tuple[Accelerogram, Array]] = ()
 
     def __post_init__(self) -> None:
         """Check all fields, and store arrays as dense, exactly symmetric ones.
@@ -106,7 +110,8 @@ class MatrixStructure(LinearSystem):
                 vector or an array has a wrong shape, or an array is not symmetric; a factor names
                 no parameter or gives no number; the mass of the unknowns that have mass is not
                 positive definite; an unknown without mass has a damper, a force or no stiffness; a
-                damping ratio is outside [0, 1), or their number is not 0, 1 or that of the modes.
+                damping ratio is outside [0, 1), or their number is not 0, 1 or that of the modes;
+                or components of the ground motion are not of one grid of times.
         """
         for name in ("parameters", "observed", "row_factors"):
             value = getattr(self, name)
@@ -122,10 +127,13 @@ class MatrixStructure(LinearSystem):
         require_names("name of a parameter", self.parameters)
         require_names("name of an output", self.observed)
         require_loads(self.ground, self.loads)
-        object.__setattr__(self, "loads", tuple(self.loads))
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
+        self._require_components()
+        # Copies of a structure have its inertia forces already, which are made anew.
+        loads = [force for force in self.loads if not force.is_inertial]
+        object.__setattr__(self, "loads", (*loads, *self._inertia_forces()))
         self._require_vectors()
         self._require_definite()
         for name, factor in self.row_factors.items():
@@ -133,6 +141,49 @@ class MatrixStructure(LinearSystem):
             self._require_factor(f"observed: {name}", factor)
         self._require_forces_on_masses()
         self._require_ratios()
+
+    def _require_components(self) -> None:
+        """Check the components of the ground motion beside the first one.
+
+        Raises:
+            RefusedError: One is no pair of an accelerogram and an influence vector, or the samples
+                of two components do not belong to the same times.
+        """
+        allowed = "a list of pairs (Accelerogram, influence vector)"
+        require_sequence("components", self.components, allowed)
+        for pair in self.components:
+            is_pair = isinstance(pair, Sequence) and len(pair) == 2
+            is_pair = is_pair and isinstance(pair[0], Accelerogram)
+            require(is_pair, "components", type(pair).__name__, allowed)
+            ground, influence = pair
+            require_numbers("influence vector", influence)
+            shape = np.shape(influence)
+            require(
+                shape == (self.size,), "influence vector", f"of shape {shape}", f"({self.size},)"
+            )
+            first = self.ground or self.components[0][0]
+            what = " and ".join(f"{len(x.samples)} every {x.step:g} s" for x in (first, ground))
+            allowed_times = "the same times in all components"
+            require(first.has_times_of(ground), "samples of components", what, allowed_times)
+
+    def _inertia_forces(self) -> Iterator[Force]:
+        """Yield the forces −M(p) ι a(t) = −Σ_i f_i(p) M_i ι a(t) of each component (ι, a).
+
+        There is one force for each term of the mass, whose amplitude is the factor f_i.
+        """
+        for ground, influence in self.components:
+            for factor, array in self.mass:
+                yield Force(-array @ influence, factor, ground, is_inertial=True)
+
+    def moved_by(self, ground: Accelerogram) -> Self:
+        """Return the structure with another base excitation, if it has but one component.
+
+        Raises:
+            RefusedError: The ground moves in several components.
+        """
+        what = f"of {len(self.components) + 1} components"
+        require(not self.components, "ground", what, "one component where a record replaces it")
+        return super().moved_by(ground)
 
     def _require_forces_on_masses(self) -> None:
         """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude."""
