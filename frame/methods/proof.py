@@ -165,10 +165,13 @@ class Proof:
                 `GapError` with the input to bisect, or a `BisectionError` if bisections would not
                 help. Or the structure has no smooth oscillating modes over the sub-box.
         """
+        # Models by their degree, with their errors. Those for a gap leave out no mode that a larger
+        # gap would keep, and serve there as well.
+        models: dict[int, tuple[ModalModel, Array]] = {}
 
         def bounds_within(gap: float) -> list[BoxBounds]:
             """Return the bounds for one gap; raise UnprovedError if the model is inaccurate."""
-            model, error = self._accurate_model(flow, boxes, goal.scale, gap)
+            model, error = self._accurate_model(flow, boxes, goal.scale, gap, models)
             return bound_levels(model, error, goal.scale, gap, self.boxes, goal.workers, goal.tick)
 
         for gap in self._gaps[:-1]:
@@ -177,7 +180,12 @@ class Proof:
         return bounds_within(self._gaps[-1])
 
     def _accurate_model(
-        self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
+        self,
+        flow: LinearFlow,
+        boxes: Boxes,
+        scale: Array,
+        gap: float,
+        models: dict[int, tuple[ModalModel, Array]],
     ) -> tuple[ModalModel, Array]:
         """Return a modal model of a box that is accurate enough for a gap.
 
@@ -186,6 +194,8 @@ class Proof:
             boxes: The box on each level.
             scale: Unit of the gap for each output, shape (outputs,).
             gap: The gap.
+            models: Models of the box for this gap or smaller ones by their degree, with their
+                errors; further ones are added.
 
         Returns:
             The model, and the guaranteed bound of its error at the time nodes, shape (times,
@@ -205,8 +215,11 @@ class Proof:
         while True:
             # Modes that contribute less than a small part of the gap are left out; their energy
             # counts as error.
-            model = ModalModel.of_degree(flow, boxes, degree, numbers.LEFT_OUT_MODES * gap * scale)
-            error = proved_error(model)
+            if degree not in models:
+                left_out = numbers.LEFT_OUT_MODES * gap * scale
+                model = ModalModel.of_degree(flow, boxes, degree, left_out)
+                models[degree] = model, proved_error(model)
+            model, error = models[degree]
             excess = float((error / scale).max()) / (numbers.MAX_ERROR_FRACTION * gap)
             if excess <= 1:
                 return model, error
