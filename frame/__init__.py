@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from alphacut.frame.analyses.probability import Probability, probability
     from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
     from alphacut.frame.analyses.spectral_scaling import ScaledSuite, scale_suite
+    from alphacut.frame.analyses.spectrum_response import SpectrumResponse, spectrum_response
     from alphacut.frame.analyses.suites import SuitePeaks, over_records
     from alphacut.frame.analyses.tolerances import Tolerances, tolerances
     from alphacut.frame.calculus.unproved import UnprovedError
@@ -60,12 +61,12 @@ __all__ = [
     "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow", "MatrixStructure",
     "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction", "Predictions",
     "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity",
-    "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError",
-    "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
-    "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode", "over_records",
-    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
-    "read_suite", "require_envelope", "response_spectrum", "scale_suite", "sensitivity",
-    "spectral_acceleration", "tolerances",
+    "SpectrumResponse", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
+    "UnprovedError", "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide",
+    "envelope", "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode",
+    "over_records", "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
+    "read_spectrum", "read_suite", "require_envelope", "response_spectrum", "scale_suite",
+    "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -102,6 +103,7 @@ AT_FIRST_USE = {
     "ScaledPeaks": "analyses.incremental",
     "ScaledSuite": "analyses.spectral_scaling",
     "Sensitivity": "analyses.sensitivity",
+    "SpectrumResponse": "analyses.spectrum_response",
     "StoreyFrame": "structures.storey",
     "SuitePeaks": "analyses.suites",
     "TargetSpectrum": "spectra.target",
@@ -131,6 +133,7 @@ AT_FIRST_USE = {
     "scale_suite": "analyses.spectral_scaling",
     "sensitivity": "analyses.sensitivity",
     "spectral_acceleration": "spectra.response_spectrum",
+    "spectrum_response": "analyses.spectrum_response",
     "tolerances": "analyses.tolerances",
 }
 """Module of each exported name, which is imported at its first use: all of them take .1 s."""

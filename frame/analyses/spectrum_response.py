@@ -1,0 +1,333 @@
+"""Response-spectrum method: peaks of a linear structure's modes under a spectrum, combined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, checked_number, require, require_choice
+from alphacut.base.number_text import Table, engineering, percent_text, range_text
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.spectra.modal_combination import COMBINATIONS, combined_peaks, correlation
+from alphacut.frame.spectra.target import TargetSpectrum
+from alphacut.frame.structures.linear import LinearSystem, evaluate, undamped_modes
+from alphacut.frame.structures.model import Dynamics, StructureModel
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.boxes import corners, quasi_random_points
+
+MASS_FRACTION = 0.9
+"""Fraction of the mass that EN 1998-1, 4.3.3.3.1(3), and ASCE 7 ask the modes to move."""
+SAMPLES = 200
+"""Points inside of each cut at which peaks are computed (tuned)."""
+CORNER_INPUTS = 8
+"""Most inputs for which all corners of a cut are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The lowest K modes of a structure at S parameter sets, for m outputs.
+
+    Args:
+        omega: Angular frequencies ω in rad/s, rising, shape (S, K).
+        ratios: Damping ratios φᵀ D φ / (2 ω), with φᵀ M φ = 1, shape (S, K).
+        mass_fractions: Effective masses over the mass that moves with the ground, shape (S, K).
+        factors: Participation factor φᵀ M ι times the output of the mode shape, shape (S, K, m).
+            Times the spectral displacement it is the peak of the output by this mode.
+    """
+
+    omega: Array
+    ratios: Array
+    mass_fractions: Array
+    factors: Array
+
+    @property
+    def periods(self) -> Array:
+        """Natural periods in s, shape (S, K)."""
+        return np.asarray(2 * np.pi / self.omega)
+
+    def peaks(self, spectrum: TargetSpectrum) -> Array:
+        """Return the peaks of the outputs by each mode, with their signs, shape (S, K, m).
+
+        Raises:
+            RefusedError: A period lies outside the range of the spectrum.
+        """
+        displacements = spectrum(self.periods) / self.omega**2
+        return np.asarray(self.factors * displacements[..., np.newaxis])
+
+
+@dataclass(frozen=True)
+class Method:
+    """A variant of the response-spectrum method.
+
+    Args:
+        spectrum: Pseudo-acceleration over the period.
+        combination: "SRSS" or "CQC".
+        modes: Number of the lowest modes that are combined; None for all.
+        own_ratios: Whether CQC takes the damping ratio of each mode; else that of the spectrum.
+    """
+
+    spectrum: TargetSpectrum
+    combination: str
+    modes: int | None
+    own_ratios: bool
+
+    def modes_at(self, system: LinearSystem, names: Sequence[str], points: Array) -> Modes:
+        """Return the modes of a structure at S parameter sets.
+
+        Args:
+            system: The structure.
+            names: Names of d parameters; others keep their nominal values.
+            points: Their values in SI units, shape (S, d).
+
+        Raises:
+            RefusedError: An output takes velocities or accelerations, or a stiffness is not
+                positive definite.
+        """
+        matrices, rows = evaluate(system, names, points, derivatives=False)
+        mass = matrices.mass.value
+        squares, shapes = undamped_modes(mass, matrices.stiffness.value)
+        what = "one that lets the structure drift"
+        require(bool((squares > 0).all()), "stiffness", what, "a positive definite one")
+        n = squares.shape[1]
+        of_motion = [np.abs(matrices.accelerated), np.abs(rows.value[..., n:]).max(axis=0)]
+        moving = np.flatnonzero(np.hstack(of_motion).any(axis=1))
+        wrong = ", ".join(system.outputs[k] for k in moving)
+        allowed = "displacements, drifts and forces, which a spectrum of displacements gives"
+        require(not wrong, "output", wrong, allowed)
+
+        omega = np.sqrt(squares)
+        influence = matrices.rigid[:, 0]
+        moved = mass @ influence
+        participation = (shapes.swapaxes(1, 2) @ moved[..., np.newaxis])[..., 0]
+        of_shapes = (rows.value[..., :n] @ shapes).swapaxes(1, 2)
+        damping = np.sum(shapes * (matrices.damping.value @ shapes), axis=1)
+        # The mass that moves with the ground is positive, unless the ground moves nothing.
+        total = np.maximum(moved @ influence, 1e-300)
+        kept = slice(self.modes)
+        return Modes(
+            omega=omega[:, kept],
+            ratios=(damping / (2 * omega))[:, kept],
+            mass_fractions=(participation**2 / total[:, np.newaxis])[:, kept],
+            factors=(participation[..., np.newaxis] * of_shapes)[:, kept],
+        )
+
+    def combined(self, modes: Modes) -> Array:
+        """Return the combined peaks of the outputs, shape (S, m).
+
+        Raises:
+            RefusedError: A period lies outside the range of the spectrum, or CQC is to take the
+                damping ratio of a mode that has none.
+        """
+        correlations = np.eye(modes.omega.shape[1])
+        if self.combination == "CQC":
+            ratios = np.full_like(modes.ratios, self.spectrum.damping)
+            if self.own_ratios:
+                ratios = modes.ratios
+            allowed = "above 0 for CQC, as two modes without damping are correlated in no way"
+            require(bool((ratios > 0).all()), "damping ratio", f"{ratios.min():g}", allowed)
+            correlations = correlation(modes.omega, ratios)
+        return combined_peaks(modes.peaks(self.spectrum), correlations)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SpectrumResponse(Answer):
+    """Combined peaks of a structure under a response spectrum.
+
+    Args:
+        method: Spectrum, rule of combination, number of modes.
+        alpha: Levels, rising, shape (levels,).
+        modes: The modes at the nominal inputs (S = 1).
+        outputs: Names of the outputs.
+        units: SI unit of each output.
+        nominal: Combined peaks at the nominal inputs, shape (outputs,).
+        attained: The smallest and the largest combined peak of each cut that some inputs have,
+            shape (levels, outputs, 2).
+    """
+
+    key = "spectrum_response"
+    title = "Which peaks does the response spectrum give?"
+    method: Method
+    alpha: Array
+    modes: Modes
+    outputs: tuple[str, ...]
+    units: tuple[str, ...]
+    nominal: Array
+    attained: Array
+
+    @property
+    def modal_peaks(self) -> dict[str, Array]:
+        """Peaks of each output by its modes at the nominal inputs, with their signs, (modes,)."""
+        peaks = self.modes.peaks(self.method.spectrum)[0]
+        return dict(zip(self.outputs, peaks.T, strict=True))
+
+    @property
+    def sufficient_modes(self) -> int | None:
+        """Number of the lowest modes that move 90 % of the mass at the nominal inputs, if any do.
+
+        The mass is that which moves with the ground.
+        """
+        sums = np.cumsum(self.modes.mass_fractions[0])
+        # Rounding of a sum that is the whole mass must not be what decides.
+        sufficient = np.flatnonzero(sums >= MASS_FRACTION - 1e-9)
+        return int(sufficient[0]) + 1 if len(sufficient) else None
+
+    def mode_table(self) -> Table:
+        """Return a table of texts with a row for each mode at the nominal inputs.
+
+        The columns are its number, period, damping ratio, fraction of the mass that moves with the
+        ground, the sum of these fractions up to it, and the peak of each output by this mode alone.
+        """
+        modes = self.modes
+        sums = np.cumsum(modes.mass_fractions[0])
+        peaks = modes.peaks(self.method.spectrum)[0]
+        rows = []
+        for k, period in enumerate(modes.periods[0]):
+            row = {
+                "mode": str(k + 1),
+                "T": engineering(float(period), "s"),
+                "ζ": percent_text(float(modes.ratios[0, k]), 2),
+                "mass": percent_text(float(modes.mass_fractions[0, k])),
+                "sum": percent_text(float(sums[k])),
+            }
+            for name, unit, peak in zip(self.outputs, self.units, peaks[k], strict=True):
+                row[name] = engineering(float(peak), unit)
+            rows.append(row)
+        return table_of(rows)
+
+    def table(self) -> Table:
+        """Return a table of texts with a row for each output.
+
+        The columns are the output, the range of its combined peak at the lowest level, the
+        guarantee of this range, and the combined peak at the nominal inputs.
+        """
+        rows = []
+        for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
+            low, high = self.attained[0, k].tolist()
+            row = {
+                "peak of": name,
+                f"at α = {self.alpha[0]:g}": f"{range_text(low, high, Nature.ATTAINED)} {unit}",
+                "nature": self.nature_text(Nature.ATTAINED),
+                "nominal": engineering(float(self.nominal[k]), unit),
+            }
+            rows.append(row)
+        return table_of(rows)
+
+    def records(self) -> list[Record]:
+        """Return a row for each output and level, with the smallest and largest attained peak."""
+        rows: list[Record] = []
+        for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
+            for row_of_level, level in enumerate(map(float, self.alpha)):
+                low, high = self.attained[row_of_level, k].tolist()
+                row: Record = {
+                    "output": name,
+                    "unit": unit,
+                    "alpha": level,
+                    "nominal": float(self.nominal[k]),
+                    "attained lower": known(low),
+                    "attained upper": known(high),
+                }
+                rows.append(row)
+        return rows
+
+    def words(self) -> str:
+        """Return sentences on spectrum, combination, and how much mass the modes move."""
+        method = self.method
+        total = percent_text(float(self.modes.mass_fractions[0].sum()))
+        count = self.modes.omega.shape[1]
+        needed = self.sufficient_modes
+        enough = f"the first {needed} of them 90 %" if needed else "less than the 90 % of codes"
+        return (
+            f"Peaks of {count} modes by the {method.spectrum}, combined by {method.combination}"
+            f" ({COMBINATIONS[method.combination]}). The modes move {total} of the mass,"
+            f" {enough} (at the most plausible inputs). A combined peak is an estimate of the"
+            " peak under an earthquake of this spectrum; its range is that over the inputs."
+        )
+
+
+def spectrum_response(
+    structure: StructureModel,
+    inputs: Mapping[str, FuzzyNumber | float],
+    spectrum: TargetSpectrum,
+    *,
+    combination: str = "CQC",
+    modes: int | None = None,
+    own_ratios: bool = False,
+    alpha: Sequence[float] = ALPHA,
+) -> SpectrumResponse:
+    """Return the peaks of a structure's outputs by the response-spectrum method.
+
+    Mode k with period T_k and shape φ_k gives an output the peak Γ_k r·φ_k Sa(T_k)/ω_k², r the row
+    of the output and Γ_k = φᵀMι/φᵀMφ. The peaks of all modes are combined by SRSS or CQC.
+
+    Args:
+        structure: A linear structure. Its own base excitation and loads are not used.
+        inputs: Fuzzy parameters by name, in SI units; a number is a crisp one.
+        spectrum: Pseudo-acceleration over the period. That of a record is
+            `TargetSpectrum(periods, response_spectrum(record, periods))`.
+        combination: "CQC" or "SRSS".
+        modes: Number of the lowest modes that are combined; all unless given.
+        own_ratios: Whether CQC takes the damping ratio of each mode of the structure; else that
+            of the spectrum is taken for all modes.
+        alpha: Levels, rising within [0, 1].
+
+    Returns:
+        Modes and combined peaks at the nominal inputs, and over each cut the smallest and largest
+        combined peaks at corners and at points inside.
+
+    Raises:
+        RefusedError: An argument is not as said, the structure is not linear, an output takes
+            velocities or accelerations, a period lies outside the range of the spectrum, or the
+            structure may drift.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame, eurocode8_spectrum, spectrum_response
+        >>> frame = StoreyFrame(masses=[5e4, 5e4], stiffness=[6e7, 4e7], outputs=("base_shear",))
+        >>> found = spectrum_response(frame, {"k1": 6e7}, eurocode8_spectrum(2.0, "B"), alpha=[1])
+        >>> found.nominal.round(-2).tolist(), found.sufficient_modes
+        ([543300.0], 1)
+    """
+    require_choice("combination", combination, COMBINATIONS)
+    if not isinstance(structure, LinearSystem) or structure.dynamics is not Dynamics.LINEAR:
+        cure = "take elastic() of a frame whose columns yield"
+        raise RefusedError("structure", "one that is not linear", "a linear structure", cure)
+    if modes is not None:
+        checked_number("modes", modes, positive=True, whole=True)
+    method = Method(spectrum, combination, modes, own_ratios)
+    cuts = boxes(inputs, alpha)
+    nominal_modes = method.modes_at(structure, cuts.names, cuts.nominal[np.newaxis])
+    nominal = method.combined(nominal_modes)[0]
+    return SpectrumResponse(
+        method=method,
+        alpha=cuts.alpha,
+        modes=nominal_modes,
+        outputs=tuple(map(str, structure.outputs)),
+        units=tuple(structure.unit_of(name) for name in structure.outputs),
+        nominal=nominal,
+        attained=_attained(structure, cuts, method),
+    )
+
+
+def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> Array:
+    """Return the smallest and largest combined peaks found in each cut, (levels, outputs, 2).
+
+    They are those at the nominal inputs, at corners of the cut and at points inside. What a
+    narrower cut attains is attained in the wider ones, too.
+    """
+    d = len(cuts.names)
+    inside = quasi_random_points(d, SAMPLES)
+    ends = np.round(inside)  # some corners
+    if d <= CORNER_INPUTS:
+        ends = corners(np.zeros(d), np.ones(d))
+    fractions = np.vstack([inside, ends])
+    found = []
+    for low, high in zip(cuts.lower, cuts.upper, strict=True):
+        points = np.vstack([cuts.nominal, np.clip(low + (high - low) * fractions, low, high)])
+        peaks = method.combined(method.modes_at(structure, cuts.names, points))
+        found.append(np.stack([-peaks.min(axis=0), peaks.max(axis=0)], axis=-1))
+    widest = np.maximum.accumulate(found[::-1])[::-1]
+    return np.asarray(widest * [-1.0, 1.0])
