@@ -269,7 +269,7 @@ def test_blas_threads_do_not_change_a_bit():
     building = StoreyFrame(masses=[4e4] * 8, outputs=("q8", "drift1", "base_shear"), **springs)
     inputs = {"k1": Interval(5.5e7, 6.5e7), "m8": Interval(3.6e4, 4.4e4)}
     inputs["rayleigh_mass"] = Interval(0.4, 0.6)
-    given = {"duration": 3, "step": 0.1, "alpha": (0,), "progress": False}
+    given = {"duration": 8, "step": 0.1, "alpha": (0,), "progress": False}
     bounds = []
     for threads in (1, 3):
         with threadpool_limits(limits=threads, user_api="blas"):
