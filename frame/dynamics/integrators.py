@@ -271,11 +271,12 @@ def load_moments(history: History, step: float, count: int, order: int) -> Array
     since_step = start[:, None] + length * (points + 1) / 2
     time = home[:, None] * step + since_step
     weighted = history.envelope(time) * history.wave(time) * (length / 2 * weights)
+    until_end = 1 - since_step / step
     first_segment_of_step = np.searchsorted(home, np.arange(count))
     moments: Array = np.empty((count, order))
     for k in range(order):
         moments[:, k] = np.add.reduceat(weighted.sum(1), first_segment_of_step)
-        weighted = weighted * (1 - since_step / step)
+        weighted *= until_end
     return moments
 
 

@@ -70,16 +70,12 @@ def lattice_sums(highest: int) -> LatticeSums:
     """
     plain = np.zeros(highest + 1)
     conjugate = np.zeros(highest + 1)
-    for n in range(4, highest + 1, 4):
-        if n < 40:
-            plain[n] = 2 * (_zeta(n) + _lipschitz(n, 1))
-        else:
-            plain[n] = _near_points(n, conjugate=False)
-    for n in range(7, highest + 1, 4):
-        if n < 40:
-            conjugate[n] = 4 * _lipschitz(n, 2)
-        else:
-            conjugate[n] = _near_points(n, conjugate=True)
+    for n in range(4, min(highest + 1, 40), 4):
+        plain[n] = 2 * (_zeta(n) + _lipschitz(n, 1))
+    for n in range(7, min(highest + 1, 40), 4):
+        conjugate[n] = 4 * _lipschitz(n, 2)
+    plain[40::4] = _near_points(np.arange(40, highest + 1, 4), conjugate=False)
+    conjugate[43::4] = _near_points(np.arange(43, highest + 1, 4), conjugate=True)
     return LatticeSums(plain, conjugate)
 
 
@@ -135,20 +131,23 @@ def _lipschitz(n: int, power: int) -> float:
     return float(np.sum(np.exp(logarithm) / (1 - np.exp(-2 * np.pi * q)) ** power))
 
 
-def _near_points(n: int, *, conjugate: bool) -> float:
+def _near_points(n: Ints, *, conjugate: bool) -> Array:
     """Return Σ p^-n, or Σ conj(p) p^-n, over all lattice points p = m + i j ≠ 0, for large n.
 
     Points with |m| ≤ 2 and |j| ≤ 2 are enough. Each of the 8 k points with max(|m|, |j|) = k adds
     at most k^(1 − n), so that all with k ≥ 3 add less than 8 Σ k^-38 < 6e-18 to a sum of about 4.
 
     Args:
-        n: Exponent, at least 40.
+        n: Exponents, at least 40, shape (N,).
         conjugate: Whether the terms have the factor conj(p).
+
+    Returns:
+        The sums, shape (N,).
     """
     m = np.arange(-2.0, 3.0)
     p = (m[:, np.newaxis] + 1j * m).ravel()
     p = p[p != 0]
-    terms = p ** -float(n)
+    terms = p ** -n[:, np.newaxis].astype(float)
     if conjugate:
         terms = p.conj() * terms
-    return float(np.sum(terms).real)
+    return np.asarray(terms.sum(axis=1).real)
