@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, cast
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, on_one_blas_thread
-from alphacut.base.errors import require, require_choice
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.frame.bounds.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
@@ -20,7 +20,13 @@ from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.result import Ends, Envelope
-from alphacut.frame.structures.linear import evaluate, has_matrices, require_modal_order
+from alphacut.frame.structures.linear import (
+    LinearSystem,
+    Matrices,
+    evaluate,
+    has_matrices,
+    require_modal_order,
+)
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import yields
 from alphacut.frame.verification.step_error import step_error, with_node_deviation, with_step_error
@@ -370,20 +376,16 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
     ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
     # Second-order effects of the weight reduce the stiffness of a storey.
     system.require_standing(dict(zip(cuts.names, ends, strict=True)))
+    try:
+        matrices = _checked_matrices(system, cuts.names, cuts.probes)
+    except RefusedError:
+        for point in cuts.probes:  # the first one that is refused is told
+            _checked_matrices(system, cuts.names, point[np.newaxis])
+        raise
     # A structure that nothing moves has no peaks to bound.
     is_moved = system.ground is not None and np.any(system.ground.samples)
-    for point in cuts.probes:
-        try:
-            # The matrices at one point have a first axis of length 1.
-            matrices = evaluate(system, cuts.names, point[np.newaxis], derivatives=False)[0]
-            is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
-        except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
-            is_positive = False
-        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
-        value = f"not positive definite at {at}"
-        require(is_positive, "mass", value=value, allowed="a mass for every unknown")
-        has_forces = matrices.forces is not None and matrices.forces.value.any()
-        is_moved = is_moved or has_forces or matrices.start.value.any()
+    has_forces = matrices.forces is not None and matrices.forces.value.any()
+    is_moved = is_moved or has_forces or matrices.start.value.any()
     key = "q0, v0, ground and loads"
     allowed = "a start, a record or a force that moves something"
     require(is_moved, key, value="zero", allowed=allowed)
@@ -393,6 +395,30 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
         points = np.vstack([cuts.nominal, cuts.probes])
         matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
         require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(ratios))
+
+
+def _checked_matrices(system: LinearSystem, names: Sequence[str], points: Array) -> Matrices:
+    """Return the matrices of a structure, and refuse mass matrices that are not positive definite.
+
+    Args:
+        system: The structure.
+        names: Names of its d parameters that are not nominal.
+        points: Their values at S parameter sets in SI units, shape (S, d).
+
+    Raises:
+        RefusedError: A mass matrix is not positive definite; the message has the first parameter
+            set, also where another one is at fault. Or damping is given by ratios, and a stiffness
+            is not positive definite.
+    """
+    try:
+        matrices = evaluate(system, names, points, derivatives=False)[0]
+        is_positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
+    except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
+        is_positive = False
+    at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, points[0], strict=True))
+    value = f"not positive definite at {at}"
+    require(is_positive, "mass", value=value, allowed="a mass for every unknown")
+    return matrices
 
 
 def _require_range(system: StructureModel, name: str, low: float, high: float) -> None:

@@ -16,6 +16,7 @@ from alphacut.frame import (
     MatrixStructure,
     StoreyFrame,
     envelope,
+    require_envelope,
 )
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
 from alphacut.fuzzy import Interval, RefusedError
@@ -100,6 +101,22 @@ def test_a_matrix_of_the_other_sign_is_told_to_turn_it():
     with pytest.raises(RefusedError, match=r"negative diagonal in term 2; .* it seems to be −K"):
         signed_structure(mass=1.0, stiffness=-3.0)
     assert signed_structure(mass=1.0, stiffness=-0.5).size == 2  # a weight takes some stiffness
+
+
+def test_the_first_point_without_a_positive_mass_is_told():
+    """The mass [[1, a], [a, 2]] is positive definite for a² < 2, at a = -1 and not at a = 2."""
+    structure = MatrixStructure(
+        {"a": 0.5, "b": 1.0},
+        mass=[(1.0, np.diag([1.0, 2.0])), ("a", np.array([[0.0, 1.0], [1.0, 0.0]]))],
+        stiffness=[("b", np.eye(2))],
+        observed={"q": np.array([0.0, 1.0])},
+        q0=np.array([0.1, 0.0]),
+    )
+    inputs = {"a": Interval(-1.0, 2.0), "b": Interval(1.0, 3.0)}
+    with pytest.raises(RefusedError, match="mass is not positive definite at a = 2, b = 1;"):
+        require_envelope(structure, inputs, duration=1.0, step=0.1)
+    inputs["a"] = Interval(-1.0, 1.0)
+    require_envelope(structure, inputs, duration=1.0, step=0.1)
 
 
 @pytest.mark.parametrize(
