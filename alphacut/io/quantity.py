@@ -247,16 +247,15 @@ def _parse_decimal(text: str, si: str) -> Decimal:
     """
     text = text.strip()
     match = re.fullmatch(rf"({NUMBER})\s*(.*)", text)
-    # What to write instead, if the text has the pattern of a common mistake; else empty.
-    cure = number_cure(text)
     # "1,5 GPa" begins with the number 1 and the unit ",5 GPa".
     if match is None or match[2].startswith((",", "_")):
         what = f'"{text}" does not begin with a number such as 1.5'
+        cure = number_cure(text)
         raise ValueError(f"{what}; {cure}" if cure else what)
     digits = match[1]
     unit = match[2].strip()
     # A unit that begins with another character is the rest of a number, as "x 10^3 N" of a power.
-    if cure and re.match(r"[^A-Za-z°%‰µμ(/[]", unit):
+    if re.match(r"[^A-Za-z°%‰µμ(/[]", unit) and (cure := number_cure(text)):
         raise ValueError(f'"{text}" is no number with a unit; {cure}')
 
     # Powers of ten of thousands of digits would take minutes: numbers far beyond the largest
@@ -270,6 +269,7 @@ def _parse_decimal(text: str, si: str) -> Decimal:
     try:
         return number * factor(unit, si)
     except ValueError as error:
+        cure = number_cure(text)
         raise ValueError(f"{cure}; {error}" if cure else str(error)) from None
 
 

@@ -366,12 +366,17 @@ def _have_decimal_commas(rows: Sequence[str]) -> bool:
         False if there are no rows, no commas, or a row that is no list of numbers with decimal
         commas.
     """
-    rows = [row for row in rows if not re.search(r"[A-Za-z]{2}|\d[-/.]\d+[-/.]\d", row)]
+    words = r"[A-Za-z]{2}|\d[-/.]\d+[-/.]\d"
     number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
     further = rf'\s*[;\t]\s*{number}|\s+{number}|(?<="),(?="){number}'
-    matches = [re.fullmatch(rf"\s*{number}(?P<more>{further})*[;\s]*", row) for row in rows]
-    if not all(matches) or not any("," in row for row in rows):
+    pattern = rf"\s*{number}(?P<more>{further})*[;\s]*"
+    # Tables have thousands of rows, and in most of them the first one is none of such numbers.
+    if not all(re.fullmatch(pattern, row) or re.search(words, row) for row in rows):
         return False
+    rows = [row for row in rows if not re.search(words, row)]
+    if not any("," in row for row in rows):
+        return False
+    matches = [re.fullmatch(pattern, row) for row in rows]
     if any(match and match["more"] for match in matches):
         return True
     before_commas = [float(row.strip(' ";').partition(",")[0] or 0) for row in rows]
