@@ -21,7 +21,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Knowledge
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import levels
 from alphacut.fuzzy.sets.claimed import widest_cut
-from alphacut.fuzzy.sets.numbers import Cut, outer_steps
+from alphacut.fuzzy.sets.numbers import Cut, fuzzy_number
 from alphacut.rve.cell.cell import AnyPhase, Phase, Phases
 from alphacut.rve.result.cell_model import AnyModel
 from alphacut.rve.result.engineering_constants import (
@@ -30,7 +30,12 @@ from alphacut.rve.result.engineering_constants import (
     PLANE_STRAIN,
     engineering_constants,
 )
-from alphacut.rve.result.loss_factors import CONSTANTS, MAX_FIRST_ORDER, loss_factors
+from alphacut.rve.result.loss_factors import (
+    CONSTANTS,
+    MAX_FIRST_ORDER,
+    loss_factors,
+    phase_loss_cuts,
+)
 from alphacut.rve.result.moduli import AVERAGES, require_average
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
@@ -260,23 +265,6 @@ class FuzzyStiffness:
             "parameter": list(bounds.inputs),
         }
         return xarray.Dataset(variables, coordinates)
-
-
-def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
-    """Return the fuzzy number of α-cuts; between two levels the wider cut holds.
-
-    Args:
-        alpha: Rising levels, shape (levels,).
-        cuts: Lower and upper ends, nested, shape (levels, 2). The first cut holds from α = 0 on. If
-            1 is the only level, the result is the mean of both ends, a crisp number.
-
-    Raises:
-        RefusedError: An end is not finite, or the cuts are not nested.
-    """
-    # The level 1 alone does not say what the support is.
-    if tuple(alpha) == (1.0,):
-        return Crisp(float(cuts.mean()))
-    return outer_steps(alpha, cuts[:, 0], cuts[:, 1])
 
 
 def fuzzy_stiffness(
@@ -745,11 +733,6 @@ def _errors_of_modulus(bounds: Bounds, reference: HomogenisedStiffness | None) -
         return dict(reference.error)
     largest = _largest_by_name(bounds, kind="error")
     return {name: error for name, error in largest.items() if error}
-
-
-def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Array:
-    """Return α-cuts of the loss factor of each phase, shape (levels, 2, phases)."""
-    return np.array([np.transpose([loss.cut(level) for loss in losses]) for level in alpha])
 
 
 def loss_bounds(result: HomogenisedStiffness, cuts: Array) -> tuple[Array, Array]:

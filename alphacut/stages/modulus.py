@@ -20,6 +20,7 @@ from alphacut.fuzzy import FuzzyNumber, General, Reduced, Signed
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.propagation import CampaignOptions
 from alphacut.fuzzy.result import Ends, Nature
+from alphacut.fuzzy.sets.numbers import fuzzy_number
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fuzzy_cell import (
@@ -27,7 +28,6 @@ from alphacut.rve.fuzzy_cell import (
     SUFFIXES,
     FuzzyStiffness,
     LossCuts,
-    fuzzy_number,
     fuzzy_stiffness,
 )
 from alphacut.rve.result.engineering_constants import NAMES

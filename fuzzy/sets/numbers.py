@@ -372,3 +372,20 @@ def outer_steps(
     levels = [min(float(level), round(float(level), 12)) for level in alpha]
     levels[0] = 0.0
     return Stepwise(tuple(levels), tuple(lower), tuple(upper), encloses)
+
+
+def fuzzy_number(alpha: Array, cuts: Array) -> FuzzyNumber:
+    """Return the fuzzy number of α-cuts; between two levels the wider cut holds.
+
+    Args:
+        alpha: Rising levels, shape (levels,).
+        cuts: Lower and upper ends, nested, shape (levels, 2). The first cut holds from α = 0 on. If
+            1 is the only level, the result is the mean of both ends, a crisp number.
+
+    Raises:
+        RefusedError: An end is not finite, or the cuts are not nested.
+    """
+    # The level 1 alone does not say what the support is.
+    if tuple(alpha) == (1.0,):
+        return Crisp(float(cuts.mean()))
+    return outer_steps(alpha, cuts[:, 0], cuts[:, 1])

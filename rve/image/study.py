@@ -30,9 +30,8 @@ from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.fuzzy.sets.claimed import widest_cut
-from alphacut.fuzzy.sets.numbers import checked_levels
+from alphacut.fuzzy.sets.numbers import checked_levels, fuzzy_number
 from alphacut.rve.cell.cell import Phase
-from alphacut.rve.fuzzy_cell import fuzzy_number, phase_loss_cuts
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import read_grid
@@ -49,6 +48,7 @@ from alphacut.rve.image.phases import (
 )
 from alphacut.rve.image.raw import HEADS
 from alphacut.rve.result.engineering_constants import NAMES
+from alphacut.rve.result.loss_factors import phase_loss_cuts
 from alphacut.rve.result.moduli import ISOTROPIC
 from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
 from alphacut.stochastic.segmentation import segment

@@ -9,12 +9,13 @@ Am. 34, 954, 1962).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.result.result import (
     DeclaredConstants,
@@ -111,3 +112,8 @@ def first_order(
     midrange = (losses.max() + losses.min()) / 2
     factor_errors = np.tensordot(abs(losses - midrange), fraction_errors)
     return np.asarray(factors, float), np.asarray(factor_errors, float)
+
+
+def phase_loss_cuts(losses: Sequence[FuzzyNumber], alpha: Sequence[float]) -> Array:
+    """Return α-cuts of the loss factor of each phase, shape (levels, 2, phases)."""
+    return np.array([np.transpose([loss.cut(level) for loss in losses]) for level in alpha])
