@@ -22,7 +22,7 @@ from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.parse import ParsedCase, parse
 from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
-from alphacut.case.types import require_alone
+from alphacut.case.types import AtFirstUse, require_alone
 from alphacut.frame.structures.storey import yields
 from alphacut.fuzzy import FuzzyNumber
 
@@ -30,16 +30,16 @@ from alphacut.fuzzy import FuzzyNumber
 class Content(CellContent):
     """A case, with one section of `alphacut.case.structures.STRUCTURES` for its structure."""
 
-    microstructure: MicrostructureSection | None = None
-    records: RecordsSection | None = None
-    force: tuple[ForceSection, ...] = ()
-    study: tuple[Study, ...] = ()
-    envelope: EnvelopeSection | None = None
-    identify: Identify | None = None
-    probability: ProbabilitySection | None = None
-    decision: DecisionSection | None = None
-    tolerances: TolerancesSection | None = None
-    fragility: FragilitySection | None = None
+    microstructure: AtFirstUse[MicrostructureSection] | None = None
+    records: AtFirstUse[RecordsSection] | None = None
+    force: tuple[AtFirstUse[ForceSection], ...] = ()
+    study: tuple[AtFirstUse[Study], ...] = ()
+    envelope: AtFirstUse[EnvelopeSection] | None = None
+    identify: AtFirstUse[Identify] | None = None
+    probability: AtFirstUse[ProbabilitySection] | None = None
+    decision: AtFirstUse[DecisionSection] | None = None
+    tolerances: AtFirstUse[TolerancesSection] | None = None
+    fragility: AtFirstUse[FragilitySection] | None = None
 
     @property
     def questions(self) -> dict[str, QuestionSection]:

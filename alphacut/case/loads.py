@@ -32,7 +32,6 @@ from alphacut.frame import (
 )
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
-from alphacut.frame.records.tables import read_force_history
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
 from alphacut.frame.records.units import acceleration_factor
 from alphacut.frame.structures.model import PlacedForce
@@ -104,6 +103,8 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         path = case_file(kind, info)
     except RefusedError as error:
         raise RefusedError("", kind, f"{allowed}; {error.allowed}") from None
+    from alphacut.frame.records.tables import read_force_history  # takes time to import
+
     force = read_force_history(path)
     # A file with a unit has forces, and amplitudes are factors of them; one without has numbers,
     # and amplitudes are forces.

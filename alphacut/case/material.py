@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import (
     ALPHA,
+    AtFirstUse,
     CaseFile,
     CasePath,
     Length,
@@ -452,14 +453,15 @@ def _cell_kind(table: Mapping[str, object]) -> str:
 
 
 Cell = Annotated[
-    Annotated[RoundCell, Tag("<round>")]
-    | Annotated[ImageCell, Tag("<image>")]
-    | Annotated[MeshedCell, Tag("<mesh>")],
+    Annotated[AtFirstUse[RoundCell], Tag("<round>")]
+    | Annotated[AtFirstUse[ImageCell], Tag("<image>")]
+    | Annotated[AtFirstUse[MeshedCell], Tag("<mesh>")],
     Discriminator(_cell_kind),
 ]
 
 AnyLaw = Annotated[
-    Annotated[RadiusMapSection, Tag("<map>")] | Annotated[ThetaSection, Tag("<law>")],
+    Annotated[AtFirstUse[RadiusMapSection], Tag("<map>")]
+    | Annotated[AtFirstUse[ThetaSection], Tag("<law>")],
     Discriminator(lambda table: "<law>" if set(table) <= {"theta"} else "<map>"),
 ]
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from functools import cache
 from pkgutil import resolve_name
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import create_model
 
 from alphacut.case.cell import CellContent
+from alphacut.case.types import FirstUse
 
 C = TypeVar("C", bound=CellContent)
 STRUCTURES = {
@@ -61,7 +62,8 @@ def _whole_case(
     for name, place in structures:
         kind: Any = object
         if built:
-            kind = resolve_name(place) | None
+            section: Any = resolve_name(place)
+            kind = Annotated[section, FirstUse()] | None
         fields[name] = (kind, None)  # the type of the field, and its default
     # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest.
     bases: Any = (content, create_model("Structures", __base__=CellContent, **fields))

@@ -235,6 +235,21 @@ class Quantity:
         return core_schema.no_info_plain_validator_function(self.parse)
 
 
+class FirstUse:
+    """Metadata of the class of a section, which is made ready once a case has the section.
+
+    Without it Pydantic makes the validators of all sections before it reads a case, in .05 s.
+    """
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Section], _: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return the schema by which Pydantic calls the class, and takes its errors as its own."""
+        return core_schema.with_info_plain_validator_function(
+            lambda value, info: source.model_validate(value, context=info.context)
+        )
+
+
 text = PlainValidator
 """A key whose text a function reads, from the text and the context of the case."""
 
@@ -249,6 +264,8 @@ def _as_array(value: object) -> object:
 
 
 T = TypeVar("T")
+AtFirstUse = Annotated[T, FirstUse()]
+"""A section that many cases leave out."""
 OneOrMany = Annotated[tuple[T, ...], BeforeValidator(_as_array)]
 """An array of which one entry may stand without brackets."""
 NotEmpty = BeforeValidator(_not_empty)

@@ -1,43 +1,26 @@
-"""A case as it was read, in words: quantities, modes and records, and doubts about them."""
+"""A case as it was read, in words: its quantities, and doubts about them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.base.errors import FailedError, RefusedError
-from alphacut.base.number_text import MINUS, STANDARD_GRAVITY, engineering, percent_text, text_table
+from alphacut.base.number_text import MINUS, engineering
 from alphacut.case.content import Content
-from alphacut.case.loads import ForceHistory, RecordsSection
+from alphacut.case.loads import ForceHistory
 from alphacut.case.parse import quantity_of
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.case.types import Section
-from alphacut.commands.required import load_end_warnings
-from alphacut.frame import Exact, History, LinearFlow
-from alphacut.frame.analyses.peaks import WIDENING
-from alphacut.frame.analyses.suites import (
-    NominalMode,
-    ScaledRecord,
-    nominal_mode,
-    short_record_warnings,
-)
-from alphacut.frame.boxes import AT_REST
-from alphacut.frame.result import within_steps
-from alphacut.frame.structures.linear import LinearSystem, NominalModes, histories
+from alphacut.frame import History
 from alphacut.frame.structures.matrix import Monomial
-from alphacut.frame.structures.storey import yields
-from alphacut.frame.verification.step_error import node_deviation
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.quantity import QUANTITIES
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA
-from alphacut.stages.foreseen import MOST_TIMED_STEPS, foreseen_structure
-
-if TYPE_CHECKING:
-    pass
+from alphacut.stages.foreseen import foreseen_structure
 
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
@@ -91,229 +74,6 @@ def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
         return list(doubts(content, rows, structure_of_envelope(content)))
     except (RefusedError, FailedError):
         return list(doubts(content, rows, None))
-
-
-def motion_text(
-    content: Content, structure: Structure, records: Sequence[ScaledRecord] = ()
-) -> str:
-    """Return lines on what moves the structure, and warnings of a time step that misses peaks.
-
-    Args:
-        content: The case.
-        structure: Its structure at the nominal values of the material.
-        records: Records of its suite as they move the structure, if it has one.
-
-    Returns:
-        Lines that end with a newline: the record of the ground or the records of a suite, and
-        "warning: …" lines. Empty without [envelope], and of a structure that is not linear.
-
-    Raises:
-        FailedError: The response that the time step is judged by could not be computed.
-    """
-    section = content.envelope
-    linear = structure.linear
-    if section is None or linear is None:
-        return ""
-    text = ""
-    duration = section.duration
-    step = section.step
-    moved = linear
-    for name, history in histories(linear).items():
-        # A load history whose first step is longer than the simulation acts as one straight line.
-        # This happens if its times are in another unit, such as ms.
-        if len(history.samples) > 2 and history.step > duration:
-            text += (
-                f"warning: {name}: the motion ends before the second sample, at {history.step:g}"
-            )
-            text += " s: are its times in another unit than s?\n"
-    if (record := linear.ground) is not None:
-        peak = record.extremes[0]  # the largest magnitude; the other entry is that of its slope
-        sizes = f"peak {engineering(peak, 'm/s^2')}, {peak / STANDARD_GRAVITY:.3g} g"
-        text += f"record: {len(record.samples)} samples of {record.step:g} s, {sizes}\n"
-        length = record.step * (len(record.samples) - 1)
-        # The modes are needed only for a record that ends before the motion does.
-        if length < duration:
-            short = short_record_warnings("the record", length, nominal_mode(linear).period)
-            text += "".join(f"warning: {line}\n" for line in short)
-    text += "".join(f"warning: {line}\n" for line in load_end_warnings(content, structure))
-    if content.records is not None:
-        from alphacut.stages.suite import scaled_suite
-
-        text += records_text(content.records, records, nominal_mode(linear))
-        if (scaled := scaled_suite(content.records, structure)) is not None:
-            text += str(scaled)
-        # Of a linear structure peaks under records are found with time nodes of their own, finer
-        # than the step of the case. Where columns yield, the step must be fine enough for the
-        # strongest record.
-        if not yields(linear):
-            return text
-        strongest = max(records, key=lambda record: record.measures["Sa(T1)"])
-        duration = step * round(strongest.duration / step)
-        moved = linear.moved_by(strongest.ground)
-    # The first steps of a very long response are enough, and `check` is to end in seconds.
-    duration = min(duration, MOST_TIMED_STEPS * step)
-    return text + "".join(f"warning: {line}\n" for line in long_steps(moved, duration, step))
-
-
-def modes_document(modes: NominalModes) -> dict[str, object]:
-    """Return the natural modes of a structure as a JSON document.
-
-    Args:
-        modes: Undamped modes by rising frequency. A frequency of zero, which no structure of a case
-            has, would give a period above 1e300 s, since JSON has no infinity.
-
-    Returns:
-        "periods_s", "damping_ratios" and "effective_masses_kg", lists with an entry for each mode;
-        and "moved_mass_kg", the mass that moves with the ground.
-    """
-    return {
-        "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),
-        "damping_ratios": modes.damping_ratios.tolist(),
-        "effective_masses_kg": modes.effective_masses.tolist(),
-        "moved_mass_kg": modes.moved_mass,
-    }
-
-
-def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
-    """Return the first period, a table of the lowest modes, and the weight that moves.
-
-    Modes are shown until their effective masses add up to 90 % of the mass that moves with the
-    ground, but three at least and eight at most, if the structure has as many. Without such a mass
-    eight are shown.
-
-    Args:
-        modes: Undamped modes by rising frequency, at the most plausible values.
-        is_shaken: Whether the ground moves. The structure is then taken for a building, whose
-            first period is longer than that of a part of a machine.
-
-    Returns:
-        Lines that end with a newline, with a warning if the first period is unusual.
-    """
-    periods = 2 * pi / np.maximum(modes.frequencies, 1e-300)
-    first = float(2 * pi / modes.frequencies[0])
-    text = f"first natural period: {first:.4g} s, at the most plausible values\n"
-    # Parts of machines have periods of some 1 ms, one-storey buildings 0.05 s, the highest towers
-    # 10 s.
-    shortest = 1e-3
-    if is_shaken:
-        shortest = 0.02
-    if not shortest <= first <= 10.0:
-        text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
-        text += " not exchanged?\n"
-    largest = float(modes.damping_ratios.max())
-    doubt = "are units of dampers, damping matrices and rayleigh factors right?"
-    # ratios of structures are .1 to 60 %, of an undamped one below the rounding of 1e-12
-    if largest > 1 or 1e-12 < largest < 1e-5:
-        text += f"warning: damping ratios are up to {largest:.2g} of critical: {doubt}\n"
-    moved = modes.moved_mass
-    fractions = modes.effective_masses / (moved or np.inf)
-    # Building codes ask for the modes that have 90 % of the mass (EN 1998-1, 4.3.3.3.1).
-    needed = int(np.searchsorted(np.cumsum(fractions), 0.9)) + 1
-    rows = []
-    for k in range(min(max(needed, 3), 8, len(fractions))):
-        mass = "–"
-        if moved:
-            mass = percent_text(float(fractions[k]))
-        damping = percent_text(modes.damping_ratios[k], 2)
-        rows.append((f"{k + 1}", f"{engineering(float(periods[k]), '')} s", damping, mass))
-    text += text_table(("mode", "period", "damping ratio", "effective mass"), rows)
-    if moved:
-        weight = engineering(moved * STANDARD_GRAVITY, "N")
-        text += f"total weight: {weight}, of {moved:,.6g} kg that move with the ground\n"
-    return text
-
-
-def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:
-    """Yield a sentence for each output whose peak may rise by over 1 % between time nodes.
-
-    The peak, and what responses add to it between nodes, are computed for the most plausible
-    structure. Where columns yield, peaks of accelerations alone are read at the nodes, so that only
-    they are judged, by the response with the initial stiffness.
-
-    Args:
-        linear: A linear structure, or a frame that yields.
-        duration: Length of the response, in s.
-        step: Distance of the nodes, in s.
-
-    Raises:
-        FailedError: The response could not be computed.
-    """
-    has_events = yields(linear)
-    if has_events:
-        read_at_nodes = [name for name in linear.outputs if linear.unit_of(name) == "m/s^2"]
-        if not read_at_nodes:
-            return
-        linear = linear.with_outputs(read_at_nodes).elastic()
-    flow = LinearFlow(linear, (), duration, step, Exact(), by_modes=False)
-    nominal = np.zeros((1, 0))  # the one structure without fuzzy inputs
-    at_nodes = np.abs(flow.values(nominal)[0]).T  # (outputs, times)
-    between = node_deviation(flow, nominal).T  # what each step may add, of the same shape
-    # The peak of a structure at rest is rounding alone. It is replaced by AT_REST, a billionth, of
-    # `reach`: the size that the energy of the response allows, shape (outputs,).
-    peaks = np.maximum(at_nodes.max(axis=1), AT_REST * flow.reach())
-    # If nothing moves at all, peaks are 0, and the ratio of 1 says that nothing is widened.
-    farthest = within_steps(at_nodes, between).max(axis=1)
-    widening = np.divide(farthest, peaks, out=np.ones_like(peaks), where=peaks > 0) - 1
-    for name, fraction in zip(linear.outputs, widening, strict=True):
-        if fraction <= WIDENING:
-            continue
-        if has_events:
-            what = f"the step of {step:g} s is too coarse: its peak may be missed"
-            by_how_much = f"by about {fraction:.1%}"
-            if fraction >= 1:
-                by_how_much = "altogether"
-            yield f"{name}: {what} {by_how_much} between nodes"
-        else:
-            # A curve is farthest from its chord by h²/8 max |q''|: the distance falls with the
-            # square of the step h, and half a step leaves a quarter.
-            what = f"the step of {step:g} s widens its bound by about {fraction:.1%}"
-            yield f"{name}: {what} between nodes, one of {step / 2:g} s by {fraction / 4:.1%}"
-
-
-def records_text(
-    section: RecordsSection, records: Sequence[ScaledRecord], mode: NominalMode
-) -> str:
-    """Return a table of the ground motion records of a suite, and their warnings.
-
-    The columns "PGA used", "Sa(T1) used" and "motion" describe each record as it moves the
-    structure, after correction and scaling; the columns before them as its file holds it.
-    Accelerations are in g.
-
-    Args:
-        section: The records of the case, as their files hold them.
-        records: The same records in the same order, as they move the structure.
-        mode: First mode of the structure, whose period and damping ratio Sa(T1) is for.
-
-    Returns:
-        Lines that end with a newline, with "warning: …" lines at the end.
-    """
-    rows = []
-    for raw, record in zip(section.recordings, records, strict=True):
-        rows.append(
-            (
-                raw.name,
-                raw.file_format,
-                raw.unit,
-                f"{raw.step:g} s",
-                f"{len(raw.samples)}",
-                percent_text(raw.mean_to_peak_ratio, 2),
-                _in_g(raw.peak),
-                _in_g(record.measures["PGA"]),
-                _in_g(record.measures["Sa(T1)"]),
-                f"{record.duration:.4g} s",
-            )
-        )
-    head = ["record", "format", "unit", "step", "samples", "mean/peak", "peak"]
-    head += ["PGA used", "Sa(T1) used", "motion"]
-    text = text_table(head, rows)
-    of_mode = f"T1 = {mode.period:.4g} s with the structure's own damping ratio"
-    text += f"Sa(T1): pseudo-acceleration ω² max |u| at {of_mode}, {percent_text(mode.ratio)}\n"
-    return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
-
-
-def _in_g(acceleration: float) -> str:
-    """Return an acceleration in m/s² as text in g with three digits."""
-    return f"{acceleration / STANDARD_GRAVITY:.3g} g"
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

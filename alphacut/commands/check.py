@@ -41,14 +41,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     from alphacut.commands.case_text import (
         doubts,
         doubts_before_refusal,
-        modes_document,
-        modes_text,
-        motion_text,
         rows_of,
         structure_of_envelope,
     )
     from alphacut.commands.required import require_runnable
-    from alphacut.frame.structures.linear import nominal_modes
 
     rows = list(rows_of("", content))
     try:
@@ -71,12 +67,14 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     document: dict[str, object] = {"case": options.case, "stages": list(content.stages)}
     document |= {"period_s": None, "modes": None}
     if structure is not None and structure.linear is not None:
+        from alphacut.commands.motion_text import modes_document, modes_text, motion_text
+        from alphacut.frame.structures.linear import nominal_modes
+
         modes = nominal_modes(structure.linear)
         document["modes"] = modes_document(modes)
         document["period_s"] = 2 * pi / float(modes.frequencies[0])
         is_shaken = content.records is not None or structure.linear.ground is not None
         text += modes_text(modes, is_shaken=is_shaken)
-    if structure is not None:
         text += motion_text(content, structure, records)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]

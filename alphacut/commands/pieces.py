@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from alphacut.case.content import Content
 from alphacut.stages.cell import CellProblem
-from alphacut.stages.envelope import tasks
 
 
 class Foreseen(NamedTuple):
@@ -54,6 +53,8 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     section = content.envelope
     if "envelope" not in content.stages or section is None:
         return
+    from alphacut.stages.envelope import tasks  # takes time to import
+
     if content.identify is not None:
         yield Foreseen("identify", 1, "campaigns")
     if content.records is not None:

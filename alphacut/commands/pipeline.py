@@ -19,8 +19,8 @@ from alphacut.case.material import RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
+from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
-from alphacut.commands.required import load_end_warnings
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.peaks import Peak, Peaks
 from alphacut.io.files import Document, rank, require_writable, say

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 from alphacut.base.errors import FailedError, RefusedError, require
-from alphacut.base.number_text import percent_text
 from alphacut.case.content import Content
 from alphacut.case.material import ThetaSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
-from alphacut.frame import require_envelope
-from alphacut.frame.structures.linear import histories
 from alphacut.stages.cell import CellProblem, require_levels
-from alphacut.stages.envelope import tasks
 from alphacut.stages.foreseen import possible_materials, structure_as_computed
 
 if TYPE_CHECKING:
@@ -132,6 +127,9 @@ def _require_motion_of(
         RefusedError: An input, output, record, method or tolerance does not fit the structure.
         FailedError: The method cannot be set up for it.
     """
+    from alphacut.frame import require_envelope
+    from alphacut.stages.envelope import tasks
+
     records: tuple[ScaledRecord, ...] = ()
     if content.identify is not None:
         from alphacut.stages.identify import require_learnable
@@ -150,36 +148,3 @@ def _require_motion_of(
         (own_task,) = tasks(section, ())  # of [envelope], as questions are
         require_tolerances(content.tolerances, Response(structure, own_task))
     return records
-
-
-def load_end_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Yield a warning of each load that does not end as the responses do.
-
-    Warned of are an accelerogram that goes on after all responses have ended, and a force that is
-    not zero where its file ends, before the longest response does: it jumps to zero there. There
-    are no warnings without [envelope], or if the structure is not linear.
-
-    Args:
-        content: The case, for the durations of [envelope] and its studies.
-        structure: Its structure.
-    """
-    linear = structure.linear
-    if linear is None or content.envelope is None:
-        return
-    longest = max(task.duration for task in tasks(content.envelope, content.study))
-    for name, history in histories(linear).items():
-        end = history.start + history.step * (len(history.samples) - 1)
-        largest, _ = history.extremes
-        # Records and measured forces fade away: 1 % of the largest value is no jump (tuned). The
-        # last value of a history that `is_held` stays on, so that it does not jump either.
-        jumps = abs(history.samples[-1]) > 0.01 * largest and not history.is_held
-        if history is linear.ground:
-            if end > longest * (1 + 1e-9):
-                yield f"the record lasts {end:g} s, and the motion is computed for {longest:g} s"
-        elif jumps and end < longest * (1 - 1e-9):
-            fraction = percent_text(float(abs(history.samples[-1])) / largest)
-            yield (
-                f"{name} ends at {end:g} s with {fraction} of its largest value, and is 0 from"
-                f" then on, while the motion is computed for {longest:g} s: let its file last as"
-                " long, or end with 0"
-            )

@@ -14,7 +14,6 @@ from typing import get_args
 
 from alphacut.base.errors import RefusedError, checked_number, path_of, require, require_choice
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.records.read import read_recording
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
 from alphacut.frame.records.units import acceleration_factor
@@ -145,6 +144,8 @@ def read_recordings(
         RefusedError: There is no file, or there are more than 500; or some cannot be read: the
             message has the reason of the first, and the names of all others.
     """
+    from alphacut.frame.records.read import read_recording  # with all formats, in .02 s
+
     is_suite = 0 < len(paths) <= MAX_RECORDS
     require(is_suite, "files", shown, allowed=f"1 to {MAX_RECORDS} files, and {len(paths)} match")
     recordings: list[Recording] = []
