@@ -13,6 +13,7 @@ from pydantic import Field, ValidationInfo
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import (
+    AtFirstUse,
     NotEmpty,
     OneOrMany,
     Quantity,
@@ -361,7 +362,7 @@ class RecordsSection(Section):
     scale: Annotated[Scale, text(_parse_scale)] = Scale()
     """factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record; Sa(T1) is the pseudo-acceleration
     `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %)"""
-    spectrum: SpectrumSection | None = None
+    spectrum: AtFirstUse[SpectrumSection] | None = None
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
