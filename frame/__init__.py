@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from alphacut.frame.structures.material_damping import damping_from_loss
     from alphacut.frame.structures.matrix import MatrixStructure
     from alphacut.frame.structures.quantities import Output, Parameter
-    from alphacut.frame.structures.read_matrix import read_matrix
+    from alphacut.frame.structures.read_matrix import read_matrix, read_unknowns
     from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
@@ -65,8 +65,8 @@ __all__ = [
     "UnprovedError", "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide",
     "envelope", "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode",
     "over_records", "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
-    "read_spectrum", "read_suite", "require_envelope", "response_spectrum", "scale_suite",
-    "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
+    "read_spectrum", "read_suite", "read_unknowns", "require_envelope", "response_spectrum",
+    "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -128,6 +128,7 @@ AT_FIRST_USE = {
     "read_record": "records.suite",
     "read_spectrum": "spectra.target",
     "read_suite": "records.suite",
+    "read_unknowns": "structures.read_matrix",
     "require_envelope": "propagation",
     "response_spectrum": "spectra.response_spectrum",
     "scale_suite": "analyses.spectral_scaling",

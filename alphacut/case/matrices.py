@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -22,7 +23,13 @@ from alphacut.case.structure import (
     read_accelerogram,
 )
 from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
-from alphacut.frame import Accelerogram, MatrixStructure, damping_from_loss, read_matrix
+from alphacut.frame import (
+    Accelerogram,
+    MatrixStructure,
+    damping_from_loss,
+    read_matrix,
+    read_unknowns,
+)
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions, require_symmetric
 from alphacut.frame.structures.quantities import Output, require_names
 from alphacut.frame.structures.read_matrix import MAX_ROWS
@@ -49,12 +56,11 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     """
     match value:
         case [str(factor), str(file)]:
-            name, _, member = file.partition(":")
+            path, member = _file_and_member(file, info)
             # Pydantic leaves refused keys out: without names the number of rows is not judged.
             unknowns = info.data.get("unknowns", ())
             rows = len(unknowns) or MAX_ROWS
-            path = case_file(name, info)
-            array = read_matrix(path, name=member, max_rows=rows)
+            array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
             if unknowns:
                 _require_shape(path.name, array, rows)
                 require_symmetric(path.name, array, unknowns)
@@ -62,6 +68,28 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
             return Monomial.parse(factor), array
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
+
+
+def _file_and_member(text: str, info: ValidationInfo) -> tuple[Path, str]:
+    """Return the file and the name of one of its matrices that a text such as "K.npz:columns" has.
+
+    Raises:
+        RefusedError: There is no such file in the folder of the case.
+    """
+    name, _, member = text.partition(":")
+    return case_file(name, info), member
+
+
+def _unknowns(value: object, info: ValidationInfo) -> object:
+    """Return the unknowns of a matrix file whose name stands in their place.
+
+    Raises:
+        RefusedError: There is no such file, or it names no unknowns.
+    """
+    if not isinstance(value, str):
+        return value
+    path, member = _file_and_member(value, info)
+    return read_unknowns(path, name=member)
 
 
 def _require_shape(name: str, array: Array, n: int) -> None:
@@ -137,8 +165,9 @@ class MatricesSection(StructureSection):
     A modulus that a stage computes takes the place of parameter E.
     """
 
-    unknowns: Annotated[tuple[str, ...], NotEmpty, after(distinct)]
-    """names of the unknowns in the order of the matrices, as NODE.DIRECTION"""
+    unknowns: Annotated[tuple[str, ...], NotEmpty, BeforeValidator(_unknowns), after(distinct)]
+    """names of the unknowns in the order of the matrices, as NODE.DIRECTION; or a matrix file that
+    names them"""
     parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
     mass: Annotated[tuple[Term, ...], NotEmpty] = Field(description="pairs [factor, file] of M")
     stiffness: Annotated[tuple[Term, ...], NotEmpty]

@@ -44,9 +44,6 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
         cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
-        if re.match(r"\s*\d+\s*,", first):  # of Abaqus, in its own order of nodes and directions
-            cure = "write ROW COLUMN VALUE without commas, below the line %%MatrixMarket matrix"
-            cure += " coordinate real symmetric and one of sizes, as 18 18 42"
         allowed = "%%MatrixMarket matrix coordinate or array, real or integer, general or symmetric"
         raise RefusedError(name, first, allowed, cure)
     is_sparse = match[1].lower() == b"coordinate"
@@ -54,7 +51,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
     _require_numbers_alone(name, body)
 
-    sizes = _numbers(name, body[0]) if body else np.empty(0)
+    sizes = numbers_in(name, body[0]) if body else np.empty(0)
     n_sizes = 2
     cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
     if is_sparse:
@@ -70,7 +67,7 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     is_square = shape[0] == shape[1] or not is_symmetric
     require(is_square, name, value, "a square matrix", "mend the line of sizes, as 18 18 42")
 
-    entries = _numbers(name, b" ".join(body[1:]))
+    entries = numbers_in(name, b" ".join(body[1:]))
     if not is_sparse:
         return _by_columns(name, entries, shape, is_symmetric=is_symmetric)
     value = f"of {len(entries) / 3:g} entries, where its line of sizes states {sizes[2]:.0f}"
@@ -144,7 +141,7 @@ def dense_of_entries(
     return matrix
 
 
-def _numbers(name: str, text: bytes) -> Array:
+def numbers_in(name: str, text: bytes) -> Array:
     """Return the numbers in a text, shape (numbers,), in which blanks separate them.
 
     A number beyond the range of floats gives infinity.

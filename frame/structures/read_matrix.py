@@ -1,4 +1,4 @@
-"""Matrices of a frame program, from files of Matrix Market, NumPy, SciPy or CSV.
+"""Matrices of a frame program, from its own files or those of Matrix Market, NumPy, SciPy or CSV.
 
 What a file states of itself is checked before memory is taken or a library sees it: sizes against
 the unknowns and the memory that is free, indices against the shape, text against its alphabet.
@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from io import StringIO
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -17,41 +19,49 @@ from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, cure_of, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
+from alphacut.frame.structures.entry_lists import NamedMatrix, read_abaqus, read_calculix
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
 
 # The allowed value in messages of all formats.
-ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
+ALLOWED = "a file .mtx, .sti, .mas, .npz, .npy or .csv with one array of finite real numbers"
 # Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB.
 MAX_ROWS = 5000
+# Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
+HELD_STIFFNESS = 1e35
 
 
-def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -> Array:
+def read_matrix(
+    path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS, unknowns: Sequence[str] = ()
+) -> Array:
     """Read a matrix, as of masses or stiffnesses, from a file; a sparse one becomes dense.
 
     Args:
-        path: File of Matrix Market (.mtx), of `scipy.sparse.save_npz` or `numpy.savez` (.npz), of
-            `numpy.save` (.npy), or of numbers between commas, semicolons or blanks (.csv).
+        path: File of Matrix Market or of Abaqus's *MATRIX OUTPUT (.mtx), of CalculiX's *FREQUENCY,
+            SOLVER=MATRIXSTORAGE (.sti and .mas, with .dof beside), of `scipy.sparse.save_npz` or
+            `numpy.savez` (.npz), of `numpy.save` (.npy), or of numbers between commas, semicolons
+            or blanks (.csv).
         name: Name of the array in a .npz file of several.
         max_rows: Largest number of rows and of columns, as the number of unknowns.
+        unknowns: Names of the rows to return, in their order, where the file names its own
+            (`read_unknowns`). Unknowns that are left out are held, and their rows go; those that
+            the file does not have are rows of zeros, as of unknowns without mass. A file without
+            names is returned as it is.
 
     Returns:
         The matrix, shape (n, m); or a vector, shape (n,), where the file has one.
 
     Raises:
-        RefusedError: The file cannot be read, holds something else, or more than allowed.
+        RefusedError: The file cannot be read, holds something else, or more than allowed; or it
+            names unknowns, and none of these.
 
     Example:
         >>> read_matrix("cases/plane-frame/stiffness1.mtx").shape
         (18, 18)
     """
     file = path_of("path", path)
-    try:
-        array = _read_by_ending(file, name, max_rows=max_rows)
-    except RefusedError:
-        raise
-    except Exception as error:  # whatever the readers of files, texts and archives raise
-        reason = getattr(error, "strerror", None) or printable(error, 80) or type(error).__name__
-        raise RefusedError(printable(file.name, 80), reason, ALLOWED) from None
+    array, names = _read_named(file, name, max_rows=max_rows)
+    if names and unknowns:
+        array = _arranged(file.name, array, names, unknowns)
     shape = " × ".join(str(n) for n in array.shape)
     cure = "save numbers, as array.astype(float)"
     require(array.dtype.kind in "uif", file.name, f"an array of {array.dtype.name}", ALLOWED, cure)
@@ -71,8 +81,73 @@ def read_matrix(path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS) -
     return np.array(array, float)
 
 
-def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
-    """Return the array in a file, whose ending (.npy, .npz, .mtx or .csv) tells its format.
+def read_unknowns(path: str | Path, *, name: str = "") -> tuple[str, ...]:
+    """Return the names of the free unknowns of a matrix in a file, in the order of its rows.
+
+    They are NODE.DIRECTION, with the program's own numbers: "12.1" is node 12 along 1. Unknowns
+    that a boundary condition holds are left out; Abaqus adds 1e36 to their stiffness.
+
+    Args:
+        path: File of Abaqus in the formats MATRIX INPUT or LABELS (.mtx), or of CalculiX (.sti or
+            .mas) with its .dof beside.
+        name: Name of the matrix in a file of several.
+
+    Raises:
+        RefusedError: The file cannot be read, or has a matrix whose rows are not named.
+    """
+    file = path_of("path", path)
+    array, names = _read_named(file, name, max_rows=MAX_ROWS)
+    cures = {
+        ".mtx": "let *MATRIX OUTPUT write FORMAT=LABELS",
+        ".sti": "keep the file .dof of the same name beside it",
+        ".mas": "keep the file .dof of the same name beside it",
+    }
+    cure = cures.get(file.suffix.lower(), "list the names in the order of the rows")
+    require(bool(names), file.name, "without names of unknowns", "a file that names them", cure)
+    is_free = np.asarray(array.diagonal(), float) < HELD_STIFFNESS
+    return tuple(compress(names, is_free))
+
+
+def _read_named(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
+    """Return the array in a file and the names of its rows; empty where it has none.
+
+    Raises:
+        RefusedError: The file cannot be read, or holds no matrix.
+    """
+    try:
+        return _read_by_ending(path, name, max_rows=max_rows)
+    except RefusedError:
+        raise
+    except Exception as error:  # whatever the readers of files, texts and archives raise
+        reason = getattr(error, "strerror", None) or printable(error, 80) or type(error).__name__
+        raise RefusedError(printable(path.name, 80), reason, ALLOWED) from None
+
+
+def _arranged(file: str, array: Numbers, names: Sequence[str], unknowns: Sequence[str]) -> Array:
+    """Return the rows and columns of a matrix that have these names, in their order.
+
+    Args:
+        file: Name of the file, for the message.
+        array: Shape (names, names).
+        names: Names of its rows.
+        unknowns: Names of the rows to return. Those that are not in `names` give zeros.
+
+    Raises:
+        RefusedError: None of the unknowns is in `names`.
+    """
+    place_of = {name: place for place, name in enumerate(names)}
+    known = [k for k, unknown in enumerate(unknowns) if unknown in place_of]
+    value = f"of unknowns {', '.join(names[:4])} …"
+    cure = "name unknowns as the file does, NODE.DIRECTION by number"
+    require(bool(known), file, value, f"unknowns as {', '.join(unknowns[:4])}", cure)
+    places = [place_of[unknowns[k]] for k in known]
+    arranged = np.zeros((len(unknowns), len(unknowns)))
+    arranged[np.ix_(known, known)] = array[np.ix_(places, places)]
+    return arranged
+
+
+def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
+    """Return the array in a file, whose ending and first line tell its format.
 
     The array may have any number of axes and any type of numbers, and entries that are not finite;
     the caller checks it. A sparse matrix becomes dense.
@@ -80,7 +155,8 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
     Args:
         path: The file.
         name: Name of the array in a .npz file of several; empty for the only one.
-        max_rows: Largest number of rows and of columns of a sparse matrix or of a .mtx file.
+        max_rows: Largest number of rows and of columns of a sparse matrix or of a .mtx file. A
+            file with names may have as many as `MAX_ROWS`, of which the caller takes some.
 
     Raises:
         RefusedError: The file is of another type, with a hint for known ones, or holds no matrix.
@@ -88,15 +164,21 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> Numbers:
     """
     ending = path.suffix.lower()
     if ending == ".npy":
-        return read_npy(path)
+        return NamedMatrix(read_npy(path))
     if ending == ".npz":
-        return _read_archive(ArrayArchive(path), name, max_rows=max_rows)
-    if ending == ".mtx":
+        return NamedMatrix(_read_archive(ArrayArchive(path), name, max_rows=max_rows))
+    if ending in (".mtx", ".sti", ".mas"):
         require_text(path)
-        return matrix_market(path.name, path.read_bytes(), max_rows=max_rows)
+        content = path.read_bytes()
+        max_named_rows = max(max_rows, MAX_ROWS)
+        if ending != ".mtx":
+            return read_calculix(path, content, max_rows=max_named_rows)
+        if re.match(rb"\s*[-\d*]", content):
+            return read_abaqus(path.name, content, max_rows=max_named_rows)
+        return NamedMatrix(matrix_market(path.name, content, max_rows=max_rows))
     if ending == ".csv":
         require_text(path)
-        return _read_csv(path.name, path.read_text(encoding="utf-8-sig"))
+        return NamedMatrix(_read_csv(path.name, path.read_text(encoding="utf-8-sig")))
     numbers_alone = "rename a file of numbers alone to NAME.csv"
     sheet = "save the sheet as CSV, numbers alone"
     cures = {

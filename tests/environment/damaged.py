@@ -268,7 +268,32 @@ def _matrices() -> list[Format]:
         savers[f"{form}.npz"] = lambda p, form=form: scipy.sparse.save_npz(
             p, sparse.asformat(form), compressed=False
         )
-    return [Format(name, saved_by(name, save), read_matrix) for name, save in savers.items()]
+    found = [Format(name, saved_by(name, save), read_matrix) for name, save in savers.items()]
+
+    def listed(path: Path, *, is_named: bool) -> None:
+        """Entries of the upper triangle; by node and direction, or by number."""
+        names = [f"{k // 2 + 1},{k % 2 + 1}," if is_named else f"{k + 1}" for k in range(8)]
+        entries = [
+            f"{names[j]} {names[i]} {matrix[i, j]:.15e}\n"
+            for i in range(8)
+            for j in range(8)
+            if (matrix[i, j] and j >= i)
+        ]
+        path.write_text("".join(entries))
+        if path.suffix == ".sti":
+            names = [f"{k // 2 + 1}.{k % 2 + 1}\n" for k in range(8)]
+            path.with_suffix(".dof").write_text("".join(names))
+
+    for name, is_named in (("abaqus.mtx", True), ("coordinate.mtx", False), ("beam.sti", False)):
+        save = saved_by(name, lambda p, is_named=is_named: listed(p, is_named=is_named))
+        found.append(Format(name, save, read_symmetric))
+    return found
+
+
+def read_symmetric(path: Path) -> None:
+    """Read a matrix that its file states as symmetric."""
+    matrix = read_matrix(path)
+    assert np.array_equal(matrix, matrix.T)
 
 
 def _pictures() -> list[Format]:

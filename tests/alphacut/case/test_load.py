@@ -352,6 +352,26 @@ def test_what_makes_no_structure_is_one_line(folder, old, new, message):
     assert any(message in line for line in lines), lines
 
 
+def test_unknowns_come_with_the_file_that_names_them(folder):
+    """Those that Abaqus holds are left out, and matrices come in the order of the names."""
+    stiffness = "5,1, 5,1, 1.0e+36\n1,1, 1,1, 1.0\n2,1, 1,1, -1.0\n2,1, 2,1, 1.0\n"
+    (folder / "upper_STIF1.mtx").write_text(stiffness)
+    text = MATRICES.replace('["1.x", "2.x"]', '"upper_STIF1.mtx"')
+    text = text.replace("upper.npz:springs", "upper_STIF1.mtx").replace(".x", ".1")
+    content = read(folder, text.replace('"x"', '"1"'))
+    assert content.structure_section.unknowns == ("1.1", "2.1")
+    expected = loaded(folder).structure.model
+    model = content.structure.model
+    for (_, matrix), (_, other) in zip(model.stiffness, expected.stiffness, strict=True):
+        assert np.array_equal(matrix, other)
+    assert np.array_equal(model.pattern, [1, 1])
+    other_order = text.replace('unknowns = "upper_STIF1.mtx"', 'unknowns = ["2.1", "1.1"]')
+    [_, (_, springs)] = read(folder, other_order.replace('"x"', '"1"')).structure.model.stiffness
+    assert np.array_equal(springs, expected.stiffness[1][1])
+    lines = refusals(changed(folder, '["1.x", "2.x"]', '"lower.mtx"'))
+    assert any("without names of unknowns" in line for line in lines)
+
+
 def test_a_fuzzy_parameter_in_no_factor_is_doubted(folder):
     section = loaded(folder, 'm = "20 t"', 'm = "20 t"\nmr = "1 ± 10 %"').structure_section
     (doubt,) = section.warnings(None)

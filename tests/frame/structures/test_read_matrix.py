@@ -43,7 +43,6 @@ def test_one_of_several_arrays_is_named(tmp_path):
         ("k.csv", "1,2\n3\n", "1 of 2 rows have 2"),
         ("k.csv", "1,nan\n", "nan at row 1, column 2"),
         ("k.mtx", "no matrix\n", "k.mtx is no matrix; allowed: %%MatrixMarket"),
-        ("k.mtx", "1,1, 1,1, 2e7\n", "write ROW COLUMN VALUE without commas"),
         ("k.npy", "no array", "an array of real numbers as numpy.save"),
     ],
 )
