@@ -11,7 +11,9 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.bounds.spectrum_bounds import Combination, combined_bounds
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.spectra.modal_combination import COMBINATIONS, combined_peaks, correlation
 from alphacut.frame.spectra.target import TargetSpectrum
 from alphacut.frame.structures.linear import LinearSystem, evaluate, undamped_modes
@@ -61,20 +63,8 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class Method:
-    """A variant of the response-spectrum method.
-
-    Args:
-        spectrum: Pseudo-acceleration over the period.
-        combination: "SRSS" or "CQC".
-        modes: Number of the lowest modes that are combined; None for all.
-        own_ratios: Whether CQC takes the damping ratio of each mode; else that of the spectrum.
-    """
-
-    spectrum: TargetSpectrum
-    combination: str
-    modes: int | None
-    own_ratios: bool
+class Method(Combination):
+    """A variant of the response-spectrum method, at parameter sets."""
 
     def modes_at(self, system: LinearSystem, names: Sequence[str], points: Array) -> Modes:
         """Return the modes of a structure at S parameter sets.
@@ -124,7 +114,7 @@ class Method:
                 damping ratio of a mode that has none.
         """
         correlations = np.eye(modes.omega.shape[1])
-        if self.combination == "CQC":
+        if self.rule == "CQC":
             ratios = np.full_like(modes.ratios, self.spectrum.damping)
             if self.own_ratios:
                 ratios = modes.ratios
@@ -147,6 +137,9 @@ class SpectrumResponse(Answer):
         nominal: Combined peaks at the nominal inputs, shape (outputs,).
         attained: The smallest and the largest combined peak of each cut that some inputs have,
             shape (levels, outputs, 2).
+        proved: Guaranteed bounds of the combined peaks of each cut, the same shape; 0 and ∞ where
+            none are found.
+        unproved: Why some bounds are not found; empty if all are.
     """
 
     key = "spectrum_response"
@@ -158,6 +151,8 @@ class SpectrumResponse(Answer):
     units: tuple[str, ...]
     nominal: Array
     attained: Array
+    proved: Array
+    unproved: str = ""
 
     @property
     def modal_peaks(self) -> dict[str, Array]:
@@ -203,33 +198,45 @@ class SpectrumResponse(Answer):
         """Return a table of texts with a row for each output.
 
         The columns are the output, the range of its combined peak at the lowest level, the
-        guarantee of this range, and the combined peak at the nominal inputs.
+        guarantee of this range, its attained part, and the combined peak at the nominal inputs.
         """
         rows = []
         for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
             low, high = self.attained[0, k].tolist()
+            reached = range_text(low, high, Nature.ATTAINED)
+            text = reached
+            nature = Nature.ATTAINED
+            if np.isfinite(self.proved[0, k, 1]):
+                low, high = self.proved[0, k].tolist()
+                nature = Nature.GUARANTEED
+                text = range_text(low, high, nature)
             row = {
                 "peak of": name,
-                f"at α = {self.alpha[0]:g}": f"{range_text(low, high, Nature.ATTAINED)} {unit}",
-                "nature": self.nature_text(Nature.ATTAINED),
+                f"at α = {self.alpha[0]:g}": f"{text} {unit}",
+                "nature": self.nature_text(nature),
+                "reached": f"{reached} {unit}",
                 "nominal": engineering(float(self.nominal[k]), unit),
             }
             rows.append(row)
         return table_of(rows)
 
     def records(self) -> list[Record]:
-        """Return a row for each output and level, with the smallest and largest attained peak."""
+        """Return a row for each output and level, with guaranteed bounds and attained values.
+
+        Upper bounds that are not found are None.
+        """
         rows: list[Record] = []
         for k, (name, unit) in enumerate(zip(self.outputs, self.units, strict=True)):
-            for row_of_level, level in enumerate(map(float, self.alpha)):
-                low, high = self.attained[row_of_level, k].tolist()
+            for j, level in enumerate(map(float, self.alpha)):
                 row: Record = {
                     "output": name,
                     "unit": unit,
                     "alpha": level,
                     "nominal": float(self.nominal[k]),
-                    "attained lower": known(low),
-                    "attained upper": known(high),
+                    "guaranteed lower": known(self.proved[j, k, 0]),
+                    "guaranteed upper": known(self.proved[j, k, 1]),
+                    "attained lower": known(self.attained[j, k, 0]),
+                    "attained upper": known(self.attained[j, k, 1]),
                 }
                 rows.append(row)
         return rows
@@ -240,12 +247,16 @@ class SpectrumResponse(Answer):
         total = percent_text(float(self.modes.mass_fractions[0].sum()))
         count = self.modes.omega.shape[1]
         needed = self.sufficient_modes
+        unproved = ""
+        if self.unproved:
+            unproved = f" Not all ranges are proved: {self.unproved}."
         enough = f"the first {needed} of them 90 %" if needed else "less than the 90 % of codes"
         return (
-            f"Peaks of {count} modes by the {method.spectrum}, combined by {method.combination}"
-            f" ({COMBINATIONS[method.combination]}). The modes move {total} of the mass,"
+            f"Peaks of {count} modes by the {method.spectrum}, combined by {method.rule}"
+            f" ({COMBINATIONS[method.rule]}). The modes move {total} of the mass,"
             f" {enough} (at the most plausible inputs). A combined peak is an estimate of the"
-            " peak under an earthquake of this spectrum; its range is that over the inputs."
+            " peak under an earthquake of this spectrum; its range is that over the"
+            f" inputs.{unproved}"
         )
 
 
@@ -276,8 +287,9 @@ def spectrum_response(
         alpha: Levels, rising within [0, 1].
 
     Returns:
-        Modes and combined peaks at the nominal inputs, and over each cut the smallest and largest
-        combined peaks at corners and at points inside.
+        Modes and combined peaks at the nominal inputs; over each cut the smallest and largest
+        combined peaks at corners and at points inside, and guaranteed bounds of all, where modes
+        are known to keep apart in the cut or in each of its parts.
 
     Raises:
         RefusedError: An argument is not as said, the structure is not linear, an output takes
@@ -300,15 +312,18 @@ def spectrum_response(
     method = Method(spectrum, combination, modes, own_ratios)
     cuts = boxes(inputs, alpha)
     nominal_modes = method.modes_at(structure, cuts.names, cuts.nominal[np.newaxis])
-    nominal = method.combined(nominal_modes)[0]
+    attained = _attained(structure, cuts, method)
+    proved, unproved = _proved(structure, cuts, method, attained)
     return SpectrumResponse(
         method=method,
         alpha=cuts.alpha,
         modes=nominal_modes,
         outputs=tuple(map(str, structure.outputs)),
         units=tuple(structure.unit_of(name) for name in structure.outputs),
-        nominal=nominal,
-        attained=_attained(structure, cuts, method),
+        nominal=method.combined(nominal_modes)[0],
+        attained=attained,
+        proved=proved,
+        unproved=unproved,
     )
 
 
@@ -331,3 +346,30 @@ def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> Array:
         found.append(np.stack([-peaks.min(axis=0), peaks.max(axis=0)], axis=-1))
     widest = np.maximum.accumulate(found[::-1])[::-1]
     return np.asarray(widest * [-1.0, 1.0])
+
+
+def _proved(
+    structure: LinearSystem, cuts: Boxes, method: Method, attained: Array
+) -> tuple[Array, str]:
+    """Return guaranteed bounds of the combined peaks of each cut, and why some are missing.
+
+    Args:
+        structure: The structure.
+        cuts: The cuts.
+        method: Spectrum and combination.
+        attained: Smallest and largest attained combined peaks, shape (levels, outputs, 2).
+
+    Returns:
+        Bounds of the same shape, 0 and ∞ where none are found; and the reason, or an empty text.
+    """
+    proved = np.full(attained.shape, [0.0, np.inf])
+    reason = ""
+    for j, ends in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
+        try:
+            proved[j] = combined_bounds(structure, cuts.names, ends, method, attained[j])
+        except UnprovedError as error:
+            reason = str(error)
+    # Bounds of a cut hold in the narrower ones, too.
+    proved[..., 0] = np.maximum.accumulate(proved[..., 0])
+    proved[..., 1] = np.minimum.accumulate(proved[..., 1])
+    return proved, reason

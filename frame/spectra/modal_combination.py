@@ -52,3 +52,35 @@ def combined_peaks(peaks: Array, correlations: Array) -> Array:
     """
     squares = np.sum(peaks * (correlations @ peaks), axis=-2)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+def correlation_range(
+    periods: tuple[Array, Array], ratios: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Return bounds of the `correlation` of modes whose periods and damping ratios have ranges.
+
+    Args:
+        periods: Lower and upper ends of natural periods, positive, shape (modes,) each. The first
+            mode is known to have the longest period, and so on; the ranges may overlap.
+        ratios: Lower and upper ends of damping ratios, positive, shape (modes,) each.
+
+    Returns:
+        Bounds of ρ, from 0 to 1, shape (modes, modes) each; valid above the diagonal alone.
+    """
+    # x = ln(T_i/T_j) is not negative for i < j. Numerator and denominator rise with ζ, the
+    # denominator with x, and of the numerator mode i's term falls with x and mode j's rises. All
+    # are widened by far more than their rounding.
+    low, high = np.log(periods[0]), np.log(periods[1])
+    x_low = np.maximum(low[:, np.newaxis] - high - 1e-14, 0.0)
+    x_high = np.maximum(high[:, np.newaxis] - low + 1e-14, 0.0)
+    numerators = []
+    denominators = []
+    for second, x, x_opposite in ((ratios[0], x_low, x_high), (ratios[1], x_high, x_low)):
+        first = second[:, np.newaxis]
+        terms = first * np.exp(-x_opposite / 2) + second * np.exp(x / 2)
+        numerators.append(2 * np.sqrt(first * second) * terms)
+        squares = first**2 + second**2
+        denominators.append(np.sinh(x) ** 2 + 2 * first * second * np.cosh(x) + squares)
+    smallest = numerators[0] / denominators[1] * (1 - 1e-12)
+    largest = numerators[1] / denominators[0] * (1 + 1e-12)
+    return np.asarray(smallest), np.asarray(np.minimum(largest, 1.0))

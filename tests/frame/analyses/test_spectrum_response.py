@@ -8,9 +8,13 @@ from alphacut.frame import (
     MatrixStructure,
     StoreyFrame,
     TargetSpectrum,
+    asce7_two_period,
     eurocode8_spectrum,
     spectrum_response,
 )
+from alphacut.frame.analyses.spectrum_response import Method
+from alphacut.frame.spectra.displacement_chord import displacement_chord
+from alphacut.frame.spectra.modal_combination import correlation, correlation_range
 from alphacut.fuzzy import Interval, RefusedError
 
 SPECTRUM = eurocode8_spectrum(2.0, "B")
@@ -110,3 +114,111 @@ def test_what_the_method_does_not_cover_is_refused(change, more, word):
     frame = StoreyFrame(**({"masses": [1e4], "stiffness": [4e6]} | change))
     with pytest.raises(RefusedError, match=word):
         spectrum_response(frame, {"k1": frame.stiffness[0]}, SPECTRUM, **more)
+
+
+def random_structure(rng, number):
+    """A structure, the names of its inputs, and a spectrum."""
+    floors = 1 + number % 4
+    rules = [SPECTRUM, asce7_two_period(9.0, 4.0, 6.0), eurocode8_spectrum(2.0, "C", q=3.0)]
+    names = [f"k{floors}", "m1", "rayleigh_mass"][: 1 + number % 3]
+    period = rng.uniform(0.2, 1.2)
+    masses = rng.uniform(3e4, 6e4, floors)
+    stiffness = rng.uniform(0.8, 1.2, floors) * 4e4 * (2 * np.pi / period) ** 2 * floors**2 / 2
+    if number % 2:
+        outputs = ("drift1", f"q{floors}", "base_shear")
+        factors = (0.3, 1e-4)
+        frame = StoreyFrame(masses, stiffness=stiffness, rayleigh=factors, outputs=outputs)
+        return frame, names, rules[number % 3]
+    # The same chain on a spring without a mass, and a member force.
+    k = {f"k{z + 1}": x for z, x in enumerate(stiffness)}
+    rows = np.eye(floors + 1)[1:] - np.eye(floors + 1)[:-1]
+    chain = [(f"k{z + 1}", np.outer(row, row)) for z, row in enumerate(rows)]
+    chain.append((1.3 * stiffness[0], np.outer(np.eye(floors + 1)[0], np.eye(floors + 1)[0])))
+    mass = [("m1", np.diag(np.eye(floors + 1)[1]))]
+    mass += [(m, np.diag(np.eye(floors + 1)[z])) for z, m in enumerate(masses[1:], 2)]
+    structure = MatrixStructure(
+        k | {"m1": masses[0]},
+        mass=mass,
+        stiffness=chain,
+        observed={"top": np.eye(floors + 1)[-1], "force": rows[-1]},
+        row_factors={"force": f"k{floors}"},
+        ratios=[0.03],
+    )
+    return structure, [x for x in names if x != "rayleigh_mass"], rules[number % 3]
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_no_sample_of_a_cut_lies_outside_guaranteed_bounds(number, rng):
+    structure, names, spectrum = random_structure(rng, number)
+    rule = ("CQC", "SRSS")[number % 5 == 0]
+    own_ratios = number % 4 < 2
+    nominal = np.array([structure.parameters[name] for name in names])
+    radius = rng.uniform(0.01, 0.08, len(names)) * nominal
+    ends = np.transpose([nominal - radius, nominal + radius]).tolist()
+    inputs = {name: Interval(*cut) for name, cut in zip(names, ends, strict=True)}
+    found = spectrum_response(
+        structure, inputs, spectrum, combination=rule, own_ratios=own_ratios, alpha=[0.0]
+    )
+    method = Method(spectrum, rule, None, own_ratios)
+    points = rng.uniform(*np.transpose(ends), (400, len(names)))
+    samples = method.combined(method.modes_at(structure, names, points))
+    low, high = found.proved[0].T
+    assert found.unproved == ""
+    assert (samples >= low).all()
+    assert (samples <= high).all()
+    attained = np.ptp(found.attained[0], axis=1)
+    assert (high - low <= 1.2 * attained + 0.03 * high).all()
+
+
+def test_where_modes_cross_the_range_is_attained_and_no_more():
+    twins = MatrixStructure(
+        {"k": 4e6},
+        mass=[(1.0, np.diag([1e4, 1e4]))],
+        stiffness=[("k", np.diag([1.0, 0.0])), (4e6, np.diag([0.0, 1.0]))],
+        observed={"sum": np.ones(2)},
+        ratios=[0.05],
+    )
+    found = spectrum_response(twins, {"k": Interval(3e6, 5e6)}, SPECTRUM, alpha=[0.0])
+    assert found.proved.tolist() == [[[0.0, np.inf]]]
+    assert found.table().rows[0][2] == "attained"
+    assert "near one another" in found.words()
+    assert found.records()[0]["guaranteed upper"] is None
+    assert found.attained[0, 0, 0] < found.nominal[0] < found.attained[0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    "spectrum",
+    [
+        SPECTRUM,
+        eurocode8_spectrum(2.0, "D", q=4.0),
+        asce7_two_period(9.0, 4.0, 2.0),
+        TargetSpectrum([0.0, 0.3, 0.7, 4.0], [1.0, 3.0, 0.5, 0.6], minimum=0.55),
+    ],
+)
+def test_a_chord_is_within_its_error_and_touches_it(spectrum, rng):
+    for width in (0.03, 0.3, 2.0):
+        low = rng.uniform(0.0, 1.9)
+        chord = displacement_chord(spectrum, low, low + width)
+        periods = np.linspace(low, low + width, 3001)
+        displacement = spectrum(periods) * periods**2 / (4 * np.pi**2)
+        line = chord.value + chord.slope * (periods - chord.midpoint)
+        farthest = np.abs(displacement - line).max()
+        assert farthest <= chord.error <= 1.5 * farthest + 1e-9
+
+
+def test_correlations_of_modes_in_ranges_lie_within_bounds(rng):
+    for _ in range(100):
+        periods = np.sort(rng.uniform(0.3, 0.6, 3))[::-1]
+        ratios = rng.uniform(0.01, 0.2, 3)
+        widths = rng.uniform(0, 0.1, (2, 3))
+        low, high = correlation_range(
+            (periods * (1 - widths[0]), periods * (1 + widths[1])),
+            (ratios * (1 - widths[1]), ratios * (1 + widths[0])),
+        )
+        rho = correlation(2 * np.pi / periods, ratios)
+        above = np.triu_indices(3, 1)
+        assert (low <= rho)[above].all()
+        assert (rho <= high)[above].all()
+    exact = correlation_range((periods, periods), (ratios, ratios))
+    assert exact[0][above] == pytest.approx(rho[above])
+    assert exact[1][above] == pytest.approx(rho[above])
