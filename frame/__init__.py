@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from alphacut.base.first_use import at_first_use
 
 if TYPE_CHECKING:
+    from alphacut.frame.analyses.angles import AnglePeaks, over_angles
     from alphacut.frame.analyses.decision import Decision, decide
     from alphacut.frame.analyses.fragility import Fragility, fragility
     from alphacut.frame.analyses.incremental import ScaledPeaks, incremental
@@ -43,7 +44,9 @@ if TYPE_CHECKING:
     from alphacut.frame.spectra.asce7 import asce7_multi_period, asce7_two_period
     from alphacut.frame.spectra.eurocode8 import eurocode8_spectrum
     from alphacut.frame.spectra.response_spectrum import (
+        RotatedSpectra,
         response_spectrum,
+        rotated_spectra,
         spectral_acceleration,
     )
     from alphacut.frame.spectra.target import TargetSpectrum, read_spectrum
@@ -56,22 +59,24 @@ if TYPE_CHECKING:
     from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Decision", "DualProof", "Envelope", "Exact",
-    "Force", "Fragility", "GraphFollower", "History", "Identified", "ImprovedFollower",
-    "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit", "LinearFlow", "MatrixStructure",
-    "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak", "Prediction", "Predictions",
-    "Probability", "Proof", "RefutedError", "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity",
-    "SpectrumResponse", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
-    "UnprovedError", "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide",
-    "envelope", "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode",
-    "over_records", "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
-    "read_spectrum", "read_suite", "read_unknowns", "require_envelope", "response_spectrum",
+    "INTEGRATORS", "METHODS", "Accelerogram", "AnglePeaks", "Auto", "Decision", "DualProof",
+    "Envelope", "Exact", "Force", "Fragility", "GraphFollower", "History", "Identified",
+    "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit",
+    "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak",
+    "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
+    "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumResponse", "StoreyFrame",
+    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "asce7_multi_period",
+    "asce7_two_period", "damping_from_loss", "decide", "envelope", "eurocode8_spectrum",
+    "fragility", "identify", "incremental", "measured_mode", "over_angles", "over_records", "peaks",
+    "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
+    "read_suite", "read_unknowns", "require_envelope", "response_spectrum", "rotated_spectra",
     "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
     "METHODS": "propagation",
     "Accelerogram": "records.history",
+    "AnglePeaks": "analyses.angles",
     "Auto": "methods.auto",
     "Decision": "analyses.decision",
     "DualProof": "methods.dual",
@@ -99,6 +104,7 @@ AT_FIRST_USE = {
     "Probability": "analyses.probability",
     "Proof": "methods.proof",
     "RefutedError": "identification.identify",
+    "RotatedSpectra": "spectra.response_spectrum",
     "Sampled": "methods.sampled",
     "ScaledPeaks": "analyses.incremental",
     "ScaledSuite": "analyses.spectral_scaling",
@@ -119,6 +125,7 @@ AT_FIRST_USE = {
     "identify": "identification.identify",
     "incremental": "analyses.incremental",
     "measured_mode": "identification.modes",
+    "over_angles": "analyses.angles",
     "over_records": "analyses.suites",
     "peaks": "analyses.peaks",
     "pendulum": "structures.lagrangian",
@@ -131,6 +138,7 @@ AT_FIRST_USE = {
     "read_unknowns": "structures.read_matrix",
     "require_envelope": "propagation",
     "response_spectrum": "spectra.response_spectrum",
+    "rotated_spectra": "spectra.response_spectrum",
     "scale_suite": "analyses.spectral_scaling",
     "sensitivity": "analyses.sensitivity",
     "spectral_acceleration": "spectra.response_spectrum",

@@ -491,16 +491,17 @@ def summarised(
     )
 
 
-def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
+def largest_peaks(peaks: Mapping[str, Peaks] | Mapping[float, Peaks]) -> dict[str, Peak]:
     """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
 
     The largest peak does not fall if the peak under some record rises. Its bounds are therefore the
     largest of the bounds under the records, with the weakest of their guarantees. Of the smallest
-    value of an output ("min q3") the smallest one over the records is bounded.
+    value of an output ("min q3") the smallest one over the records is bounded. Under several
+    records no structure is known to have small peaks, as each record may have its own one.
 
     Args:
-        peaks: Peaks by the record's name and by the peak's name; at least one record, and the same
-            peaks and levels for each.
+        peaks: Peaks by the record's name, or by the direction of one record, and by the peak's
+            name; at least one record, and the same peaks and levels for each.
     """
     largest: dict[str, Peak] = {}
     for name, first in next(iter(peaks.values())).items():
@@ -512,8 +513,10 @@ def largest_peaks(peaks: Mapping[str, Peaks]) -> dict[str, Peak]:
         # largest values of -q (`outwards`), and are turned back at the end (`mirrored`).
         found = with_combined(
             replace(farthest, nature=nature), of_records, np.max,
-            "lower", "upper", "error", "reached", "least_lower", "least_upper",
+            "lower", "upper", "error", "reached", "least_lower",
         )  # fmt: skip
+        if len(of_records) > 1:
+            found = replace(found, least_upper=np.full_like(found.reached, np.inf))
         largest[name] = mirrored(found) if first.is_least else found
     return largest
 

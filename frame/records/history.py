@@ -230,7 +230,10 @@ class Accelerogram(History):
     name: str = field(default="", kw_only=True)
     remarks: tuple[str, ...] = field(default=(), kw_only=True, repr=False)
 
-    def has_times_of(self, other: Accelerogram) -> bool:
-        """Return whether two accelerograms differ in their samples alone, of which both have n."""
-        same_samples = replace(other, samples=self.samples)
-        return len(self.samples) == len(other.samples) and self.identity == same_samples.identity
+    def require_times_of(self, other: Accelerogram) -> None:
+        """Raise RefusedError unless another accelerogram has as many samples at the same times."""
+        what = " and ".join(f"{len(x.samples)} every {x.step:g} s" for x in (self, other))
+        is_as_long = len(self.samples) == len(other.samples)
+        has_same_times = self.identity == replace(other, samples=self.samples).identity
+        allowed = "the same times in all components"
+        require(is_as_long and has_same_times, "samples of components", what, allowed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import pi, sqrt
 from typing import NamedTuple
 
@@ -48,16 +49,91 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
         [3.0, 1.69, 0.17]
     """
     ratio = checked_number("damping", damping, least=0, most=0.999)
-    require_numbers("periods", np.asarray(periods))
-    shaped = np.asarray(periods, float)
+    shaped = _checked_periods(periods)
     oscillates = shaped != 0
     positive = shaped[oscillates]
-    smallest = positive.min(initial=np.inf)
+    found = np.full(shaped.shape, ground.extremes[0])
+    largest = np.zeros(len(positive))
+    for k, values in _pseudo_accelerations(ground, positive, ratio):
+        largest[k] = max(largest[k], np.abs(values).max())
+    found[oscillates] = largest
+    return found
+
+
+def _checked_periods(periods: ArrayLike) -> Array:
+    """Return periods as an array; raises RefusedError if one is neither 0 nor from 0.001 s on."""
+    require_numbers("periods", np.asarray(periods))
+    shaped = np.asarray(periods, float)
+    smallest = shaped[shaped != 0].min(initial=np.inf)
     allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
     require(smallest >= MIN_PERIOD, "periods", f"{smallest:g} s", allowed)
-    found = np.full(shaped.shape, ground.extremes[0])
-    found[oscillates] = _pseudo_accelerations(ground, positive, ratio)
-    return found
+    return shaped
+
+
+class RotatedSpectra(NamedTuple):
+    """Median and largest value of a spectrum over all directions, in m/s², by the period.
+
+    Args:
+        rotd50: RotD50, the median over the directions.
+        rotd100: RotD100, the largest value of them.
+    """
+
+    rotd50: Array
+    rotd100: Array
+
+
+def rotated_spectra(
+    first: Accelerogram, second: Accelerogram, periods: ArrayLike, damping: float = 0.05
+) -> RotatedSpectra:
+    """Return the spectra RotD50 and RotD100 of two horizontal components (Boore 2010).
+
+    At each period they are the median and the largest value of the spectral pseudo-acceleration
+    of the record a₁ cos θ + a₂ sin θ over the 180 directions θ = 0°, 1°, … 179°.
+
+    Args:
+        first: The component a₁.
+        second: The component a₂, at right angles to the first, with as many samples at the same
+            times.
+        periods: Undamped natural periods, in s, as of `response_spectrum`.
+        damping: Damping ratio ζ, from 0 to 0.999.
+
+    Returns:
+        `rotd50` and `rotd100` in m/s², each in the shape of the periods.
+
+    Raises:
+        RefusedError: The components differ in their times, a period is neither 0 nor from 0.001 s
+            on, or the damping ratio is not such a number.
+
+    Example:
+        >>> from alphacut.frame import Accelerogram, rotated_spectra
+        >>> pulse = Accelerogram(0.01, [0.0, 3.0, 0.0])
+        >>> still = Accelerogram(0.01, [0.0, 0.0, 0.0])
+        >>> found = rotated_spectra(pulse, still, [0.0, 0.1])
+        >>> found.rotd100.round(2).tolist(), found.rotd50.round(2).tolist()
+        ([3.0, 1.69], [2.12, 1.19])
+    """
+    ratio = checked_number("damping", damping, least=0, most=0.999)
+    first.require_times_of(second)
+    shaped = _checked_periods(periods)
+    flat = shaped.ravel()
+    directions = np.radians(np.arange(180))
+    turns = np.column_stack([np.cos(directions), np.sin(directions)])
+
+    def peaks_by_direction(of_first: Array, of_second: Array) -> Array:
+        return np.asarray(np.abs(turns @ np.stack([of_first, of_second])).max(axis=1))
+
+    # The response is linear in the record, so that those to the components are turned.
+    ground_peaks = peaks_by_direction(first.samples, second.samples)
+    oscillating = np.flatnonzero(flat)
+    largest = np.where(flat[:, np.newaxis] == 0, ground_peaks, 0.0)  # (periods, directions)
+    both = (_pseudo_accelerations(ground, flat[oscillating], ratio) for ground in (first, second))
+    for of_first, of_second in zip(*both, strict=True):
+        row = largest[oscillating[of_first.oscillator]]
+        np.maximum(row, peaks_by_direction(of_first.values, of_second.values), out=row)
+    return RotatedSpectra(
+        rotd50=np.median(largest, axis=1).reshape(shaped.shape),
+        rotd100=largest.max(axis=1).reshape(shaped.shape),
+    )
 
 
 def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
@@ -103,8 +179,20 @@ class _Advance(NamedTuple):
         return cls(np.exp(z), time * first, ramp)
 
 
-def _pseudo_accelerations(ground: Accelerogram, periods: Array, ratio: float) -> Array:
-    """Return ω² max |u| of oscillators with positive periods, shape (oscillators,).
+class _Readings(NamedTuple):
+    """Values of ω² u of one oscillator of several, at one time in each step of a record."""
+
+    oscillator: int
+    values: Array  # (steps,)
+
+
+def _pseudo_accelerations(
+    ground: Accelerogram, periods: Array, ratio: float
+) -> Iterator[_Readings]:
+    """Yield ω² u of oscillators with positive periods, at `READINGS` times a period or more.
+
+    Oscillators and times follow in an order that depends on the step and the length of the record,
+    the periods and the ratio alone.
 
     With the root λ = ω (-ζ + i √(1 - ζ²)) of the characteristic polynomial and its conjugate λ*,
     y = u' - λ* u satisfies y' = λ y - a(t), and u = Im y / Im λ.
@@ -123,11 +211,10 @@ def _pseudo_accelerations(ground: Accelerogram, periods: Array, ratio: float) ->
     for k in range(len(starts) - 1):
         states[k + 1] = whole.decay * states[k] - loads[k]
 
-    largest = np.zeros(len(roots))
+    scale = omega**2 / roots.imag
     for k, period in enumerate(periods):
         substeps = int(np.ceil(READINGS * step / period))
         for j in range(1, substeps + 1):
             part = _Advance.of(roots[[k]], j / substeps * step, step)
             inside = part.decay * states[:, k] - part.constant * starts - part.ramp * differences
-            largest[k] = max(largest[k], np.abs(inside.imag).max())
-    return np.asarray(omega**2 * largest / roots.imag)
+            yield _Readings(k, scale[k] * inside.imag)

@@ -161,10 +161,7 @@ class MatrixStructure(LinearSystem):
             require(
                 shape == (self.size,), "influence vector", f"of shape {shape}", f"({self.size},)"
             )
-            first = self.ground or self.components[0][0]
-            what = " and ".join(f"{len(x.samples)} every {x.step:g} s" for x in (first, ground))
-            allowed_times = "the same times in all components"
-            require(first.has_times_of(ground), "samples of components", what, allowed_times)
+            (self.ground or self.components[0][0]).require_times_of(ground)
 
     def _inertia_forces(self) -> Iterator[Force]:
         """Yield the forces −M(p) ι a(t) = −Σ_i f_i(p) M_i ι a(t) of each component (ι, a).

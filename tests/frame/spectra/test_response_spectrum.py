@@ -9,6 +9,7 @@ from alphacut.frame import (
     StoreyFrame,
     over_records,
     response_spectrum,
+    rotated_spectra,
     spectral_acceleration,
 )
 from alphacut.fuzzy import Interval, RefusedError
@@ -71,3 +72,31 @@ def test_a_period_that_no_structure_has_is_refused_before_it_takes_minutes():
     record = Accelerogram(0.02, np.ones(40))
     with pytest.raises(RefusedError, match=r"first natural period .* as t and MN/m"):
         over_records(frame, {"m1": Interval(49e3, 51e3)}, [record], duration=20.0, step=0.02)
+
+
+def test_rotated_spectra_are_those_of_records_turned_by_hand():
+    rng = np.random.default_rng(5)
+    x, y = (Accelerogram(0.02, rng.normal(size=40)) for _ in range(2))
+    periods = np.array([[0.0, 0.02], [0.3, 1.5]])
+    found = rotated_spectra(x, y, periods, 0.1)
+    turned = [
+        response_spectrum(
+            Accelerogram(0.02, np.cos(angle) * x.samples + np.sin(angle) * y.samples), periods, 0.1
+        )
+        for angle in np.radians(np.arange(180))
+    ]
+    assert found.rotd50 == pytest.approx(np.median(turned, axis=0), rel=1e-12)
+    assert found.rotd100 == pytest.approx(np.max(turned, axis=0), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("second", "periods", "message"),
+    [
+        (Accelerogram(0.02, np.ones(4)), 0.3, "3 every 0.02 s and 4 every 0.02 s; allowed: the"),
+        (Accelerogram(0.01, np.ones(3)), 0.3, "3 every 0.02 s and 3 every 0.01 s; allowed: the"),
+        (Accelerogram(0.02, np.ones(3)), -1.0, "periods is -1 s"),
+    ],
+)
+def test_what_cannot_be_rotated_is_one_line(second, periods, message):
+    with pytest.raises(RefusedError, match=message):
+        rotated_spectra(Accelerogram(0.02, np.ones(3)), second, periods)

@@ -1,0 +1,139 @@
+"""Peaks over all angles of incidence, against sampled angles and inputs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, Force, History, MatrixStructure, over_angles
+from alphacut.frame.analyses.angles import turned
+from alphacut.frame.analyses.peaks import Peak, close_peaks
+from alphacut.frame.analyses.suites import largest_peaks
+from alphacut.fuzzy import Interval, Nature, RefusedError
+from tests.frame.motions import exact_motions, random_points
+
+DURATION, STEP = 0.8, 0.05
+MOTION = {"duration": DURATION, "step": STEP, "alpha": [0.0]}
+
+
+def random_plan(rng, **changes):
+    """A floor on columns that are not centred: unknowns east, north and rotation."""
+    root = np.eye(3) + 0.3 * rng.normal(size=(3, 3))
+    ground, second = (Accelerogram(0.05, rng.normal(size=13)) for _ in range(2))
+    return MatrixStructure(
+        {"m": 2.0, "k": 150.0},
+        mass=[("m", np.eye(3))],
+        stiffness=[("k", root @ root.T + 0.3 * np.eye(3))],
+        observed={"corner": rng.normal(size=3)},
+        ratios=[0.04],
+        ground=ground,
+        pattern=np.eye(3)[0],
+        components=[(second, np.eye(3)[1])],
+        **changes,
+    )
+
+
+INPUTS = {"k": Interval(144.0, 156.0)}
+
+
+def sampled_peaks(structure, inputs, angles, points):
+    """Peaks at the nodes of each angle and point, from motions under both components apart.
+
+    They are computed without `turned`, from ground motions along the axes.
+    """
+    (second, north), *others = structure.components
+    still = replace(structure, ground=None, components=others)
+    axes = [
+        replace(still, ground=ground, pattern=pattern)
+        for ground in (structure.ground, second)
+        for pattern in (structure.pattern, north)
+    ]
+    fixed, *along = (
+        exact_motions(x, points, inputs, DURATION, STEP)[..., 0] for x in (still, *axes)
+    )
+    first_east, first_north, second_east, second_north = (motion - fixed for motion in along)
+    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    motions = fixed + cosine * (first_east + second_north) + sine * (first_north - second_east)
+    return np.abs(motions).max(axis=1)
+
+
+@pytest.mark.parametrize("case", range(10))
+def test_no_sampled_angle_exceeds_the_bound_of_random_plans(case):
+    seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    changes = {}
+    if case % 2:
+        history = History(0.1, rng.normal(size=6))
+        changes = {"q0": 0.01 * rng.normal(size=3), "loads": [Force(np.ones(3), 0.7, history)]}
+    plan = random_plan(rng, **changes)
+    directions = 3
+    found = over_angles(plan, INPUTS, **MOTION, directions=directions)
+    peak = found.peak["corner"]
+    assert peak.nature is Nature.GUARANTEED
+    assert len(found.by_angle) == directions * (1 + case % 2)
+    angles = rng.uniform(0, 2 * np.pi, 2000)
+    sampled = sampled_peaks(plan, INPUTS, angles, random_points(INPUTS, 2000, rng))
+    assert sampled.max() <= peak.proved[0]
+    # The inputs found are the worst of one of the directions, 60° apart.
+    assert peak.reached[0] > 0.98 * np.cos(np.pi / 6) * sampled.max()
+    # What is attained is attained at the named inputs, angle and time.
+    point = np.array([[peak.reached_at["k"]]])
+    worst = found.worst["corner"]
+    there = exact_motions(turned(plan, np.radians(worst.angle)), point, INPUTS, DURATION, STEP)
+    assert np.abs(there[0, round(worst.time / STEP), 0]) == pytest.approx(peak.reached[0])
+    assert sampled_peaks(plan, INPUTS, np.radians([worst.angle]), point) == pytest.approx(
+        peak.reached[0]
+    )
+
+
+def test_every_angle_of_a_symmetric_plan_is_alike():
+    """An output along any direction has its peak where the ground moves along it."""
+    record = Accelerogram(0.05, np.random.default_rng(4).normal(size=13))
+    still = Accelerogram(0.05, np.zeros(13))
+    east, north = np.eye(2)
+    plan = MatrixStructure(
+        {"k": 150.0},
+        [(2.0, np.eye(2))],
+        [("k", np.eye(2))],
+        {"east": east, "oblique": 0.5 * east + 0.75**0.5 * north},
+        ratios=[0.04],
+        ground=record,
+        pattern=east,
+        components=[(still, north)],
+    )
+    found = over_angles(plan, INPUTS, **MOTION)
+    alone = close_peaks(replace(plan, components=()), INPUTS, ["east"], **MOTION)["east"]
+    for name, angle in (("east", 0), ("oblique", 60)):
+        assert found.peak[name].reached[0] == pytest.approx(alone.reached[0], rel=1e-3)
+        assert alone.proved[0] <= found.peak[name].proved[0] <= 1.02 * alone.proved[0]
+        assert found.worst[name].angle % 180 == pytest.approx(angle, abs=1e-6)
+    table = str(found)
+    assert "guaranteed" in table
+    assert "°, " in table
+    assert [row["peak reached"] for row in found.records()] == [
+        peak.reached[0] for peak in found.peak.values()
+    ]
+
+
+def test_what_has_no_angles_is_one_line():
+    plan = random_plan(np.random.default_rng(1))
+    with pytest.raises(RefusedError, match="ground is of one component at most; allowed: two"):
+        over_angles(replace(plan, components=()), INPUTS, **MOTION)
+    with pytest.raises(RefusedError, match="output is max corner"):
+        over_angles(plan, INPUTS, **MOTION, names=["max corner"])
+    with pytest.raises(RefusedError, match="directions is 1"):
+        over_angles(plan, INPUTS, **MOTION, directions=1)
+
+
+def test_structures_with_small_peaks_under_each_record_have_none_under_both():
+    """Of two structures one has the peaks 1 and 3 under two records, and the other 3 and 1."""
+    ones = np.ones(1)
+    peak = Peak(
+        alpha=0 * ones, lower=ones, upper=3 * ones, error=0 * ones, reached=3 * ones,
+        least_lower=ones, least_upper=ones, nature=Nature.GUARANTEED,
+    )  # fmt: skip
+    alone = largest_peaks({"first": {"q": peak}})["q"]
+    both = largest_peaks({"first": {"q": peak}, "second": {"q": peak}})["q"]
+    assert alone.min_peak_bounds.upper == 1
+    assert both.min_peak_bounds.upper >= 3
