@@ -13,6 +13,7 @@ import os
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import binom
 
 SHARE = 0.995
 """Least share of estimated values that their errors cover."""
@@ -50,9 +51,14 @@ class Row:
 
     @property
     def right(self) -> bool:
-        """Whether enough is covered, and guaranteed bounds are near."""
+        """Whether enough is covered, and guaranteed bounds are near.
+
+        Of few estimated values one more may be missed than their share: as many as chance misses in
+        one of a hundred draws, if each is missed with the probability 1 − `SHARE`.
+        """
         if not self.guaranteed:
-            return self.share >= SHARE
+            missed = ~np.concatenate(self.covered)
+            return bool(binom.sf(missed.sum() - 1, missed.size, 1 - SHARE) >= 0.01)
         return self.share == 1.0 and bool(self.quantiles[1] <= MOST)
 
 
@@ -109,14 +115,17 @@ class Calibration:
             lines.append(f"{name:24} {nature:10} {count:8} {100 * row.share:8.3f}%{numbers}")
         return "\n".join([*lines, *self.violations])
 
-    def judge(self) -> None:
-        """Prints the table; fails where a row is wrong, estimates are far too large, or none is."""
+    def judge(self, most: float = MOST) -> None:
+        """Prints the table; fails where a row is wrong, estimates are far too large, or none is.
+
+        `most` is that of the median of all estimates.
+        """
         print(f"\n{self}")
         wrong = [name for name, row in self.rows.items() if not row.right]
         estimates = [
             part for row in self.rows.values() if not row.guaranteed for part in row.ratios
         ]
-        if estimates and not np.median(np.concatenate(estimates)) <= MOST:
+        if estimates and not np.median(np.concatenate(estimates)) <= most:
             wrong.append("median of the errors")
         assert self.rows, f"{self.name}: nothing was judged (SEED={self.seed})"
         assert not wrong, f"{', '.join(wrong)} (SEED={self.seed})\n{self}"

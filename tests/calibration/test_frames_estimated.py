@@ -8,7 +8,7 @@ import pytest
 from alphacut.frame import GraphFollower, ImprovedFollower, envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Interval, Nature
-from tests.calibration.declared import Calibration, free_seed
+from tests.calibration.declared import MOST, Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 
 TOLERANCE = 1e-3
@@ -80,4 +80,5 @@ def test_errors_of_searches_and_followers_cover(kind):
             if found.nature is Nature.ATTAINED:  # which promises what some motion does
                 require_reached(found, exact_flow(drawn), rng)
     if natures != {Nature.ATTAINED}:
-        table.judge()
+        # From nodes half a period apart nobody sees which basin goes on: errors cover, and are wide.
+        table.judge(np.inf if kind == "large steps" else MOST)

@@ -58,26 +58,29 @@ KINDS = {"pendulums": swinging, "Duffing": quartic(1), "wells": quartic(-1), "do
 
 
 def bounded(system, inputs):
-    """The envelope and its step, which is halved up to twice where it is refused as too coarse."""
-    for step in (0.02, 0.01):
+    """The envelope and its step, halved up to twice where it is too coarse; None if it still is."""
+    for step in (0.02, 0.01, 0.005):
         drawn = Drawn(system, inputs, duration=4.0, step=step)
         with suppress(StepError):
             return envelope(system, inputs, method=METHOD, **drawn.motion), step
-    drawn = Drawn(system, inputs, duration=4.0, step=0.005)
-    return envelope(system, inputs, method=METHOD, **drawn.motion), 0.005
+    return None
 
 
 @pytest.mark.slow
 def test_errors_cover_or_bounds_are_called_attained():
     """Ten systems of each kind, against motions of steps a quarter as long."""
-    seed, attained, missed = free_seed("nonlinear"), 0, []
+    seed, attained, missed, refused = free_seed("nonlinear"), 0, [], []
     table = Calibration("nonlinear: declared over true", seed)
     for kind, number in product(KINDS, range(10)):
         rng = np.random.default_rng([seed, number])
         system, names = KINDS[kind](rng)
         share = float(rng.choice([0.02, 0.05, 0.1]))
         inputs = {name: about(system.parameters[name], share) for name in names}
-        bounds, step = bounded(system, inputs)
+        found = bounded(system, inputs)
+        if found is None:
+            refused.append((kind, number))
+            continue
+        bounds, step = found
         attained += bounds.nature is Nature.ATTAINED
         fine = Extrapolated(LagrangianFlow(system, tuple(inputs), 4.0, step))
         before = len(table.violations)
@@ -87,3 +90,6 @@ def test_errors_cover_or_bounds_are_called_attained():
     print(f"{attained} of {10 * len(KINDS)} called attained; errors passed in {missed}")
     table.judge()
     assert not missed, (missed, seed)
+    # Double pendulums part soon, where they swing far: no step of these follows them.
+    assert len(refused) <= 5, (refused, seed)
+    assert {kind for kind, _ in refused} <= {"double"}
