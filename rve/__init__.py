@@ -18,7 +18,8 @@ from alphacut.rve.result.result import HomogenisedStiffness, StressCurve, effect
 if TYPE_CHECKING:
     from alphacut.rve.engineering import constants
     from alphacut.rve.fuzzy_cell import FuzzyStiffness, fuzzy_stiffness
-    from alphacut.rve.image.model import solve_image
+    from alphacut.rve.image.conductivity import FuzzyImageConductivity, fuzzy_image_conductivity
+    from alphacut.rve.image.model import solve_conduction, solve_image
     from alphacut.rve.image.study import (
         FuzzyImageStiffness,
         GreyImage,
@@ -37,15 +38,17 @@ if TYPE_CHECKING:
     from alphacut.rve.spheres.model import SpheresModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyImageStiffness", "FuzzyStiffness",
-    "GreyImage", "HomogenisedStiffness", "ImageFields", "LevelSetModel", "MeshModel", "Phase",
-    "PrismModel", "ProductSpace", "ReferenceBounds", "SeriesModel", "SlicesModel", "SpheresModel",
-    "StressCurve", "VoigtPhase", "constants", "effective_modulus", "fuzzy_image_stiffness",
-    "fuzzy_stiffness", "image_fields", "loss_factors", "read_image", "reference_bounds",
+    "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyImageConductivity",
+    "FuzzyImageStiffness", "FuzzyStiffness", "GreyImage", "HomogenisedStiffness", "ImageFields",
+    "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
+    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase", "constants",
+    "effective_modulus", "fuzzy_image_conductivity", "fuzzy_image_stiffness", "fuzzy_stiffness",
+    "image_fields", "loss_factors", "read_image", "reference_bounds", "solve_conduction",
     "solve_image",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
+    "FuzzyImageConductivity": "image.conductivity",
     "FuzzyImageStiffness": "image.study",
     "FuzzyStiffness": "fuzzy_cell",
     "GreyImage": "image.study",
@@ -59,12 +62,14 @@ AT_FIRST_USE = {
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
     "constants": "engineering",
+    "fuzzy_image_conductivity": "image.conductivity",
     "fuzzy_image_stiffness": "image.study",
     "fuzzy_stiffness": "fuzzy_cell",
     "image_fields": "image.vti",
     "loss_factors": "result.loss_factors",
     "read_image": "image.study",
     "reference_bounds": "result.reference_bounds",
+    "solve_conduction": "image.model",
     "solve_image": "image.model",
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""

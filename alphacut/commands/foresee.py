@@ -32,6 +32,7 @@ from alphacut.rve.image.study import (
     FuzzyImageStiffness,
     GreyImage,
     ImageStudy,
+    Phases,
     solve_study,
 )
 from alphacut.stages import answers, envelope, identify, microstructure, modulus, suite
@@ -255,7 +256,7 @@ def _image(cell: ImageCell, content: Content) -> tuple[float, Material]:
     return seconds, Material(largest.modulus, largest.loss_factor)
 
 
-def cropped(study: ImageStudy, fraction: float) -> ImageStudy:
+def cropped(study: ImageStudy[Phases], fraction: float) -> ImageStudy[Phases]:
     """Return the study of about a fraction of an image, around its middle.
 
     Args:

@@ -14,7 +14,7 @@ from alphacut.stages.foreseen import possible_materials, structure_as_computed
 
 if TYPE_CHECKING:
     from alphacut.frame.analyses.suites import ScaledRecord
-    from alphacut.rve.image.study import ImageStudy
+    from alphacut.rve.image.study import ImagePhase, ImageStudy
 
 # Stages are imported where a case has them: all of them take .1 s.
 
@@ -27,7 +27,7 @@ class Built(NamedTuple):
         records: Records of a suite as they move the structure; empty without a suite.
     """
 
-    image: ImageStudy | None
+    image: ImageStudy[ImagePhase] | None
     records: tuple[ScaledRecord, ...]
 
 
@@ -49,7 +49,7 @@ def require_runnable(content: Content) -> Built:
     return Built(study_of_image, records)
 
 
-def _require_material(content: Content) -> ImageStudy | None:
+def _require_material(content: Content) -> ImageStudy[ImagePhase] | None:
     """Refuse a cell, mesh or image that stage modulus cannot take.
 
     Returns:

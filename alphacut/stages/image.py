@@ -96,7 +96,7 @@ def stage(
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), ImageResult, compute)
 
 
-def study_of(cell: ImageCell) -> ImageStudy:
+def study_of(cell: ImageCell) -> ImageStudy[ImagePhase]:
     """Return the study of the image that a case names.
 
     Args:

@@ -1,4 +1,4 @@
-"""Bounds of a stiffness in the Loewner order, and what follows from them.
+"""Bounds of a stiffness or conductivity in the Loewner order, and what follows from them.
 
 Each function states the inequality that it proves. A number that is computed with k rounded
 operations is off by at most k + 1 rounding units of itself; the bounds are moved outwards by that.
@@ -26,7 +26,103 @@ class Enclosure(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class StiffnessBounds:
+class LoewnerBounds:
+    """Bounds lower ≤ C ≤ upper of a symmetric tensor, as quadratic forms.
+
+    Args:
+        lower: Lower bound, shape (n, n); 0 where there is none, as beside pores that percolate.
+        upper: Upper bound, of the same shape; its diagonal is infinite where there is none, as
+            beside rigid or perfectly conducting phases.
+    """
+
+    lower: Array
+    upper: Array
+
+    @property
+    def has_lower(self) -> bool:
+        """Whether the lower bound is positive: not where pores percolate."""
+        return bool(self.lower.any())
+
+    @property
+    def has_upper(self) -> bool:
+        """Whether the upper bound is finite: not beside rigid or perfectly conducting phases."""
+        return bool(np.isfinite(self.upper).all())
+
+    @property
+    def width(self) -> float:
+        """Largest ratio of the upper to the lower energy over all mean fields, minus one."""
+        if not (self.has_lower and self.has_upper):
+            return float("inf")
+        from scipy.linalg import eigh  # takes time to import
+
+        return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
+
+    def contains(self, tensor: Array) -> bool:
+        """Return whether a symmetric tensor of their shape lies between the bounds."""
+        distances = np.stack([tensor - self.lower, self.upper - tensor])
+        return bool((np.linalg.eigvalsh(distances)[:, 0] >= 0).all())
+
+    def overlaps(self, other: LoewnerBounds) -> bool:
+        """Return whether some tensor may lie between these bounds and between other ones.
+
+        Then the lower bounds of each are below the upper bounds of the other.
+        """
+        pairs = (self, other), (other, self)
+        return all(
+            np.linalg.eigvalsh(above.upper - below.lower)[0] >= 0
+            for above, below in pairs
+            if above.has_upper
+        )
+
+
+class ConductivityBounds(LoewnerBounds):
+    """Bounds lower ≤ K ≤ upper of a conductivity, as quadratic forms of the mean gradient.
+
+    K is that of heat in W/(m K), of electricity in S/m, or a diffusivity in m²/s: bounds have the
+    unit of the phases' conductivities, and the shape (2, 2) of the plane or (3, 3) of space.
+    """
+
+    @property
+    def mean(self) -> Enclosure:
+        """Bounds of the mean over all directions, the trace of K over the dimension."""
+        n = len(self.lower)
+        low = float(np.trace(self.lower)) / n
+        high = float(np.trace(self.upper)) / n
+        return Enclosure(low * (1 - 4 * UNIT), high * (1 + 4 * UNIT))
+
+    def components(self) -> Array:
+        """Return bounds of K_xx, K_yy and K_xy, or of K_xx, K_yy, K_zz, K_yz, K_xz and K_xy.
+
+        Returns:
+            Lower and upper bound of each, shape (components, 2). Components off the diagonal lie
+            between −∞ and ∞ where a bound is missing.
+        """
+        n = len(self.lower)
+        diagonal = np.diagonal([self.lower, self.upper], 0, 1, 2).T
+        off_diagonal = [entry_bounds(self.lower, self.upper, i, j) for i, j in SHEARS[n]]
+        return np.concatenate([diagonal, off_diagonal])
+
+
+def entry_bounds(lower: Array, upper: Array, i: int, j: int) -> Enclosure:
+    """Return bounds of entry (i, j) of a symmetric tensor from bounds in the Loewner order.
+
+    With S between A and B in the Loewner order and D = B − A, the inequality of Cauchy and Schwarz
+    gives, for any vectors x and y,
+
+        |x·(S − (A + B)/2) y| ≤ √(x·D x) √(y·D y)/2.
+
+    Here x and y are the unit vectors i and j, so that S_ij lies within √(D_ii D_jj)/2 of the mean
+    of A_ij and B_ij; −∞ and ∞ where a bound is infinite.
+    """
+    if not np.isfinite(upper).all():
+        return Enclosure(-np.inf, np.inf)
+    middle = (lower[i, j] + upper[i, j]) / 2
+    diagonal = np.maximum(np.diagonal(upper - lower)[[i, j]], 0)  # D_ii and D_jj
+    radius = np.sqrt(diagonal).prod() / 2 + 4 * UNIT * np.abs(upper).max()
+    return Enclosure(float(middle - radius), float(middle + radius))
+
+
+class StiffnessBounds(LoewnerBounds):
     """Bounds lower ≤ C ≤ upper of a stiffness, as quadratic forms of the mean strain.
 
     The bounds are in Pa and in Voigt order: of the plane, shape (3, 3), with 2 ε12; of space, shape
@@ -39,32 +135,10 @@ class StiffnessBounds:
     compliance, of Reuss's, with Hill's (1952) mean of the two.
     """
 
-    lower: Array
-    upper: Array
-
     @property
     def dimension(self) -> int:
         """2 in the plane, 3 in space."""
         return 2 if len(self.lower) == 3 else 3
-
-    @property
-    def has_lower(self) -> bool:
-        """Whether the lower bound is positive: not where pores percolate."""
-        return bool(self.lower.any())
-
-    @property
-    def has_upper(self) -> bool:
-        """Whether the upper bound is finite: not beside rigid phases."""
-        return bool(np.isfinite(self.upper).all())
-
-    @property
-    def width(self) -> float:
-        """Largest ratio of the upper to the lower energy over all strains, minus one."""
-        if not (self.has_lower and self.has_upper):
-            return float("inf")
-        from scipy.linalg import eigh  # takes time to import
-
-        return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
 
     @property
     def bulk(self) -> Enclosure:
@@ -222,14 +296,6 @@ class StiffnessBounds:
     def _lateral_ratio(self, i: int, j: int) -> Enclosure:
         """Return bounds of −S_ij/S_ii from bounds of S, the inverse of the stiffness.
 
-        With S between A and B in the Loewner order and D = B − A, the inequality of Cauchy and
-        Schwarz gives, for any vectors x and y,
-
-            |x·(S − (A + B)/2) y| ≤ √(x·D x) √(y·D y)/2.
-
-        Here x and y are the unit vectors i and j, so that S_ij lies within √(D_ii D_jj)/2 of the
-        mean of A_ij and B_ij.
-
         Args:
             i: Index of the load in Voigt's order, from 0.
             j: Index of the other component in Voigt's order, from 0.
@@ -244,14 +310,10 @@ class StiffnessBounds:
         if not (self.has_lower and self.has_upper):
             return Enclosure(-np.inf, np.inf)
         low, high = self._compliance
-        slack = 4 * UNIT
-        middle = (low[i, j] + high[i, j]) / 2
-        diagonal = np.maximum(np.diagonal(high - low)[[i, j]], 0)  # D_ii and D_jj
-        radius = np.sqrt(diagonal).prod() / 2 + slack * np.abs(high).max()
         # S_ij and the positive S_ii lie in intervals; their quotient is extreme at the ends.
-        cross_terms = [-middle - radius, -middle + radius]
+        cross_terms = np.negative(entry_bounds(low, high, i, j))
         ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
-        margin = slack * np.abs(ratios).max()
+        margin = 4 * UNIT * np.abs(ratios).max()
         return Enclosure(float(ratios.min() - margin), float(ratios.max() + margin))
 
     def _hill(self, modulus: int) -> Enclosure:
@@ -277,11 +339,6 @@ class StiffnessBounds:
         if self.has_upper:
             high = hill_mean(self.upper, min_compliance, modulus, side=1)
         return Enclosure(low, high)
-
-    def contains(self, stiffness: Array) -> bool:
-        """Return whether a symmetric stiffness of their shape lies between the bounds."""
-        distances = np.stack([stiffness - self.lower, self.upper - stiffness])
-        return bool((np.linalg.eigvalsh(distances)[:, 0] >= 0).all())
 
 
 def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -> float:

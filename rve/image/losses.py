@@ -52,7 +52,11 @@ def concave_constants(bounds: StiffnessBounds, average: str) -> dict[str, Enclos
 
 
 def energy_fractions(
-    model: ImageModel, solution: ImageSolution, images: ModuliImages, phase: Ints, n_phases: int
+    model: ImageModel,
+    solution: ImageSolution[StiffnessBounds],
+    images: ModuliImages,
+    phase: Ints,
+    n_phases: int,
 ) -> dict[str, Array]:
     """Return bounds of the fraction of the strain energy that belongs to each phase, by constant.
 
@@ -98,7 +102,7 @@ def _lower_bounds_with(
     factor: float,
     changed_phase: int,
     model: ImageModel,
-    solution: ImageSolution,
+    solution: ImageSolution[StiffnessBounds],
     images: ModuliImages,
     phase: Ints,
 ) -> dict[str, float]:
@@ -121,7 +125,7 @@ def _lower_bounds_with(
     """
     factors = np.where(phase == changed_phase, factor, 1.0)
     # Only the lower bound is needed, which stresses give: half the work of both sides.
-    stresses = model.solve_side(factors * images.lower, stress=True, start=solution.lower)
+    stresses = model.solve_side(factors * images.lower, dual=True, start=solution.lower)
     assert stresses is not None  # None beside pores that percolate alone
     stiffness = inverse_below(stresses.energy.upper)
     bounds = concave_constants(StiffnessBounds(stiffness, stiffness), model.average)

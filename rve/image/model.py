@@ -1,4 +1,4 @@
-"""The image as the cell: both bounds of its stiffness, and their α-cuts, proved at every level."""
+"""The image as the cell: both bounds of its stiffness or conductivity, proved at every α-level."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Event
-from typing import Any
+from typing import Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
@@ -14,14 +14,23 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
 from alphacut.base.progress_bar import Progress
 from alphacut.base.threads import KernelThreads
-from alphacut.rve.image.bounds import Enclosure, StiffnessBounds, inverse_below
+from alphacut.rve.image.bounds import (
+    ConductivityBounds,
+    Enclosure,
+    LoewnerBounds,
+    StiffnessBounds,
+    inverse_below,
+)
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import element_of
+from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import SideSolution, solve_side
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average
+
+Bounds = TypeVar("Bounds", bound=LoewnerBounds)
+"""Bounds of a stiffness or of a conductivity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,35 +51,44 @@ class ImageCut:
     constants: Array
 
 
+class GridSettings(TypedDict, total=False):
+    """Arguments of a `GridModel` by name."""
+
+    sides: tuple[float, ...]
+    division: int
+    solver: ConjugateGradient
+    device: str
+
+
 @dataclass(frozen=True)
-class ImageModel:
+class GridModel(Generic[Bounds]):
     """Settings of the solution of an image of pixels or voxels that repeats itself.
 
     Args:
         sides: Sides of a pixel along y and x, or of a voxel along z, y and x, over that along x.
         division: Number of elements along each side of a pixel or voxel; see `usual_division`.
         solver: Solver of the fields with its stopping rule.
-        average: Average of the stiffness that E and ν of the plane are of, a name in
-            `moduli.AVERAGES`; in space they are of Hill's isotropic average.
         device: Where the fields are solved for: "cpu", or "cuda" by CuPy.
 
     Raises:
         RefusedError: A setting is not allowed.
     """
 
+    conduction: ClassVar[bool]
+    """Whether the fields are gradients and fluxes; else strains and stresses."""
+    bounds_type: ClassVar[type]
+    """Class of the bounds, whose arguments are the lower and the upper bound."""
     sides: tuple[float, ...] = (1.0, 1.0)
     division: int = 1
     solver: ConjugateGradient = field(default_factory=ConjugateGradient)
-    average: str = ISOTROPIC
     device: str = "cpu"
 
     def __post_init__(self) -> None:
         """Check the settings; RefusedError for one that is not allowed.
 
         Sides are two of a pixel or three of a voxel, each between .001 and 1000 times that along x,
-        the division is a whole number from 1, and the average is "axes" or "isotropic".
+        and the division is a whole number from 1.
         """
-        require_average(self.average)
         allowed = "two of a pixel or three of a voxel"
         require(len(self.sides) in (2, 3), "sides", self.sides, allowed)
         is_whole = isinstance(self.division, int) and self.division >= 1
@@ -85,14 +103,21 @@ class ImageModel:
                 allowed=f"{1 / max_ratio:g} to {max_ratio:g}",
             )
 
-    def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
+    def _element(self, *, dual: bool) -> Element:
+        """Return the element of stresses or fluxes (dual), or of displacements or temperatures."""
+        return element_of(self.sides, dual=dual, conduction=self.conduction)
+
+    def solve(
+        self, images: ModuliImages, start: ImageSolution[Bounds] | None = None
+    ) -> ImageSolution[Bounds]:
         """Return proved bounds of the stiffness of all images with moduli in given intervals.
 
         The stiffness C of a cell is the least energy of displacements, and C⁻¹ that of stresses in
         equilibrium, as quadratic forms of the mean strain and of the mean stress. So any
         displacements bound C from above, and any such stresses bound it from below. Stiffer
         materials make a stiffer cell: displacements are computed with the upper moduli, stresses
-        with the lower ones, each on a thread.
+        with the lower ones, each on a thread. The same holds for the conductivity, of temperatures
+        under a mean gradient, and of fluxes without sources.
 
         Args:
             images: Lower and upper moduli of each pixel or voxel.
@@ -123,15 +148,16 @@ class ImageModel:
                 is_stopped.set()
                 raise
 
-        def solve(stress: bool, guess: SideSolution | None) -> SideSolution | None:
-            """Return stresses for the lower moduli, or displacements for the upper ones."""
-            moduli = images.moduli_of_fields(stress=stress)
+        def solve(dual: bool, guess: SideSolution | None) -> SideSolution | None:
+            """Return dual fields for the lower moduli, or primal ones for the upper ones."""
+            moduli = images.moduli_of_fields(dual=dual)
             if moduli is None:
                 return None
-            return self.solve_side(moduli, stress=stress, start=guess, watch=raise_if_stopped)
+            return self.solve_side(moduli, dual=dual, start=guess, watch=raise_if_stopped)
 
         guesses = (None, None) if start is None else (start.lower, start.upper)
-        elements = [element_of(self.sides, stress=stress) for stress in (True, False)]
+        elements = [self._element(dual=dual) for dual in (True, False)]
+        components = elements[0].part_matrix.shape
         # The sides share nothing but the images: two threads take half the time of one, as NumPy,
         # SciPy and the kernels release the interpreter. A device works on one side at a time.
         workers = 2
@@ -144,39 +170,40 @@ class ImageModel:
                 lower, upper = pool.map(solve, (True, False), guesses)
             finally:  # Ctrl-C and errors are not to wait for the other side
                 is_stopped.set()
-        components = 3 * (dimension - 1)  # of the strain in Voigt's order: 3 or 6
-        lower_bound: Array = np.zeros((components, components))
+        lower_bound: Array = np.zeros(components)
         if lower is not None:
             lower_bound = inverse_below(lower.energy.upper)
-        upper_bound = np.diag(np.full(components, np.inf))
+        upper_bound = np.diag(np.full(len(lower_bound), np.inf))
         if upper is not None:
             upper_bound = upper.energy.upper
-        return ImageSolution(StiffnessBounds(lower_bound, upper_bound), upper, lower)
+        bounds: Bounds = self.bounds_type(lower_bound, upper_bound)
+        return ImageSolution(bounds, upper, lower)
 
     def solve_side(
         self,
         moduli: Array,
         *,
-        stress: bool,
+        dual: bool,
         start: SideSolution | None,
         watch: Callable[[], None] | None = None,
     ) -> SideSolution | None:
-        """Return stresses or displacements of nearly least energy under unit loads.
+        """Return fields of nearly least energy under unit loads.
 
         Args:
             moduli: Bulk modulus (of the plane K + G/3) and shear modulus of each pixel or voxel in
-                Pa, finite, shape (2, y, x) or (2, z, y, x). Pores, with a modulus of 0, are allowed
-                for stresses alone.
-            stress: Whether to solve for stresses, whose energy bounds the compliance from above;
-                else for displacements, whose energy bounds the stiffness from above.
+                Pa, shape (2, y, x) or (2, z, y, x); or its conductivity, shape (1, …). They are
+                finite. Pores, with a modulus of 0, are allowed for dual fields alone.
+            dual: Whether to solve for stresses or fluxes, whose energy bounds the inverse of the
+                stiffness or conductivity from above; else for displacements or temperatures, whose
+                energy bounds it from above.
             start: Solution of the same kind, whose fields are the first guess; None for zero.
             watch: Function called before each iteration in place of `self.solver.watch`; None for
                 this one.
 
         Returns:
-            `fields` under unit mean strains or stresses in Voigt's order, and `energy`, whose
-            `upper` is the bound; None where pores percolate, so that no stress is found that
-            vanishes in them.
+            `fields` under unit mean fields, of strains and stresses in Voigt's order, and `energy`,
+            whose `upper` is the bound; None where pores percolate, so that no stress or flux is
+            found that vanishes in them.
 
         Raises:
             FailedError: The solver does not converge.
@@ -187,21 +214,20 @@ class ImageModel:
         if start is not None:
             first_guess = start.fields
         return solve_side(
-            element_of(self.sides, stress=stress),
-            bulk=to_device(moduli[0]),
-            shear=to_device(moduli[1]),
+            self._element(dual=dual),
+            [to_device(modulus) for modulus in moduli],
             solver=replace(self.solver, watch=watch or self.solver.watch),
             division=self.division,
             start=first_guess,
         )
 
-    def cuts(
+    def bounds_at_levels(
         self,
         images: Sequence[ModuliImages],
-        crisp: tuple[ModuliImages, ImageSolution],
+        crisp: tuple[ModuliImages, ImageSolution[Bounds]],
         progress: Progress | None = None,
-    ) -> list[ImageCut]:
-        """Return nested bounds of stiffness, E, ν and engineering constants at each α-level.
+    ) -> list[Bounds]:
+        """Return proved bounds at each α-level.
 
         Args:
             images: Lower and upper moduli of each pixel or voxel at each level, for rising α, one
@@ -213,10 +239,7 @@ class ImageModel:
                 each.
 
         Returns:
-            One ImageCut a level, in the order of `images`: `bounds` of the stiffness, `modulus` E
-            in Pa and `poisson` ν of the average, each with a lower and an upper end, and
-            `constants` along the axes, shape (constants, 2). All but `bounds` are widened, if need
-            be, to contain the intervals of higher levels.
+            One object a level, in the order of `images`.
 
         Raises:
             FailedError: A solution does not converge, or a bound is singular to rounding.
@@ -235,19 +258,12 @@ class ImageModel:
             bounds.append(solution.bounds)
             if progress is not None:
                 progress(len(bounds) / len(images))
-        # Every image of a cut is one of the wider cuts too; so `_nested` widens each interval to
-        # contain those of higher levels.
-        young = _nested([x.young(self.average) for x in bounds])
-        poisson = _nested([x.poisson(self.average) for x in bounds])
-        constants = _nested([x.constants() for x in bounds])
-        cuts = [
-            ImageCut(x, Enclosure._make(young[k]), Enclosure._make(poisson[k]), constants[k])
-            for k, x in enumerate(bounds)
-        ]
-        return cuts[::-1]
+        return bounds[::-1]
 
-    def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
-        """Refuse cuts that contradict the bounds of an image inside them.
+    def require_consistent(
+        self, images: Sequence[ModuliImages], bounds: Sequence[LoewnerBounds]
+    ) -> None:
+        """Refuse bounds of cuts that contradict those of an image inside them.
 
         This tests the proof itself. Two images with the geometric means of the lower and upper
         moduli of the narrowest and of the widest cut are solved anew, without a first guess and
@@ -255,11 +271,11 @@ class ImageModel:
 
         Args:
             images: Lower and upper moduli at each level, for rising α.
-            cuts: Bounds of E and ν at these levels, in the same order.
+            bounds: Bounds at these levels, in the same order.
 
         Raises:
-            FailedError: The bounds of E or ν of such an image have no number in common with a cut
-                that should contain it; or the solver does not converge.
+            FailedError: No stiffness or conductivity is inside the bounds of such an image and
+                inside those of a cut that contains it; or the solver does not converge.
         """
         solver = replace(self.solver, accuracy=min(10 * self.solver.accuracy, 0.1))
         coarse_model = replace(self, solver=solver)
@@ -267,31 +283,81 @@ class ImageModel:
         widest = images[0].geometric_mean
         # The middle of the widest cut lies in no other cut for sure, so that it tests that one
         # alone.
-        tests = [(narrowest, cuts)]  # it lies in every cut
+        tests = [(narrowest, bounds)]  # it lies in every cut
         if not narrowest.equals(widest):
-            tests.append((widest, cuts[:1]))
-        for image, containing_cuts in tests:
-            bounds = coarse_model.solve(image).bounds
-            young = bounds.young(self.average)
-            poisson = bounds.poisson(self.average)
-            for cut in containing_cuts:
-                _require_overlap("E", young, cut.modulus)
-                _require_overlap("ν", poisson, cut.poisson)
+            tests.append((widest, bounds[:1]))
+        for image, of_containing_cuts in tests:
+            inside = coarse_model.solve(image).bounds
+            for of_cut in of_containing_cuts:
+                if not inside.overlaps(of_cut):
+                    what = "bounds of an image inside a cut contradict those of the cut"
+                    raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
 
-def _nested(intervals: Sequence[Enclosure] | Sequence[Array]) -> Array:
-    """Return intervals that each contain all before, shape (levels, …, 2)."""
-    lower, upper = np.moveaxis(np.array(intervals), -1, 0)
+@dataclass(frozen=True)
+class ConductionModel(GridModel[ConductivityBounds]):
+    """Settings of the solution of conduction in an image of pixels or voxels that repeats itself.
+
+    Its `solve` takes images of one modulus, the conductivity.
+    """
+
+    conduction = True
+    bounds_type = ConductivityBounds
+
+
+@dataclass(frozen=True)
+class ImageModel(GridModel[StiffnessBounds]):
+    """Settings of the solution of the stiffness of an image that repeats itself.
+
+    Args:
+        average: Average of the stiffness that E and ν of the plane are of, a name in
+            `moduli.AVERAGES`; in space they are of Hill's isotropic average.
+
+    Raises:
+        RefusedError: A setting is not allowed.
+    """
+
+    conduction = False
+    bounds_type = StiffnessBounds
+    average: str = ISOTROPIC
+
+    def __post_init__(self) -> None:
+        """RefusedError for a setting that is not allowed; the average is "axes" or "isotropic"."""
+        super().__post_init__()
+        require_average(self.average)
+
+    def cuts(self, bounds: Sequence[StiffnessBounds]) -> list[ImageCut]:
+        """Return nested bounds of E, ν and engineering constants at each α-level.
+
+        Args:
+            bounds: Bounds of the stiffness at each level, for rising α.
+
+        Returns:
+            One ImageCut a level, in the order of `bounds`: `bounds` as given, `modulus` E in Pa and
+            `poisson` ν of the average, each with a lower and an upper end, and `constants` along
+            the axes, shape (constants, 2). All but `bounds` are widened, if need be, to contain the
+            intervals of higher levels.
+
+        Raises:
+            FailedError: A bound is singular to rounding.
+        """
+        young = nested([x.young(self.average) for x in bounds])
+        poisson = nested([x.poisson(self.average) for x in bounds])
+        constants = nested([x.constants() for x in bounds])
+        return [
+            ImageCut(x, Enclosure._make(young[k]), Enclosure._make(poisson[k]), constants[k])
+            for k, x in enumerate(bounds)
+        ]
+
+
+def nested(intervals: Sequence[Enclosure] | Sequence[Array]) -> Array:
+    """Return intervals at rising α that each contain all that follow, shape (levels, …, 2).
+
+    Every image of a cut is one of the wider cuts too, so that this is what is known.
+    """
+    lower, upper = np.moveaxis(np.array(intervals)[::-1], -1, 0)
     ends = np.minimum.accumulate(lower), np.maximum.accumulate(upper)
-    return np.stack(ends, axis=-1)
-
-
-def _require_overlap(name: str, inside: Enclosure, cut: Enclosure) -> None:
-    """Refuse a cut that has no number in common with the bounds of an image inside it."""
-    if inside.lower > cut.upper or cut.lower > inside.upper:
-        what = f"{name} of an image inside a cut is {inside.lower:.9g} … {inside.upper:.9g}"
-        what += f", the cut {cut.lower:.9g} … {cut.upper:.9g}"
-        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
+    return np.stack(ends, axis=-1)[::-1]
 
 
 def usual_division(images: ModuliImages) -> int:
@@ -302,31 +368,79 @@ def usual_division(images: ModuliImages) -> int:
     times as long and narrow the bounds by half.
 
     Args:
-        images: Lower and upper moduli, shape (2, y, x) or (2, z, y, x). With pores or rigid phases
-            the contrast is infinite, and the division 1.
+        images: Lower and upper moduli. With pores or rigid phases the contrast is infinite, and the
+            division 1.
     """
-    pairs = zip(images.lower, images.upper, strict=True)  # of bulk, and of shear moduli
+    pairs = zip(images.lower, images.upper, strict=True)  # of each modulus
     is_mild = all(upper.max() <= 10.0 * lower.min() for lower, upper in pairs)
     is_small = len(images.shape) == 2 and images.lower[0].size <= 1 << 19
     return 2 if is_mild and is_small else 1
 
 
 @dataclass(frozen=True, eq=False)
-class ImageSolution:
-    """Bounds of the stiffness with the fields that prove them.
+class ImageSolution(Generic[Bounds]):
+    """Bounds of the stiffness or conductivity with the fields that prove them.
 
     Args:
         bounds: The bounds.
-        upper: Displacements, which prove the upper bound; None where a phase is rigid.
-        lower: Stresses, which prove the lower bound; None where pores percolate.
+        upper: Displacements or temperatures, which prove the upper bound; None where a phase is
+            rigid or conducts perfectly.
+        lower: Stresses or fluxes, which prove the lower bound; None where pores percolate.
     """
 
-    bounds: StiffnessBounds
+    bounds: Bounds
     upper: SideSolution | None
     lower: SideSolution | None
 
 
-def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
+def solve_conduction(
+    conductivity: Array, **settings: Unpack[GridSettings]
+) -> ImageSolution[ConductivityBounds]:
+    """Return proved bounds of the conductivity of a periodic image of pixels or voxels.
+
+    It is that of heat, of electricity, or of a diffusion.
+
+    Args:
+        conductivity: Conductivity of each pixel, shape (y, x), or voxel, shape (z, y, x), in any
+            one unit; 0 in insulators, infinite in perfect conductors.
+        settings: Arguments of `ConductionModel`: sides (of a pixel or voxel along the axes, over
+            that along x; equal ones by default), division (elements along each side, 1 by default),
+            solver, and device ("cpu" or "cuda").
+
+    Returns:
+        Solution whose `bounds` have the method `components` and the property `mean`, and whose
+        `upper` and `lower` hold the temperatures and fluxes that prove them.
+
+    Raises:
+        RefusedError: The array has another number of axes, or holds negative numbers or NaN, or
+            none but 0 and infinity; or a setting is not allowed.
+        FailedError: The solver does not converge.
+
+    Example:
+        >>> checkerboard = np.kron([[1.0, 4.0], [4.0, 1.0]], np.ones((4, 4)))  # exactly √(1 · 4)
+        >>> [round(end, 2) for end in solve_conduction(checkerboard).bounds.mean]
+        [1.98, 2.02]
+    """
+    shape = np.shape(conductivity)
+    is_grid = len(shape) in (2, 3)
+    require(is_grid, "conductivity", f"of shape {shape}", "an array (y, x) or (z, y, x)")
+    moduli = _checked_moduli("conductivity", [conductivity])
+    settings.setdefault("sides", (1.0,) * len(shape))
+    return ConductionModel(**settings).solve(ModuliImages(moduli, moduli))
+
+
+def _checked_moduli(what: str, moduli: Sequence[Array]) -> Array:
+    """Return arrays of moduli as one array of doubles; RefusedError for what is no modulus."""
+    # Single precision would be a rounding that no bound of errors knows.
+    checked = np.array(moduli, float)
+    for values in checked:
+        require(bool((values >= 0).all()), what, "negative or nan", "numbers from 0")
+        is_solid = bool(((values > 0) & np.isfinite(values)).any())
+        require(is_solid, what, "0 or infinite throughout", "a material with both bounds")
+    return checked
+
+
+def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution[StiffnessBounds]:
     """Return proved bounds of the stiffness of a periodic image of pixels or voxels.
 
     Args:
@@ -356,11 +470,6 @@ def solve_image(bulk: Array, shear: Array, **settings: Any) -> ImageSolution:
     is_grid = shape == np.shape(shear) and len(shape) in (2, 3)
     allowed = "two arrays of one shape (y, x) or (z, y, x)"
     require(is_grid, "moduli", f"of shapes {shape}, {np.shape(shear)}", allowed)
-    # Single precision would be a rounding that no bound of errors knows.
-    moduli = np.array([bulk, shear], float)
-    for values in moduli:
-        require(bool((values >= 0).all()), "moduli", "negative or nan", "numbers from 0")
-        is_solid = bool(((values > 0) & np.isfinite(values)).any())
-        require(is_solid, "moduli", "0 or infinite throughout", "a material with both bounds")
+    moduli = _checked_moduli("moduli", [bulk, shear])
     settings = {"sides": (1.0,) * len(shape), **settings}
     return ImageModel(**settings).solve(ModuliImages(moduli, moduli))

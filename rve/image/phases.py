@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 
 RIGID = 1e18
-"""Young's modulus in Pa from which on a phase is taken as rigid."""
+"""Young's modulus in Pa, or conductivity, from which on a phase is rigid or conducts perfectly."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,11 @@ class ModuliInterval:
     lower: PhaseModuli
     upper: PhaseModuli
 
+    @property
+    def moduli(self) -> Array:
+        """Lower and upper bulk and shear modulus, shape (2, 2)."""
+        return np.array([(end.bulk, end.shear) for end in (self.lower, self.upper)])
+
     @classmethod
     def of_young(
         cls, modulus: tuple[float, float], poisson: tuple[float, float], dimension: int = 2
@@ -108,14 +114,51 @@ class ModuliInterval:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ModuliImages:
-    """Lower and upper moduli of each cell of a grid, in Pa.
+@dataclass(frozen=True)
+class ConductivityInterval:
+    """All materials whose conductivity lies between two numbers of one unit.
 
     Args:
-        lower: Lower bulk and shear modulus, shape (2, *grid); the bulk modulus of pixels is that of
-            plane strain, K + G/3.
-        upper: Upper bulk and shear modulus, of the same shape.
+        lower: The lower one; 0 of an insulator, 1e18 and more of a perfect conductor.
+        upper: The upper one, not below it.
+
+    Raises:
+        RefusedError: A number is neither 0 nor inside (1e-60, 1e60) nor infinite.
+    """
+
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        """RefusedError unless each number is 0, inside (1e-60, 1e60) or infinite."""
+        for value in (self.lower, self.upper):
+            is_allowed = value in (0.0, math.inf) or 1e-60 < value < 1e60
+            what = "conductivity of a phase"
+            require(is_allowed, what, f"{value:g}", "0, or values in (1e-60, 1e+60)")
+
+    @property
+    def moduli(self) -> Array:
+        """Both numbers, infinite from 1e18 on, shape (2, 1)."""
+        ends = np.array([[self.lower], [self.upper]], float)
+        return np.where(ends >= RIGID, math.inf, ends)
+
+
+class PhaseInterval(Protocol):
+    """All materials that a phase may be of."""
+
+    @property
+    def moduli(self) -> Array:
+        """Lower and upper ends of its moduli, shape (2, moduli)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModuliImages:
+    """Lower and upper moduli of each cell of a grid.
+
+    Args:
+        lower: Lower bulk and shear modulus in Pa, shape (2, *grid); the bulk modulus of pixels is
+            that of plane strain, K + G/3. Or the lower conductivity, shape (1, *grid).
+        upper: The upper ones, of the same shape.
     """
 
     lower: Array
@@ -139,7 +182,7 @@ class ModuliImages:
             means = np.where(self.lower > 0, np.sqrt(self.lower * self.upper), 0)
         return ModuliImages(means, means)
 
-    def moduli_of_fields(self, *, stress: bool) -> Array | None:
+    def moduli_of_fields(self, *, dual: bool) -> Array | None:
         """Return the moduli that fields of one side of the bounds are computed with.
 
         Stiffer phases make a stiffer cell. So the lower bound holds with a rigid phase that is too
@@ -147,20 +190,22 @@ class ModuliImages:
         take 1e4 times the largest finite modulus; more would multiply the iterations. For
         displacements pores take 1e-6 of the smallest one; less would add some iterations.
 
+        The same holds for fluxes, temperatures, and phases of infinite conductivity.
+
         Args:
-            stress: True for stresses, which take the lower moduli and prove the lower bound; pores
-                keep the modulus 0. False for displacements, which take the upper moduli and prove
-                the upper bound.
+            dual: True for stresses and fluxes, which take the lower moduli and prove the lower
+                bound; pores keep the modulus 0. False for displacements and temperatures, which
+                take the upper moduli and prove the upper bound.
 
         Returns:
-            Bulk and shear moduli in Pa, shape (2, y, x) or (2, z, y, x). None for displacements
-            beside a rigid phase: there is no upper bound.
+            Moduli of the shape of `lower`. None for displacements beside a rigid phase, or
+            temperatures beside a perfect conductor: there is no upper bound.
 
         Raises:
             RefusedError: No modulus is positive and finite.
         """
-        moduli = self.lower if stress else self.upper
-        if not stress and np.isinf(moduli).any():
+        moduli = self.lower if dual else self.upper
+        if not dual and np.isinf(moduli).any():
             return None
         clipped = np.empty_like(moduli)
         for k in range(len(moduli)):
@@ -169,7 +214,7 @@ class ModuliImages:
             allowed = "some phase that cannot be a pore or rigid"
             require(finite.size > 0, "modulus of the phases", "0 or infinite throughout", allowed)
             clipped[k] = np.minimum(values, 1e4 * finite.max())
-            if not stress:
+            if not dual:
                 clipped[k] = np.maximum(clipped[k], 1e-6 * finite.min())
         return clipped
 
@@ -201,7 +246,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
     return first, last
 
 
-def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> ModuliImages:
+def moduli_images(first: Ints, last: Ints, phases: Sequence[PhaseInterval]) -> ModuliImages:
     """Return the lower and upper moduli of each pixel or voxel over all phases that it may be of.
 
     Args:
@@ -209,19 +254,18 @@ def moduli_images(first: Ints, last: Ints, phases: Sequence[ModuliInterval]) -> 
             x).
         last: Highest number of it, of the same shape and not below `first`. All phases between both
             are possible as well.
-        phases: Smallest and largest bulk and shear modulus of each phase, in the order of the
-            numbers.
+        phases: Smallest and largest moduli of each phase, in the order of the numbers.
 
     Returns:
-        Bulk and shear moduli in Pa: `lower`, the smallest of the possible phases, and `upper`, the
-        largest of them, each of shape (2, y, x) or (2, z, y, x). Bulk and shear modulus of a pixel
-        need not be those of the same phase.
+        Moduli: `lower`, the smallest of the possible phases, and `upper`, the largest of them, each
+        of shape (moduli, y, x) or (moduli, z, y, x). Bulk and shear modulus of a pixel need not be
+        those of the same phase.
     """
-    lower = np.array([(phase.lower.bulk, phase.lower.shear) for phase in phases])
-    upper = np.array([(phase.upper.bulk, phase.upper.shear) for phase in phases])
+    lower = np.array([phase.moduli[0] for phase in phases])
+    upper = np.array([phase.moduli[1] for phase in phases])
     # Few pairs of a first and a last phase exist: their extremes are looked up by pixel. Phases
     # need not be ordered by their moduli.
-    lowest = np.zeros((2, len(phases), len(phases)))  # (bulk or shear modulus, first, last)
+    lowest = np.zeros((lower.shape[1], len(phases), len(phases)))  # (modulus, first, last)
     highest = np.zeros_like(lowest)
     for a, b in combinations_with_replacement(range(len(phases)), 2):
         lowest[:, a, b] = lower[a : b + 1].min(axis=0)

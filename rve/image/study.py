@@ -1,17 +1,20 @@
 """The fuzzy stiffness of an image or a volume: proved bounds on each α-level, by what widens them.
 
+Phases and thresholds of images, and what results of all properties have in common, are here too.
+
 The image is the periodic cell. Each pixel or voxel is of one of the phases that its grey value and
 the thresholds allow; each phase has fuzzy moduli and loss factors.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -37,11 +40,20 @@ from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.files import read_grid
 from alphacut.rve.image.losses import energy_fractions, loss_of_young, mean_loss
 from alphacut.rve.image.memory import needed_memory, require_memory
-from alphacut.rve.image.model import ImageCut, ImageModel, ImageSolution, usual_division
+from alphacut.rve.image.model import (
+    Bounds,
+    GridModel,
+    GridSettings,
+    ImageCut,
+    ImageModel,
+    ImageSolution,
+    usual_division,
+)
 from alphacut.rve.image.phases import (
     RIGID,
     ModuliImages,
     ModuliInterval,
+    PhaseInterval,
     moduli_images,
     require_phases,
     threshold_ranges,
@@ -156,7 +168,7 @@ class ImagePhase:
         numbers = {}
         for name, value in values.items():
             require_choice("key of a phase", name, ("modulus", "poisson", "loss"))
-            numbers[name] = _as_fuzzy(f"{name} of a phase", value)
+            numbers[name] = as_fuzzy(f"{name} of a phase", value)
         for name in ("modulus", "poisson"):
             require(name in numbers, f"{name} of a phase", None, "a number, or a fuzzy number")
         if "loss" in numbers:
@@ -170,14 +182,41 @@ class ImagePhase:
         lower, upper = widest_cut(self.modulus)
         return lower > 0 and upper < RIGID
 
+    def is_solid_at(self, level: float) -> bool:
+        """Return whether the lower end of an α-cut is neither that of a pore nor rigid."""
+        return 0 < self.modulus.cut(level).lower < RIGID
 
-def _as_fuzzy(key: str, value: FuzzyNumber | float) -> FuzzyNumber:
+    def interval(self, level: AlphaLevel, dimension: int) -> PhaseInterval:
+        """Return the moduli at an α-level, or the nominal ones if it is None, in 2 or 3 dimensions.
+
+        RefusedError for moduli that are not allowed.
+        """
+        modulus = cut_or_nominal(self.modulus, level)
+        poisson = cut_or_nominal(self.poisson, level)
+        return ModuliInterval.of_young(modulus, poisson, dimension)
+
+
+class StudyPhase(Protocol):
+    """A phase of an image, with the moduli of the property that is asked for."""
+
+    def is_solid_at(self, level: float) -> bool:
+        """Return whether the lower end of an α-cut is above 0 and below infinity."""
+
+    def interval(self, level: AlphaLevel, dimension: int) -> PhaseInterval:
+        """Return the moduli at an α-level, or the nominal ones if it is None."""
+
+
+Phases = TypeVar("Phases", bound=StudyPhase)
+"""Class of the phases of an image."""
+
+
+def as_fuzzy(key: str, value: FuzzyNumber | float) -> FuzzyNumber:
     """Return a number as a fuzzy number; RefusedError, which names `key`, for what is no number."""
     return value if isinstance(value, FuzzyNumber) else Crisp(checked_number(key, value))
 
 
 @dataclass(frozen=True, eq=False)
-class ImageStudy:
+class ImageStudy(Generic[Phases]):
     """An image ready to be solved.
 
     Args:
@@ -189,7 +228,7 @@ class ImageStudy:
     """
 
     image: GreyImage
-    phases: tuple[ImagePhase, ...]
+    phases: tuple[Phases, ...]
     names: tuple[str, ...]
     phase_ranges: PhaseRanges
     fuzzy_threshold: bool
@@ -225,9 +264,9 @@ class ImageStudy:
                 could be bounded.
         """
         for level in alpha:
-            is_solid = any(0 < phase.modulus.cut(level).lower < RIGID for phase in self.phases)
+            is_solid = any(phase.is_solid_at(level) for phase in self.phases)
             what = f"0 or infinite at α = {level:g} in every phase"
-            allowed = f"a phase whose lower end there is above 0 and below {RIGID:g} Pa"
+            allowed = f"a phase whose lower end there is above 0 and below {RIGID:g}"
             require(is_solid, "modulus of the phases", what, allowed)
 
     def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
@@ -238,38 +277,65 @@ class ImageStudy:
             phases: α-level of the moduli of the phases; None for their nominal values.
 
         Returns:
-            Bulk and shear moduli in Pa, `lower` and `upper` of shape (2, y, x) or (2, z, y, x); in
-            the plane the bulk modulus is that of plane strain, K + G/3.
+            `lower` and `upper`, shape (moduli, y, x) or (moduli, z, y, x): bulk and shear moduli in
+            Pa, in the plane the bulk modulus of plane strain, K + G/3; or conductivities.
 
         Raises:
             RefusedError: A phase has moduli that are not allowed.
         """
-        moduli = []
-        for phase in self.phases:
-            modulus = _cut_or_nominal(phase.modulus, phases)
-            poisson = _cut_or_nominal(phase.poisson, phases)
-            moduli.append(ModuliInterval.of_young(modulus, poisson, self.dimension))
+        moduli = [phase.interval(phases, self.dimension) for phase in self.phases]
         first, last = self.phase_ranges(threshold)
         return moduli_images(first, last, moduli)
 
-    def model(self, *, average: str = ISOTROPIC, device: str = "cpu") -> ImageModel:
-        """Return the model that solves the image with the usual number of elements and accuracy.
+    def settings(self, device: str) -> GridSettings:
+        """Return the arguments of a model with the usual number of elements and accuracy.
 
         Args:
-            average: "isotropic" or "axes": the average over directions that E and ν of the plane
-                are of.
             device: "cpu", or "cuda" by CuPy; whether it is there is found out when the model
                 solves.
 
         Raises:
-            RefusedError: The image does not fit into memory, or the average has another name.
+            RefusedError: The image does not fit into memory.
         """
         nominal = self.images(None, None)
         division = usual_division(nominal)
         require_memory(nominal.shape, division)
         # Bounds are then within 3e-5 of those that fully solved fields would give.
         solver = ConjugateGradient(accuracy=1e-5)
-        return ImageModel(self.image.sides, division, solver, average, device)
+        return {
+            "sides": self.image.sides,
+            "division": division,
+            "solver": solver,
+            "device": device,
+        }
+
+    def bounds_at_levels(
+        self,
+        model: GridModel[Bounds],
+        nominal: ImageSolution[Bounds],
+        alpha: Sequence[float],
+        tick: Progress,
+    ) -> list[Bounds]:
+        """Return proved bounds at each α-level, after a test of the proof itself.
+
+        Args:
+            model: Model of the property whose moduli the phases have.
+            nominal: Its solution at nominal thresholds and moduli, the first guess.
+            alpha: Rising α-levels, one at least.
+            tick: Function that is called with the completed fraction.
+
+        Raises:
+            RefusedError: The moduli are not allowed, or the device is missing.
+            FailedError: The solver does not converge, or the bounds contradict each other.
+        """
+        images = [self.images(level, level) for level in alpha]
+        n_solutions = len(alpha) + 2  # with two tests
+        progress = subprogress(tick, 0.0, len(alpha) / n_solutions)
+        bounds = model.bounds_at_levels(images, (self.images(None, None), nominal), progress)
+        # A test of the proof itself, by solutions that share nothing with those of the cuts.
+        model.require_consistent(images, bounds)
+        tick(1.0)
+        return bounds
 
     @property
     def nominal_phase(self) -> Ints:
@@ -285,18 +351,18 @@ class ImageStudy:
         return dict(zip(self.names, map(float, counts / phase.size), strict=True))
 
 
-def _cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
+def cut_or_nominal(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
     """Return the cut of a number at a level, or its nominal value twice where the level is None."""
     return (number.nominal, number.nominal) if level is None else number.cut(level)
 
 
 def image_study(
     image: GreyImage,
-    phases: Sequence[ImagePhase | Mapping[str, FuzzyNumber | float]],
+    phases: Sequence[Phases],
     *,
     thresholds: Sequence[FuzzyNumber | float] = (),
     labels: Sequence[float] = (),
-) -> ImageStudy:
+) -> ImageStudy[Phases]:
     """Return an image whose phases labels, or thresholds of its grey values, tell apart.
 
     Where the thresholds are plain numbers, noise and uneven light of a picture leave the phase of
@@ -305,7 +371,7 @@ def image_study(
 
     Args:
         image: Grey values or labels, shape (y, x) or (z, y, x).
-        phases: Its phases, dark first; a mapping has modulus (Pa), poisson and, if wanted, loss.
+        phases: Its phases, dark first.
         thresholds: Grey value from which on a pixel is of the next phase, one fewer than phases.
         labels: Value of each phase in a labelled image, in place of thresholds.
 
@@ -314,9 +380,9 @@ def image_study(
         for nominal values, to the lowest and highest phase of each pixel.
 
     Raises:
-        RefusedError: A phase lacks a modulus or has another key, thresholds and labels are both or
-            neither given, one does not fit the image, noise leaves too much of a picture open at
-            the thresholds, or its sides are not positive or too unlike.
+        RefusedError: Thresholds and labels are both or neither given, one does not fit the image or
+            the phases, noise leaves too much of a picture open at the thresholds, or its sides are
+            not positive or too unlike.
     """
     require(min(image.lengths) > 0, "lengths", image.lengths, "positive lengths in m")
     ImageModel(image.sides)  # refuses sides too unlike
@@ -324,12 +390,11 @@ def image_study(
     has_one = bool(labels) != bool(thresholds)
     require(has_one, "cell.threshold", "neither or both", "one of thresholds and labels")
     require(len(phases) == count, "phases", len(phases), f"{count}, one for each")
-    listed = tuple(x if isinstance(x, ImagePhase) else ImagePhase.of(x) for x in phases)
     if labels:
-        return _labelled_study(image, listed, labels)
+        return _labelled_study(image, tuple(phases), labels)
 
     grey = image.values
-    numbers = [_as_fuzzy("threshold", threshold) for threshold in thresholds]
+    numbers = [as_fuzzy("threshold", threshold) for threshold in thresholds]
     require_phases(grey, [number.cut(0.0) for number in numbers])
     is_fuzzy = any(number.support.width > 0 for number in numbers)
     segmentation = None  # the noise of a volume is not judged
@@ -347,18 +412,18 @@ def image_study(
         # A fuzzy threshold says all that is not known, noise and light included.
         if segmentation is not None and level is not None and not is_fuzzy:
             return segmentation.ranges()
-        return threshold_ranges(grey, [_cut_or_nominal(number, level) for number in numbers])
+        return threshold_ranges(grey, [cut_or_nominal(number, level) for number in numbers])
 
     greys = [f"{number.nominal:g}" for number in numbers]
     between = [f"grey {low} … {high}" for low, high in pairwise(greys)]
     names = (f"grey below {greys[0]}", *between, f"grey above {greys[-1]}")
     is_open = segmentation is not None and segmentation.open_fraction > 0
-    return ImageStudy(image, listed, names, phase_ranges, is_fuzzy or is_open)
+    return ImageStudy(image, tuple(phases), names, phase_ranges, is_fuzzy or is_open)
 
 
 def _labelled_study(
-    image: GreyImage, phases: tuple[ImagePhase, ...], labels: Sequence[float]
-) -> ImageStudy:
+    image: GreyImage, phases: tuple[Phases, ...], labels: Sequence[float]
+) -> ImageStudy[Phases]:
     """Return the study of an image whose values are labels of its phases.
 
     Args:
@@ -387,21 +452,14 @@ def _labelled_study(
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class FuzzyImageStiffness:
-    """Proved bounds of the stiffness of an image or volume, repeated periodically, on α-levels.
+class FuzzyImage(ABC):
+    """Proved bounds of a property of an image or volume, repeated periodically, on α-levels.
 
-    Moduli are in Pa. Bounds that pores or rigid phases leave unknown are 0 or infinite.
+    Bounds that pores, rigid or perfectly conducting phases leave unknown are 0 or infinite.
 
     Args:
         alpha: Levels, shape (A,).
-        cuts: Bounds at each of them.
-        average: Average that E and ν of the plane are of; of a volume it is Hill's.
-        widths: Width of E at the lowest level by its cause, in Pa, the largest first; empty where
-            E has one bound alone.
         fractions: Fraction of each phase by its name.
-        proved_losses: Loss factors at nominal moduli, to first order, by the name of the constant,
-            shape (A, 2) each; empty where phases have none.
-        references: Classical bounds of isotropic composites; None beside pores or rigid phases.
         division: Elements along each side of a pixel or voxel.
         seconds: Wall time.
         phase: Phase of each pixel or voxel at the nominal threshold.
@@ -410,17 +468,113 @@ class FuzzyImageStiffness:
     """
 
     alpha: Array
-    cuts: Sequence[ImageCut]
-    average: str
-    widths: Mapping[str, float]
     fractions: Mapping[str, float]
-    proved_losses: Mapping[str, Array]
-    references: ReferenceBounds | None
     division: int
     seconds: float
     phase: Ints
     is_open: Mask
     lengths: tuple[float, ...]
+
+    @property
+    @abstractmethod
+    def named_bounds(self) -> dict[str, Array]:
+        """Bounds of each constant by its name, the mean over directions first, shape (A, 2)."""
+
+    @abstractmethod
+    def _variables(self) -> dict[str, Any]:
+        """Return further variables of the dataset, with the names of their axes and their unit."""
+
+    def __str__(self) -> str:
+        """Return a text of some lines without a newline at the end.
+
+        The first line has the guarantee and the wall time; then follow the bounds of each constant
+        on the first and the last α-level, in SI and rounded outwards, and the fractions of the
+        phases.
+        """
+        kind = "image" if len(self.lengths) == 2 else "volume"
+        lines = [f"bounds {GUARANTEE} of the {kind}, repeated periodically; {self.seconds:.2g} s"]
+        for name, bounds in self.named_bounds.items():
+            texts = [f"α = {self.alpha[row]:g}: {_range_text(bounds[row])}" for row in (0, -1)]
+            lines.append(f"{name}: {'; '.join(texts)}")
+        fractions = (f"{name} {fraction:.1%}" for name, fraction in self.fractions.items())
+        lines.append(f"phases: {', '.join(fractions)}")
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def to_csv(self, path: str) -> None:
+        """Write a CSV file with a row for each constant and each α-level.
+
+        The columns are constant, alpha, lower, upper (bounds in Pa, of Poisson's ratios without a
+        unit, of conductivities in that of the phases) and guarantee.
+
+        Args:
+            path: Name of the file, which is replaced; an OSError if it cannot be written.
+        """
+        rows = []
+        for name, bounds in self.named_bounds.items():
+            for row, alpha in enumerate(self.alpha):
+                lower = float(bounds[row, 0])
+                upper = float(bounds[row, 1])
+                rows.append((name, f"{alpha:g}", f"{lower!r}", f"{upper!r}", str(GUARANTEE)))
+        text = csv_text(("constant", "alpha", *SIDES, "guarantee"), rows)
+        Path(path).write_text(text, encoding="utf-8")
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return a dataset of the bounds on each α-level, in SI, and of each pixel's phase.
+
+        Returns:
+            Dataset with a variable for each constant, of shape (alpha, bound), where bound is
+            "lower" or "upper" ("E", those along the axes, "loss_E" and so on where phases have loss
+            factors; or those of the conductivity); the bounds of the tensor, "stiffness" in Voigt's
+            order or "conductivity", shape (alpha, bound, row, column); and, on the axes (y, x) or
+            (z, y, x), "phase", the number of the phase at the nominal threshold, and "is_open", 1
+            where the threshold leaves it open on the lowest level. Attributes are "nature" (the
+            guarantee), "lengths" (sides of a pixel in m along its axes) and "phases" (their names).
+
+        Raises:
+            MissingLibraryError: xarray is not installed.
+        """
+        with extra_named():
+            import xarray
+
+        grid = ("z", "y", "x")[-self.phase.ndim :]
+        variables: dict[str, Any] = {
+            **{name: (("alpha", "bound"), bounds) for name, bounds in self.named_bounds.items()},
+            **self._variables(),
+            "phase": (grid, self.phase.astype(np.float32)),
+            "is_open": (grid, self.is_open.astype(np.uint8)),
+        }
+        axes = {"alpha": self.alpha, "bound": list(SIDES)}
+        attributes = {
+            "nature": str(GUARANTEE),
+            "lengths": self.lengths,
+            "phases": list(self.fractions),
+        }
+        return xarray.Dataset(variables, axes, attributes)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FuzzyImageStiffness(FuzzyImage):
+    """Proved bounds of the stiffness of an image or volume, repeated periodically, on α-levels.
+
+    Moduli are in Pa.
+
+    Args:
+        cuts: Bounds at each level.
+        average: Average that E and ν of the plane are of; of a volume it is Hill's.
+        widths: Width of E at the lowest level by its cause, in Pa, the largest first; empty where
+            E has one bound alone.
+        proved_losses: Loss factors at nominal moduli, to first order, by the name of the constant,
+            shape (A, 2) each; empty where phases have none.
+        references: Classical bounds of isotropic composites; None beside pores or rigid phases.
+    """
+
+    cuts: Sequence[ImageCut]
+    average: str
+    widths: Mapping[str, float]
+    proved_losses: Mapping[str, Array]
+    references: ReferenceBounds | None
 
     @property
     def modulus(self) -> FuzzyNumber:
@@ -451,79 +605,26 @@ class FuzzyImageStiffness:
             names = ("E_x", "E_y", "E_z", "nu_yz", "nu_xz", "nu_xy", "G_yz", "G_xz", "G_xy")
         return dict(zip(names, values, strict=True))
 
-    def __str__(self) -> str:
-        """Return a text of some lines without a newline at the end.
+    @property
+    def named_bounds(self) -> dict[str, Array]:
+        """Bounds of E and of the constants along the axes by name, shape (A, 2) each."""
+        return {"E": self.young, **self.constants}
 
-        The first line has the guarantee and the wall time; then follow the bounds of E and of each
-        constant along the axes on the first and the last α-level, in SI and rounded outwards, and
-        the fractions of the phases.
-        """
-        kind = "image" if len(self.lengths) == 2 else "volume"
-        lines = [f"bounds {GUARANTEE} of the {kind}, repeated periodically; {self.seconds:.2g} s"]
-        for name, bounds in {"E": self.young, **self.constants}.items():
-            texts = [f"α = {self.alpha[row]:g}: {_range_text(bounds[row])}" for row in (0, -1)]
-            lines.append(f"{name}: {'; '.join(texts)}")
-        fractions = (f"{name} {fraction:.1%}" for name, fraction in self.fractions.items())
-        lines.append(f"phases: {', '.join(fractions)}")
-        return "\n".join(lines)
-
-    __repr__ = __str__
-
-    def to_csv(self, path: str) -> None:
-        """Write a CSV file with a row for each constant and each α-level, E first.
-
-        The columns are constant, alpha, lower, upper (bounds in Pa, of Poisson's ratios without a
-        unit) and guarantee.
-
-        Args:
-            path: Name of the file, which is replaced; an OSError if it cannot be written.
-        """
-        rows = []
-        for name, bounds in {"E": self.young, **self.constants}.items():
-            for row, alpha in enumerate(self.alpha):
-                lower = float(bounds[row, 0])
-                upper = float(bounds[row, 1])
-                rows.append((name, f"{alpha:g}", f"{lower!r}", f"{upper!r}", str(GUARANTEE)))
-        text = csv_text(("constant", "alpha", *SIDES, "guarantee"), rows)
-        Path(path).write_text(text, encoding="utf-8")
-
-    def to_dataset(self) -> xarray.Dataset:
-        """Return a dataset of the bounds on each α-level, in SI, and of each pixel's phase.
-
-        Returns:
-            Dataset with the variables "E", one for each constant along the axes, "loss_E" and so on
-            where phases have loss factors, all of shape (alpha, bound), where bound is "lower" or
-            "upper"; "stiffness", shape (alpha, bound, row, column) in Voigt's order; and, on the
-            axes (y, x) or (z, y, x), "phase", the number of the phase at the nominal threshold, and
-            "is_open", 1 where the threshold leaves it open on the lowest level. Attributes are
-            "nature" (the guarantee), "lengths" (sides of a pixel in m along its axes) and "phases"
-            (their names).
-
-        Raises:
-            MissingLibraryError: xarray is not installed.
-        """
-        with extra_named():
-            import xarray
-
+    def _variables(self) -> dict[str, Any]:
+        """Return the stiffness and the loss factors as variables of the dataset."""
         stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in self.cuts])
-        grid = ("z", "y", "x")[-self.phase.ndim :]
+        voigt = (
+            ["11", "22", "33", "23", "13", "12"] if len(self.lengths) == 3 else ["11", "22", "12"]
+        )
         cut = ("alpha", "bound")
-        variables: dict[str, Any] = {
+        losses = {f"loss_{name}": (cut, bounds) for name, bounds in self.proved_losses.items()}
+        return {
             "E": (cut, self.young, {"units": "Pa"}),
             "stiffness": ((*cut, "row", "column"), stiffness, {"units": "Pa"}),
-            **{name: (cut, bounds) for name, bounds in self.constants.items()},
-            **{f"loss_{name}": (cut, bounds) for name, bounds in self.proved_losses.items()},
-            "phase": (grid, self.phase.astype(np.float32)),
-            "is_open": (grid, self.is_open.astype(np.uint8)),
+            "row": ("row", voigt),
+            "column": ("column", voigt),
+            **losses,
         }
-        voigt = ["11", "22", "33", "23", "13", "12"] if len(grid) == 3 else ["11", "22", "12"]
-        axes = {"alpha": self.alpha, "bound": list(SIDES), "row": voigt, "column": voigt}
-        attributes = {
-            "nature": str(GUARANTEE),
-            "lengths": self.lengths,
-            "phases": list(self.fractions),
-        }
-        return xarray.Dataset(variables, axes, attributes)
 
 
 def _range_text(ends: Array) -> str:
@@ -571,7 +672,8 @@ def fuzzy_image_stiffness(
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
-    study = image_study(image, phases, thresholds=thresholds, labels=labels)
+    listed = [ImagePhase.of(phase) for phase in phases]
+    study = image_study(image, listed, thresholds=thresholds, labels=labels)
     with progress_reporter(progress) as tick:
         return solve_study(
             study, alpha=alpha, average=average, device=device, tick=tick or (lambda done: None)
@@ -579,7 +681,12 @@ def fuzzy_image_stiffness(
 
 
 def solve_study(
-    study: ImageStudy, *, alpha: Sequence[float], average: str, device: str, tick: Progress
+    study: ImageStudy[ImagePhase],
+    *,
+    alpha: Sequence[float],
+    average: str,
+    device: str,
+    tick: Progress,
 ) -> FuzzyImageStiffness:
     """Return proved bounds of the stiffness of an image on α-levels, and what widens them.
 
@@ -606,21 +713,16 @@ def solve_study(
     """
     start = perf_counter()
     alpha = checked_levels(alpha)
+    model = ImageModel(**study.settings(device), average=average)
     study.require_solid(alpha)
-    model = study.model(average=average, device=device)
-    nominal = study.images(None, None)  # at nominal thresholds and moduli
-    solution = model.solve(nominal)
+    solution = model.solve(study.images(None, None))  # at nominal thresholds and moduli
     _require_losses(study.phases, solution.bounds)
     # Progress is counted by solutions, which take about the same time.
     n_solutions = len(alpha) + 5  # with the nominal one, two tests, and the widths by two causes
     tick(1 / n_solutions)
-    images = [study.images(level, level) for level in alpha]
-    progress_of_cuts = subprogress(tick, 1 / n_solutions, (len(alpha) + 1) / n_solutions)
-    cuts = model.cuts(images, (nominal, solution), progress_of_cuts)
-    # A test of the proof itself, by solutions that share nothing with those of the cuts.
-    model.require_consistent(images, cuts)
+    progress = subprogress(tick, 1 / n_solutions, (len(alpha) + 3) / n_solutions)
+    cuts = model.cuts(study.bounds_at_levels(model, solution, alpha, progress))
     _require_positive(cuts[0])
-    tick((len(alpha) + 3) / n_solutions)
 
     widths = dict[str, float]()
     references = None
@@ -647,7 +749,11 @@ def solve_study(
 
 
 def _widths_by_cause(
-    study: ImageStudy, model: ImageModel, solution: ImageSolution, *, lowest: float
+    study: ImageStudy[ImagePhase],
+    model: ImageModel,
+    solution: ImageSolution[StiffnessBounds],
+    *,
+    lowest: float,
 ) -> dict[str, float]:
     """Return the width of the bounds of E by its cause, in Pa, the largest first.
 
@@ -671,7 +777,8 @@ def _widths_by_cause(
     def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
         """Return the width of E in Pa at α-levels of threshold and phases; None is nominal."""
         nominal = study.images(None, None)
-        (cut,) = model.cuts([study.images(threshold, phases)], (nominal, solution))
+        images = [study.images(threshold, phases)]
+        (cut,) = model.cuts(model.bounds_at_levels(images, (nominal, solution)))
         return float(cut.modulus.upper - cut.modulus.lower)
 
     # Causes are varied one at a time: their widths need not add up to that of the cut.
@@ -705,7 +812,10 @@ def _require_losses(phases: Sequence[ImagePhase], bounds: StiffnessBounds) -> No
 
 
 def _proved_losses(
-    study: ImageStudy, model: ImageModel, solution: ImageSolution, alpha: Sequence[float]
+    study: ImageStudy[ImagePhase],
+    model: ImageModel,
+    solution: ImageSolution[StiffnessBounds],
+    alpha: Sequence[float],
 ) -> dict[str, Array]:
     """Return bounds of the loss factors of an image at nominal moduli, to first order.
 
@@ -736,7 +846,7 @@ def _proved_losses(
     return {"E": loss_of_young(solution.bounds, proved, model.average), **proved}
 
 
-def _reference_bounds(study: ImageStudy) -> ReferenceBounds:
+def _reference_bounds(study: ImageStudy[ImagePhase]) -> ReferenceBounds:
     """Return the classical bounds of an isotropic composite of the nominal phases."""
     phases = [Phase(phase.modulus.nominal, phase.poisson.nominal) for phase in study.phases]
     fractions = list(study.fractions.values())

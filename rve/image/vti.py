@@ -16,7 +16,8 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import SideSolution, modes_of
 from alphacut.rve.image.fields.grid import on_host
-from alphacut.rve.image.study import GreyImage, image_study
+from alphacut.rve.image.model import ImageModel
+from alphacut.rve.image.study import GreyImage, ImagePhase, image_study
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +92,15 @@ def image_fields(
             thresholds, or the image does not fit into memory.
         FailedError: The solver does not converge.
     """
-    study = image_study(image, phases, thresholds=thresholds, labels=labels)
-    model = study.model()
+    listed = [ImagePhase.of(phase) for phase in phases]
+    study = image_study(image, listed, thresholds=thresholds, labels=labels)
+    model = ImageModel(**study.settings("cpu"))
     solution = model.solve(study.images(None, None))  # at nominal thresholds and moduli
     return ImageFields(
         lengths=image.lengths,
         phase=study.nominal_phase,
-        strain=_pixel_means(element_of(image.sides, stress=False), solution.upper, model.division),
-        stress=_pixel_means(element_of(image.sides, stress=True), solution.lower, model.division),
+        strain=_pixel_means(element_of(image.sides, dual=False), solution.upper, model.division),
+        stress=_pixel_means(element_of(image.sides, dual=True), solution.lower, model.division),
     )
 
 

@@ -1,4 +1,6 @@
-"""Finite elements on a pixel or voxel, from unknowns to orthonormal strain or stress modes.
+"""Finite elements on a pixel or voxel, from unknowns to orthonormal modes of their fields.
+
+Fields are strains, stresses in equilibrium, gradients of a temperature, or fluxes without sources.
 
 Displacements are products of linear splines in each component. Stresses are derivatives of
 potentials in products of quadratic B-splines, whose slopes are continuous, so that equilibrium
@@ -14,6 +16,12 @@ A field is expanded in products of Legendre polynomials that are orthonormal on 
 mean energy is a sum of squares without quadrature error: k Σ (modes of the trace)² + G Σ (modes of
 the deviator)², where the deviator's are those of 11 − 22, (11 + 22 − 2·33)/√3 and twice the shear
 components, and k is K (in the plane K + G/3); with 1/(n² k), 1/(4 G) for stresses in n dimensions.
+
+Of conduction, temperatures are the same splines as displacements. Fluxes are the curl of a
+potential, so that none arises or vanishes: q_x = ∂y ψ, q_y = −∂x ψ in the plane, with a continuous
+ψ of the splines of temperatures. In space q = curl A, where A_i is constant along i in each voxel
+and linear along the other axes (Nédélec 1980): the flux through a face is continuous, and along a
+face it may jump. The mean energy is k Σ (modes of the gradient)², with 1/k for fluxes.
 """
 
 from __future__ import annotations
@@ -62,14 +70,17 @@ class Basis:
     places: tuple[Place, ...] = (Place(),)
 
 
-def _basis(dimension: int, *, stress: bool) -> Basis:
+def _basis(dimension: int, *, dual: bool, conduction: bool) -> Basis:
     """Return the functions of one coordinate whose products over the axes an element consists of.
 
-    Stresses are second derivatives of potentials, so that potentials have continuous slopes.
+    Stresses are second derivatives of potentials, so that potentials have continuous slopes. Of
+    fluxes in the plane the potential is continuous, but its slope need not be.
 
     Args:
         dimension: 2 for pixels, 3 for voxels.
-        stress: Whether the unknowns are potentials of stresses; else they are displacements.
+        dual: Whether the unknowns are potentials of stresses or of fluxes; else they are
+            displacements or a temperature.
+        conduction: Whether they are a temperature or potentials of fluxes.
 
     Returns:
         `functions`, each by its coefficients of 1, x, x², … on [0, 1]; `owners`, for each function
@@ -77,11 +88,11 @@ def _basis(dimension: int, *, stress: bool) -> Basis:
         and `places`, the coordinate of each unknown in its cell, from 0 to 1, and whether it is
         odd, as a slope is. In space a cell has one unknown, by default at 0 and not odd.
     """
-    if dimension == 3 and not stress:  # values at both ends
+    if dimension == 3 and (conduction or not dual):  # values at both ends
         return Basis(((1, -1), (0, 1)), ((0, 0), (0, 1)))
     if dimension == 3:  # quadratic B-splines, which sum to 2
         return Basis(((1, -2, 1), (1, 2, -2), (0, 0, 1)), ((0, 0), (0, 1), (0, 2)))
-    if not stress:  # values at 0, 1/2 and 1
+    if conduction or not dual:  # values at 0, 1/2 and 1
         return Basis(
             functions=((1, -3, 2), (0, 4, -4), (0, -1, 2)),
             owners=((0, 0), (1, 0), (0, 1)),
@@ -95,6 +106,10 @@ def _basis(dimension: int, *, stress: bool) -> Basis:
     )
 
 
+EDGE = 2
+"""Order in a term of fluxes of voxels that stands for the constant function of a cell.
+
+It takes the place of the second derivative of linear functions, which is zero."""
 SHEARS = {2: ((0, 1),), 3: ((1, 2), (0, 2), (0, 1))}
 """Indices of the shear components in Voigt's order, by the dimension: 12, or 23, 13, 12."""
 
@@ -116,7 +131,9 @@ class SplineProducts(NamedTuple):
 
     Attributes:
         tables: Matrices from functions to Legendre modes of their derivatives, shape (axes, orders
-            of the derivative, modes, functions).
+            of the derivative, modes, functions). Of order `EDGE`, of fluxes of voxels, is the
+            constant function of a cell.
+        mode_counts: Number of modes that are not zero, the lowest ones, by the order.
         terms: Rows (Voigt component, number of the unknown function, order of its derivative along
             each axis of the grid), sorted by the unknown function and the last order.
         groups: First row, and one past the last row, of the terms that are alike in both, shape
@@ -125,6 +142,7 @@ class SplineProducts(NamedTuple):
     """
 
     tables: Array
+    mode_counts: Ints
     terms: Ints
     groups: Ints
     factors: Array
@@ -132,7 +150,10 @@ class SplineProducts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """Unknowns of a pixel or voxel, and the strain or stress modes that they cause.
+    """Unknowns of a pixel or voxel, and the modes that they cause of their field.
+
+    The field is a strain or stress in Voigt's components, with modes of its trace and of the parts
+    of its deviator; or a gradient or flux with its components, which are not divided into parts.
 
     The axes of a grid are (y, x) or (z, y, x). Lengths are in widths of a cell along x.
 
@@ -143,13 +164,14 @@ class Element:
         modes: Matrix from local unknowns to modes, shape (modes, local unknowns).
         magnitude: Sums of the absolute terms of each entry of `modes`, by which rounding is
             bounded.
-        bulk_rows: Number of modes that belong to the trace; they come first.
+        bulk_rows: Number of modes that belong to the trace; they come first. 0 of conduction.
         of_voigt: Modes of uniform fields in Voigt order, shape (modes, components).
         places: Coordinates of each unknown in its cell along the axes, in widths of the cell along
             each, shape (unknowns, axes).
         is_odd: Whether each unknown changes its sign when space is mirrored at a point, shape
             (unknowns,).
-        stress: Whether the modes are those of a stress, else those of a strain.
+        dual: Whether the modes are those of a stress or a flux; else of a strain or a gradient.
+        conduction: Whether they are those of a gradient or a flux.
         products: The same element as products over the axes.
     """
 
@@ -162,7 +184,8 @@ class Element:
     of_voigt: Array
     places: Array
     is_odd: Array
-    stress: bool
+    dual: bool
+    conduction: bool
     products: SplineProducts
 
     @property
@@ -176,9 +199,19 @@ class Element:
         return max(max(local.offset) for local in self.local)
 
     @property
-    def parts(self) -> tuple[slice, slice]:
-        """Rows of the modes of the trace, and rows of the modes of the deviator."""
+    def parts(self) -> tuple[slice, ...]:
+        """Rows of the modes that have one coefficient of the energy.
+
+        They are those of the trace and those of the deviator, or all of a gradient or flux.
+        """
+        if self.conduction:
+            return (slice(None),)
         return slice(0, self.bulk_rows), slice(self.bulk_rows, None)
+
+    @property
+    def part_matrix(self) -> Array:
+        """Matrix from the components of a field to those of its parts, shape (n, n)."""
+        return field_parts(self.dimension, dual=self.dual, conduction=self.conduction)
 
     @property
     def trace_in_deviator(self) -> float:
@@ -190,12 +223,13 @@ class Element:
         = 2 σ:σ − 2 tr²/n.
         """
         n = self.dimension
-        return 2 / (n * (n - 1)) if self.stress else 2 * (1 - 1 / n)
+        return 2 / (n * (n - 1)) if self.dual else 2 * (1 - 1 / n)
 
     def mean_modes(self, loads: Array) -> Array:
         """Return the modes of uniform fields, shape (modes, loads).
 
-        `loads` are strains or stresses in Voigt order, shape (loads, components).
+        `loads` are components of the fields, in Voigt's order of strains and stresses, shape
+        (loads, components).
         """
         return np.asarray(self.of_voigt @ np.asarray(loads).T)
 
@@ -228,28 +262,44 @@ def isotropic_parts(dimension: int, *, stress: bool) -> Array:
     return parts
 
 
-@cache
-def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
-    """Return the finite element of stresses or of displacements of a pixel or voxel.
+def field_parts(dimension: int, *, dual: bool, conduction: bool) -> Array:
+    """Return the matrix from the components of a field to its parts; see `isotropic_parts`.
 
-    The stress is made of second derivatives of potentials, so that it is in equilibrium exactly.
-    The result is kept: equal arguments give the same object.
+    A gradient or a flux has its components as they are.
+    """
+    if conduction:
+        return np.eye(dimension)
+    return isotropic_parts(dimension, stress=dual)
+
+
+@cache
+def element_of(sides: tuple[float, ...], *, dual: bool, conduction: bool = False) -> Element:
+    """Return the finite element of one of four kinds of fields of a pixel or voxel.
+
+    Stresses and fluxes are made of derivatives of potentials, so that they are in equilibrium
+    exactly. The result is kept: equal arguments give the same object.
 
     Args:
         sides: Sides of a pixel along y and x, or of a voxel along z, y and x, over that along x;
             another number is a KeyError.
-        stress: Whether the unknowns are potentials of stresses; else they are displacements.
+        dual: Whether the unknowns are potentials of stresses or of fluxes; else they are
+            displacements or a temperature.
+        conduction: Whether they are a temperature or potentials of fluxes.
 
     Returns:
         The unknowns that act on a cell, with the matrix from them to modes: coefficients of the
-        trace and of the parts of the deviator of the strain or stress in products of Legendre
-        polynomials that are orthonormal on the cell, constant first.
+        trace and of the parts of the deviator of the strain or stress, or of the components of the
+        gradient or flux, in products of Legendre polynomials that are orthonormal on the cell,
+        constant first.
     """
     n = len(sides)
-    basis = _basis(n, stress=stress)
-    derivatives = stress_derivatives(n) if stress else strain_derivatives(n)
+    basis = _basis(n, dual=dual, conduction=conduction)
+    derivatives = field_derivatives(n, dual=dual, conduction=conduction)
     names = unknown_functions(derivatives)
     tables = np.array([_derivative_modes(basis.functions, side) for side in sides])
+    has_edges = n == 3 and dual and conduction
+    if has_edges:
+        tables[:, EDGE, 0, 0] = 1
     spline_products = _spline_products(tables, derivatives, names)
 
     # Functions and modes are products over the axes, so that matrices to the modes of each Voigt
@@ -265,7 +315,7 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     by_unknown = components.reshape(len(derivatives), len(functions), -1)
 
     # Kernels number all modes of space; in the plane those that are always zero are left out.
-    parts = isotropic_parts(n, stress=stress)
+    parts = field_parts(n, dual=dual, conduction=conduction)
     modes = np.tensordot(parts, by_unknown, axes=1)  # (part, mode, local unknown)
     magnitude = np.tensordot(abs(parts), abs(by_unknown), axes=1)
     is_kept = (magnitude.max(axis=-1) > 0) | (n == 3)
@@ -276,6 +326,9 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
     numbers = list(product(range(len(basis.places)), repeat=n))
     coordinates = np.array([place.coordinate for place in basis.places])[np.array(numbers)]
     signs = np.array([place.is_odd for place in basis.places])[np.array(numbers)].sum(axis=1)
+    places = np.tile(coordinates, (len(names), 1))
+    if has_edges:  # A_x, A_y and A_z lie in the middle of edges along x, y and z
+        places += np.eye(3)[::-1] / 2
     local = []
     for name, function in product(range(len(names)), functions):
         owners = [basis.owners[f] for f in function]
@@ -288,11 +341,12 @@ def element_of(sides: tuple[float, ...], *, stress: bool) -> Element:
         local=tuple(local),
         modes=np.ascontiguousarray(modes[is_kept]),
         magnitude=magnitude[is_kept],
-        bulk_rows=int(is_kept[0].sum()),
+        bulk_rows=0 if conduction else int(is_kept[0].sum()),
         of_voigt=of_voigt[is_kept],
-        places=np.tile(coordinates, (len(names), 1)),
+        places=places,
         is_odd=np.tile(signs % 2 == 1, len(names)),
-        stress=stress,
+        dual=dual,
+        conduction=conduction,
         products=spline_products,
     )
 
@@ -311,7 +365,8 @@ def _spline_products(
             their unknowns are numbered. Each term's function is among them.
 
     Returns:
-        `tables` as given; `terms`, rows of (Voigt component, number of the unknown function, order
+        `tables` as given, with `mode_counts`, the number of modes that are not zero, by order;
+        `terms`, rows of (Voigt component, number of the unknown function, order
         of the derivative along each axis of the grid, x last); `groups`, ranges [first, last) of
         rows with the same function and order along x, shape (groups, 2); and `factors`, one for
         each row.
@@ -329,17 +384,19 @@ def _spline_products(
     starts_group = np.diff(terms[:, [1, -1]], axis=0).any(axis=1)
     ends = np.concatenate([[0], 1 + np.flatnonzero(starts_group), [len(rows)]])
     groups = np.stack([ends[:-1], ends[1:]], axis=1)
-    return SplineProducts(tables, terms, groups, table[:, -1].astype(float))
+    mode_counts = tables.any(axis=(0, 3)).sum(axis=1)
+    return SplineProducts(tables, mode_counts, terms, groups, table[:, -1].astype(float))
 
 
 class Derivative(NamedTuple):
-    """A term of a strain or stress component.
+    """A term of a component of a field.
 
     Attributes:
         factor: Factor of the derivative.
-        function: Indices of the function: (i, 0) of the displacement u_i, (m, n) with m ≤ n of the
-            potential Φ_mn, from 0.
-        orders: Orders of the derivative along x, y and, in space, z.
+        function: Indices of the function: (i, 0) of the displacement u_i, of the temperature or of
+            the potential A_i of fluxes; (m, n) with m ≤ n of the potential Φ_mn of stresses, from
+            0.
+        orders: Orders of the derivative along x, y and, in space, z; or `EDGE`.
     """
 
     factor: int
@@ -348,13 +405,44 @@ class Derivative(NamedTuple):
 
 
 Derivatives = list[list[Derivative]]
-"""Terms of each Voigt component."""
+"""Terms of each component."""
 
 
 def unknown_functions(derivatives: Derivatives) -> list[tuple[int, int]]:
-    """Return the indices of the functions that occur in strains or stresses, sorted."""
+    """Return the indices of the functions that occur in the components of a field, sorted."""
     # the order of the unknowns of a cell, which all of `fields` relies on
     return sorted({term.function for terms in derivatives for term in terms})
+
+
+def field_derivatives(dimension: int, *, dual: bool, conduction: bool) -> Derivatives:
+    """Return the terms of each component of one of the four kinds of fields."""
+    if conduction:
+        return flux_derivatives(dimension) if dual else gradient_derivatives(dimension)
+    return stress_derivatives(dimension) if dual else strain_derivatives(dimension)
+
+
+def gradient_derivatives(dimension: int) -> Derivatives:
+    """Return the terms of the gradient ∂i T of a temperature."""
+    return [[_derivative(1, (0, 0), [i], dimension)] for i in range(dimension)]
+
+
+def flux_derivatives(dimension: int) -> Derivatives:
+    """Return the terms of q = curl A; in the plane A is along z and depends on x and y.
+
+    In space A_k is constant along k in each voxel, which the order `EDGE` of a term says.
+    """
+    if dimension == 2:
+        return [[_derivative(1, (2, 0), [1], 2)], [_derivative(-1, (2, 0), [0], 2)]]
+    by_component = []
+    for i in range(3):
+        j = (i + 1) % 3
+        k = (i + 2) % 3
+        terms = [  # ∂j A_k − ∂k A_j
+            _derivative(1, (k, 0), [j, *[k] * EDGE]),
+            _derivative(-1, (j, 0), [k, *[j] * EDGE]),
+        ]
+        by_component.append(terms)
+    return by_component
 
 
 def strain_derivatives(dimension: int) -> Derivatives:

@@ -8,15 +8,16 @@ the sums of their products.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
-from alphacut.rve.image.fields.element import Element, isotropic_parts
+from alphacut.rve.image.fields.element import Element, field_parts
 from alphacut.rve.image.fields.grid import (
     SLAB_CELLS,
     Fields,
@@ -35,18 +36,17 @@ UNIT = 2.0**-53
 SAFETY = 1.01
 """Factor for the rounding of an error bound itself and for terms of second order."""
 COEFFICIENT = 8
-"""Rounding units by which a coefficient of trace or deviator may be off."""
+"""Rounding units by which a coefficient of the energy may be off."""
 
 
 @dataclass(frozen=True, eq=False)
 class Energies:
-    """Mean products of the modes of pairs of fields, by trace and deviator.
+    """Mean products of the modes of pairs of fields, by parts: trace and deviator, or all.
 
     Args:
-        value: Computed products by the trace and by the deviator, symmetric, shape (2, fields,
-            fields).
+        value: Computed products of each part, symmetric, shape (parts, fields, fields).
         mode_errors: Bounds of the roots of the mean squares of the errors of modes, weighted as the
-            products are, shape (2, fields).
+            products are, shape (parts, fields).
         summed: Bound of the relative rounding of products and sums.
     """
 
@@ -56,9 +56,9 @@ class Energies:
 
     @property
     def rounding(self) -> Array:
-        """Bound of the absolute error of each energy product, shape (2, fields, fields).
+        """Bound of the absolute error of each energy product, of the shape of `value`.
 
-        The first axis is trace and deviator, as in `value`. With errors δa, δb of the modes a, b
+        With errors δa, δb of the modes a, b
         the product a b is off by |a| δb + |b| δa + δa δb at most. By Cauchy and Schwarz the mean of
         each summand is at most a product of two root mean squares: of modes (`size`), or of their
         errors (`mode_errors`). Rounding of products and sums adds `summed` times the mean of |a b|,
@@ -75,7 +75,7 @@ class Energies:
         """A matrix above the matrix of the true total energies, shape (fields, fields).
 
         Above means in the Loewner order: the difference is positive semidefinite. The total energy
-        of each pair of fields is the sum of the products by trace and by deviator.
+        of each pair of fields is the sum of the products of the parts.
         """
         value = self.value.sum(axis=0)
         error_of_sum = 2 * (len(self.value) + 2) * UNIT * np.abs(self.value).sum(axis=0)
@@ -87,7 +87,7 @@ class Energies:
 
 
 def _outer(first: Array, second: Array) -> Array:
-    """Return the products of all pairs, shape (2, fields, fields), of two arrays (2, fields)."""
+    """Return the products of all pairs of fields of two arrays (parts, fields), by part."""
     return np.asarray(first[:, :, np.newaxis] * second[:, np.newaxis])
 
 
@@ -95,37 +95,36 @@ def energies(
     element: Element,
     fields: Fields,
     mean_modes: Array,
-    coefficients: tuple[Fields, Fields],
+    coefficients: Sequence[Fields],
     field_errors: Fields | None = None,
 ) -> Energies:
     """Return mean energy products of all pairs of fields, with bounds of their rounding errors.
 
     The product of two fields is the mean over the grid of coefficient · mode · mode, summed over
-    the modes of the trace, and over those of the deviator. Modes are coefficients in polynomials
-    that are orthonormal on a cell, so that their products are energies.
+    the modes of each of the element's parts. Modes are coefficients in polynomials that are
+    orthonormal on a cell, so that their products are energies.
 
     Args:
-        element: Element of displacements, with modes of the strain, or of stresses.
+        element: Element of the fields.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        coefficients: Coefficients of the squares of trace and of deviator in each cell, of the
-            shape of the grid, not negative, each with a relative error of up to 8 rounding units of
-            2⁻⁵³.
+        coefficients: Coefficients of the squares of each part in each cell, of the shape of the
+            grid, not negative, each with a relative error of up to 8 rounding units of 2⁻⁵³.
         field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
             exact fields.
 
     Returns:
-        Energies with `value`, the products of the traces and those of the deviators, shape (2,
-        fields, fields), symmetric; `mode_errors`, for trace and deviator of each field a bound of
-        the root of the mean over cells of Σ coefficient · error² over modes, shape (2, fields); and
-        `summed`, a bound of the relative rounding of products and sums.
+        Energies with `value`, the products of each part, shape (parts, fields, fields), symmetric;
+        `mode_errors`, for each part of each field a bound of the root of the mean over cells of
+        Σ coefficient · error² over modes, shape (parts, fields); and `summed`, a bound of the
+        relative rounding of products and sums.
     """
     xp = namespace(fields)
     count = fields.shape[0]
     cells = math.prod(fields.shape[2:])
-    value = np.zeros((2, count, count))
-    squared_errors = np.zeros((2, count))
+    value = np.zeros((len(element.parts), count, count))
+    squared_errors = np.zeros((len(element.parts), count))
     additions = 0
     max_cells = 0
     for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
@@ -169,13 +168,13 @@ class SlabModes(NamedTuple):
 def modes_of(
     element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
 ) -> Iterator[SlabModes]:
-    """Yield the strain or stress modes of fields plus uniform fields, by groups of cells.
+    """Yield the modes of fields plus uniform fields, by groups of cells.
 
-    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
-    Legendre polynomials that are orthonormal on a cell.
+    Modes are coefficients of the element's parts in products of Legendre polynomials that are
+    orthonormal on a cell.
 
     Args:
-        element: Element of displacements, with modes of the strain, or of stresses.
+        element: Element of the fields.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
@@ -197,12 +196,12 @@ def modes_by_matrices(
 ) -> Iterator[SlabModes]:
     """Yield the modes of fields plus uniform fields by the element's matrix, in slabs of the grid.
 
-    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
-    Legendre polynomials that are orthonormal on a cell. This is the reference of the compiled
-    kernels for voxels, and takes arrays of NumPy or CuPy.
+    Modes are coefficients of the element's parts in products of Legendre polynomials that are
+    orthonormal on a cell. This is the reference of the compiled kernels for voxels, and takes
+    arrays of NumPy or CuPy.
 
     Args:
-        element: Element of displacements, with modes of the strain, or of stresses.
+        element: Element of the fields.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
@@ -237,11 +236,11 @@ def _modes_by_rows(
 ) -> Iterator[SlabModes]:
     """Yield the modes of fields of voxels plus uniform fields, by compiled kernels.
 
-    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
-    Legendre polynomials that are orthonormal on a cell.
+    Modes are coefficients of the element's parts in products of Legendre polynomials that are
+    orthonormal on a cell.
 
     Args:
-        element: Element of displacements of voxels, with modes of the strain, or of stresses.
+        element: Element of voxels.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a voxel, z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
         field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
@@ -279,20 +278,27 @@ def _modes_by_rows(
             yield SlabModes((z, rows), modes, amplification, local)
 
 
-def solved_loads(dimension: int) -> Array:
-    """Return loads near the eigenvectors of an isotropic stiffness, a row each, in Voigt order.
+def solved_loads(element: Element) -> Array:
+    """Return mean fields near the eigenvectors of an isotropic material, a row each.
 
-    With them soft loads are not drowned in stiff ones where ν is near 1/2 or −1.
+    They are strains or stresses in Voigt order, or gradients or fluxes. With them soft loads are
+    not drowned in stiff ones where ν is near 1/2 or −1.
     """
-    parts = isotropic_parts(dimension, stress=False)
+    parts = field_parts(element.dimension, dual=False, conduction=element.conduction)
     return np.asarray(parts / np.abs(parts).max(axis=1, keepdims=True))
 
 
-def coefficients_of(element: Element, bulk: Fields, shear: Fields) -> tuple[Fields, Fields]:
-    """Return the coefficients of trace and deviator: of strains, or of stresses in n dimensions."""
-    if element.stress:
-        return 1 / element.dimension**2 / bulk, 0.25 / shear
-    return bulk, shear
+def coefficients_of(element: Element, moduli: Sequence[Fields]) -> list[Fields]:
+    """Return the coefficients of the energy of each of the element's parts.
+
+    Args:
+        element: Element of the fields.
+        moduli: Bulk and shear modulus (for trace and deviator), or the conductivity.
+    """
+    if not element.dual:
+        return list(moduli)
+    factors = [1.0] if element.conduction else [1 / element.dimension**2, 0.25]
+    return [factor / modulus for factor, modulus in zip(factors, moduli, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,8 +306,10 @@ class SideSolution:
     """Solution of one side of the bounds.
 
     Args:
-        fields: Fields for unit loads in Voigt order, shape (loads, unknowns, *grid).
-        energy: Their energies, whose `upper` bounds the stiffness or the compliance from above.
+        fields: Fields for unit loads, of strains and stresses in Voigt order, shape (loads,
+            unknowns, *grid).
+        energy: Their energies, whose `upper` bounds the stiffness or conductivity, or its inverse,
+            from above.
     """
 
     fields: Fields
@@ -310,8 +318,7 @@ class SideSolution:
 
 def solve_side(
     element: Element,
-    bulk: Fields,
-    shear: Fields,
+    moduli: Sequence[Fields],
     *,
     solver: ConjugateGradient,
     division: int = 1,
@@ -319,15 +326,15 @@ def solve_side(
 ) -> SideSolution | None:
     """Return fields of nearly least energy under unit loads: one side of the bounds.
 
-    Fields of displacements bound the stiffness from above. Fields of stresses in equilibrium bound
-    its inverse from above; they vanish exactly in pores, by potentials that are prescribed there.
+    Fields of displacements bound the stiffness from above, those of temperatures the conductivity.
+    Fields of stresses in equilibrium, or of fluxes without sources, bound the inverse from above;
+    they vanish exactly in pores, by potentials that are prescribed there.
 
     Args:
-        element: Element of displacements or of stresses.
-        bulk: Bulk modulus of each cell (in the plane K + G/3), in any unit, shape (y, x) or (z, y,
-            x).
-        shear: Shear modulus, of the same shape and unit. A cell where either modulus is 0 is a
-            pore, which is allowed for stresses alone. All are finite.
+        element: Element of the fields.
+        moduli: Bulk modulus of each cell (in the plane K + G/3) and shear modulus; or the
+            conductivity alone. They are in any unit, of shape (y, x) or (z, y, x), and finite. A
+            cell where one is 0 is a pore, which is allowed for stresses and fluxes alone.
         solver: Solver with its stopping rule.
         division: Number of elements along each side of a cell: the same image, a larger space of
             fields.
@@ -336,42 +343,41 @@ def solve_side(
     Returns:
         `fields`, shape (loads, unknowns of a cell, *grid), the grid being finer by `division`, with
         the unit loads in Voigt's order; and `energy`, that of all pairs of these fields. None for
-        stresses where a pore meets its own periodic image.
+        stresses and fluxes where a pore meets its own periodic image.
 
     Raises:
         FailedError: The solver does not converge.
     """
-    xp = namespace(bulk)
+    xp = namespace(moduli[0])
     for axis in range(element.dimension):
-        bulk = xp.repeat(bulk, division, axis=axis)
-        shear = xp.repeat(shear, division, axis=axis)
-    is_pore = (bulk == 0) | (shear == 0)
+        moduli = [xp.repeat(modulus, division, axis=axis) for modulus in moduli]
+    is_pore = reduce(xp.logical_or, [modulus == 0 for modulus in moduli])
     potentials = None
-    if element.stress and bool(is_pore.any()):
-        nodes = PoreNodes.of_mask(on_host(is_pore).astype(bool), element.reach)
+    if element.dual and bool(is_pore.any()):
+        mask = on_host(is_pore).astype(bool)
+        nodes = PoreNodes.of_mask(mask, element.reach)
         if nodes is None:
             return None
-        potentials = PorePotentials.of_nodes(element, nodes)
+        potentials = PorePotentials.of_nodes(element, nodes, mask)
         # Pores have no stress, so that their moduli do not matter while fields are solved for. The
         # largest moduli of the other cells keep the spectrum narrow.
-        bulk, shear = (xp.where(is_pore, x.max(), x) for x in (bulk, shear))
-    trace, deviator = coefficients_of(element, bulk, shear)
-    fields = _least_energy_fields(element, trace, deviator, solver, potentials, start)
+        moduli = [xp.where(is_pore, modulus.max(), modulus) for modulus in moduli]
+    coefficients = coefficients_of(element, moduli)
+    fields = _least_energy_fields(element, coefficients, solver, potentials, start)
     field_errors = None
     if potentials is not None:
         # `impose` sets the potentials at pores, and bounds their distance from exact ones. The
         # exact ones have no stress in pores, whose energy is zero therefore.
         field_errors = potentials.impose(fields)
-        trace, deviator = (xp.where(is_pore, 0.0, x) for x in (trace, deviator))
+        coefficients = [xp.where(is_pore, 0.0, coefficient) for coefficient in coefficients]
     unit_modes = element.mean_modes(np.eye(len(fields)))
-    energy = energies(element, fields, unit_modes, (trace, deviator), field_errors)
+    energy = energies(element, fields, unit_modes, coefficients, field_errors)
     return SideSolution(fields, energy)
 
 
 def _least_energy_fields(
     element: Element,
-    trace: Fields,
-    deviator: Fields,
+    coefficients: Sequence[Fields],
     solver: ConjugateGradient,
     potentials: PorePotentials | None,
     start: Fields | None,
@@ -382,30 +388,29 @@ def _least_energy_fields(
     are combined to the fields of the unit loads afterwards.
 
     Args:
-        element: Element of displacements or of stresses.
-        trace: Coefficient of the square of the trace in each cell, positive, shape (y, x) or (z, y,
-            x).
-        deviator: Coefficient of the square of the deviator in each cell, positive, of the same
-            shape.
+        element: Element of the fields.
+        coefficients: Coefficient of the square of each of the element's parts in each cell,
+            positive, shape (y, x) or (z, y, x).
         solver: Solver with its stopping rule.
-        potentials: Space of the potentials whose stress vanishes in pores; None without pores.
+        potentials: Space of the potentials whose field vanishes in pores; None without pores.
         start: First guess, in the shape of the result; None for zero.
 
     Returns:
         Unknowns of the periodic fluctuations, shape (loads, unknowns of a cell, *grid), for a unit
-        mean strain or stress in each component in Voigt's order.
+        mean field in each component, of strains and stresses in Voigt's order.
 
     Raises:
         FailedError: The solver does not converge.
     """
-    xp = namespace(trace)
-    loads = solved_loads(element.dimension)
+    shape = coefficients[0].shape
+    xp = namespace(coefficients[0])
+    loads = solved_loads(element)
     modes = element.mean_modes(loads)
-    constant = Reference.of_grid(element, trace, deviator)
-    preconditioner = FourierPreconditioner.of_material(element, constant, trace.shape, xp)
-    operator = Operator(element, trace, deviator)
-    scale = minimum_energy(element, trace, deviator, modes)
-    fields = xp.empty((len(loads), element.unknowns, *trace.shape))
+    constant = Reference.of_grid(element, coefficients)
+    preconditioner = FourierPreconditioner.of_material(element, constant, shape, xp)
+    operator = Operator(element, coefficients)
+    scale = minimum_energy(element, coefficients, modes)
+    fields = xp.empty((len(loads), element.unknowns, *shape))
     for k in range(len(loads)):  # one after another: solved together they take more memory
         this = slice(k, k + 1)
         system = System(
@@ -413,7 +418,7 @@ def _least_energy_fields(
             preconditioner=preconditioner.apply,
             load=operator.load(modes[:, this]),
             scale=float(scale[k]),
-            min_energy_ratio=constant.min_energy_ratio(trace, deviator),
+            min_energy_ratio=constant.min_energy_ratio(coefficients),
         )
         if start is not None:
             guess = xp.tensordot(xp.asarray(loads[this]), start, axes=1)
@@ -432,7 +437,7 @@ def _least_energy_fields(
 def _solve_beside_pores(
     solver: ConjugateGradient, system: System, potentials: PorePotentials, load: Array
 ) -> Fields:
-    """Return the field of a system whose stress under a mean stress vanishes in pores.
+    """Return the field of a system whose stress or flux under a mean one vanishes in pores.
 
     Such fields are an affine space: a particular field plus differences. With Q the orthogonal
     projection on the differences, A the operator and M its preconditioner, the system for a
@@ -443,8 +448,8 @@ def _solve_beside_pores(
         solver: Solver with its stopping rule.
         system: The system without pores, for potentials of shape (1, unknowns of a cell, *grid);
             its `start` may be None.
-        potentials: Space of the potentials whose total stress vanishes in the pores.
-        load: Mean stress in Voigt's order, shape (1, components).
+        potentials: Space of the potentials whose total stress or flux vanishes in the pores.
+        load: Mean stress in Voigt's order or mean flux, shape (1, components).
 
     Returns:
         New array in the shape of `system.load`.
@@ -466,22 +471,22 @@ def _solve_beside_pores(
     return particular + solver.solve(projected)
 
 
-def minimum_energy(element: Element, trace: Fields, deviator: Fields, modes: Array) -> Array:
+def minimum_energy(element: Element, coefficients: Sequence[Fields], modes: Array) -> Array:
     """Return a lower bound of the energy of any fields with given mean modes, shape (loads,).
 
     The energy is the sum over cells and modes of a coefficient times the squared mode. Modes are
-    coefficients of the trace, and then of the parts of the deviator, in products of Legendre
-    polynomials that are orthonormal on a cell. By the inequality of Cauchy and Schwarz the sum of
-    c m² over N cells is at least N times the harmonic mean of c times the squared mean of m.
+    coefficients of the element's parts in products of Legendre polynomials that are orthonormal on
+    a cell. By the inequality of Cauchy and Schwarz the sum of c m² over N cells is at least N times
+    the harmonic mean of c times the squared mean of m.
 
     Args:
-        element: Element, which tells the modes of the trace from those of the deviator.
-        trace: Coefficient c of the squared modes m of the trace, positive, of the grid's shape.
-        deviator: Coefficient of the squared modes of the deviator, positive, of the same shape.
+        element: Element, which tells the modes of each part.
+        coefficients: Coefficient c of the squared modes m of each part, positive, of the grid's
+            shape.
         modes: Mean modes of each load, shape (modes, loads).
     """
     total = np.zeros(modes.shape[1])
-    for rows, coefficient in zip(element.parts, (trace, deviator), strict=True):
+    for rows, coefficient in zip(element.parts, coefficients, strict=True):
         least = float(coefficient.size / (1 / coefficient).mean())  # N times the harmonic mean
         total += least * np.sum(modes[rows] ** 2, axis=0)
     return total

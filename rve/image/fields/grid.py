@@ -1,4 +1,4 @@
-"""The stiffness operator of a periodic grid of pixels or voxels, in arrays of any library.
+"""The operator of a periodic grid of pixels or voxels, in arrays of any library.
 
 Fields have the shape (fields, unknowns, *grid), coefficients that of the grid. The work is done in
 slabs along the first axis of the grid, which bound the memory. Arrays may be NumPy's or, on a
@@ -76,45 +76,45 @@ def device_array(device: str) -> Callable[[Array], Fields]:
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """Stiffness matrix of a grid: element matrices times coefficients of trace and deviator.
+    """Matrix of a grid: element matrices of each part of the modes times the part's coefficient.
 
-    Both coefficients are positive and have the shape of the grid.
+    There is one coefficient for each of `element.parts`: of trace and deviator, or of a gradient or
+    flux. All are positive and have the shape of the grid.
     """
 
     element: Element
-    trace: Fields
-    deviator: Fields
+    coefficients: Sequence[Fields]
 
     def apply(self, fields: Fields) -> Fields:
         """Return the nodal forces of fields, both of shape (fields, unknowns, *grid)."""
         if isinstance(fields, np.ndarray) and self.element.dimension == 3:
             no_modes = np.zeros((len(self.element.modes), len(fields)))
-            return apply_by_rows(self.element, self.trace, self.deviator, fields, no_modes)
+            return apply_by_rows(self.element, self.coefficients, fields, no_modes)
         return self.apply_by_matrices(fields)
 
     def apply_by_matrices(self, fields: Fields) -> Fields:
         """Return the nodal forces of fields by the element's matrices.
 
         This is the reference of the compiled kernels for voxels, and takes arrays of NumPy or CuPy.
-        The forces are the derivatives of half the energy trace·tr² + deviator·2 dev:dev.
+        The forces are the derivatives of half the energy, the sum over the parts of coefficient
+        times squared modes.
 
         Args:
             fields: Unknowns, shape (fields, unknowns of a cell, *grid), where the grid has the
-                shape of the coefficients `self.trace` and `self.deviator`.
+                shape of the coefficients.
 
         Returns:
             New array in the shape of `fields`.
         """
         xp = namespace(fields)
         result = xp.zeros_like(fields)
-        trace_modes, deviator_modes = (self.element.modes[rows] for rows in self.element.parts)
-        matrix = np.hstack([trace_modes.T @ trace_modes, deviator_modes.T @ deviator_modes])
-        matrix = xp.asarray(matrix)
+        modes = [self.element.modes[rows] for rows in self.element.parts]
+        matrix = xp.asarray(np.hstack([of_part.T @ of_part for of_part in modes]))
         for slab in slabs(fields):
             local = gather(self.element, fields, slab)
             # (trace Tᵀ T + deviator Dᵀ D) times the local unknowns of each cell, with the rows T
-            # and D of the element's matrix to modes
-            weighted = xp.stack([self.trace[slab] * local, self.deviator[slab] * local])
+            # and D of the element's matrix to modes; likewise of one part
+            weighted = xp.stack([coefficient[slab] * local for coefficient in self.coefficients])
             forces = matrix @ xp.reshape(weighted, (matrix.shape[1], -1))
             scatter(self.element, xp.reshape(forces, local.shape), result, slab)
         return result
@@ -124,27 +124,27 @@ class Operator:
 
         Args:
             mean_modes: Modes of the uniform fields, shape (modes, fields): coefficients of the
-                trace, and then of the parts of the deviator, in polynomials that are orthonormal on
-                a cell.
+                element's parts in polynomials that are orthonormal on a cell.
 
         Returns:
             New array of shape (fields, unknowns of a cell, *grid), in the library of the
             coefficients.
         """
-        xp = namespace(self.trace)
+        grid = self.coefficients[0]
+        xp = namespace(grid)
         count = mean_modes.shape[1]
-        result = xp.zeros((count, self.element.unknowns, *self.trace.shape))
+        result = xp.zeros((count, self.element.unknowns, *grid.shape))
         if xp is np and self.element.dimension == 3:
-            return apply_by_rows(self.element, self.trace, self.deviator, result, -mean_modes)
+            return apply_by_rows(self.element, self.coefficients, result, -mean_modes)
         ones = (1,) * self.element.dimension
         # Forces on the local unknowns of a cell with a coefficient of 1, alike for all cells.
         unit_forces = []
         for rows in self.element.parts:
             force = xp.asarray(-(self.element.modes[rows].T @ mean_modes[rows]))
             unit_forces.append(xp.reshape(force, (-1, count, *ones)))
-        trace_force, deviator_force = unit_forces
         for slab in slabs(result):
-            forces = trace_force * self.trace[slab] + deviator_force * self.deviator[slab]
+            pairs = zip(unit_forces, self.coefficients, strict=True)
+            forces = sum(force * coefficient[slab] for force, coefficient in pairs)
             scatter(self.element, forces, result, slab)
         return result
 

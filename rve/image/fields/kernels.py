@@ -5,20 +5,21 @@ become Legendre modes along x, then z, in strips that are kept until the last ro
 then y; the transposed passes lead back. `grid.Operator` and `energy.modes_of` multiply the same out
 by matrices, for arrays of any library, and are what this is tested against.
 
-The first arguments of the kernels are the members of `element.SplineProducts`. A term is a Voigt
-component, an unknown and the orders of its derivative along z, y, x. Modes have the shape
-(component, mode along z, mode along y, modes along x of a row).
+The first arguments of the kernels are the members of `element.SplineProducts`. A term is a
+component of the field (Voigt's six of strains and stresses, three of gradients and fluxes), an
+unknown and the orders of its derivative along z, y, x. Modes have the shape (component, mode along
+z, mode along y, modes along x of a row).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.kernels import kernel
-from alphacut.rve.image.fields.element import Element, isotropic_parts
+from alphacut.rve.image.fields.element import Element
 
 ROUNDINGS = 32
 """Rounding units by which a mode may be off, relative to the sum of the magnitudes of its terms.
@@ -31,44 +32,46 @@ fast = kernel(fastmath={"contract", "nsz"})  # fused products round less; the or
 
 
 def apply_by_rows(
-    element: Element, trace: Array, deviator: Array, fields: Array, mean_modes: Array
+    element: Element, coefficients: Sequence[Array], fields: Array, mean_modes: Array
 ) -> Array:
     """Return the nodal forces of fields of voxels plus uniform fields, by compiled kernels.
 
-    Forces are the derivatives by the unknowns of half the energy trace·tr² + deviator·2 dev:dev.
+    Forces are the derivatives by the unknowns of half the energy trace·tr² + deviator·2 dev:dev, or
+    of half the coefficient times the squared gradient or flux.
 
     Args:
-        element: Element of displacements or of stresses of a voxel.
-        trace: Coefficient of the squared trace in each voxel, shape (z, y, x).
-        deviator: Coefficient of the squared deviator, of the same shape.
+        element: Element of a voxel.
+        coefficients: Coefficients of the squares of trace and deviator in each voxel, or the one of
+            a gradient or flux, shape (z, y, x) each.
         fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields): coefficients
-            of the trace, and then of the parts of the deviator, in polynomials that are orthonormal
-            on a voxel.
+            of the element's parts in polynomials that are orthonormal on a voxel.
 
     Returns:
         New array in the shape of `fields`.
     """
     result = np.zeros_like(fields)
-    parts = isotropic_parts(3, stress=element.stress)
-    # Kernels work in Voigt components: the constant modes of the uniform fields are turned back.
+    parts = element.part_matrix
+    # Kernels work in components: the constant modes of the uniform fields are turned back.
     uniform = np.linalg.solve(parts, mean_modes[element.of_voigt.any(axis=1)])
-    tables, terms, groups, factors = element.products
-    # `_apply` writes the forces of one field. Entry [3, 3] of `parts` is the factor of a shear.
+    tables, counts, terms, groups, factors = element.products
+    # The last entry of `parts` is the factor of a shear. Of conduction both coefficients are the
+    # same array, of which the kernel uses one.
+    shear_factor = parts[-1, -1] ** 2
     for number, field in enumerate(fields):
-        _apply(tables, terms, groups, factors, parts[3, 3] ** 2, uniform[:, number].copy(),
-               trace, deviator, field, result[number])  # fmt: skip
+        _apply(tables, counts, terms, groups, factors, shear_factor, uniform[:, number].copy(),
+               coefficients[0], coefficients[-1], field, result[number])  # fmt: skip
     return result
 
 
 def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int) -> Array:
-    """Return the strain or stress modes of fields in some rows of a layer of voxels.
+    """Return the modes of fields in some rows of a layer of voxels.
 
-    Modes are coefficients of the trace, and then of the parts of the deviator, in products of
-    Legendre polynomials that are orthonormal on a voxel.
+    Modes are coefficients of the element's parts in products of Legendre polynomials that are
+    orthonormal on a voxel.
 
     Args:
-        element: Element of displacements or of stresses of a voxel.
+        element: Element of a voxel.
         fields: Unknowns of periodic fields, shape (fields, unknowns of a voxel, z, y, x).
         z: Index of the layer.
         first: First row along y.
@@ -79,10 +82,10 @@ def modes_by_rows(element: Element, fields: Array, z: int, first: int, last: int
         rounding units of the sum of the magnitudes of its terms.
     """
     components = np.zeros((len(element.modes), len(fields), (last - first) * fields.shape[-1]))
-    tables, terms, groups, factors = element.products
-    _fill_modes(tables, terms, groups, factors, fields, z, first, last, components)
-    parts = isotropic_parts(3, stress=element.stress)
-    return np.asarray(parts @ components.reshape(6, -1)).reshape(components.shape)
+    tables, counts, terms, groups, factors = element.products
+    _fill_modes(tables, counts, terms, groups, factors, fields, z, first, last, components)
+    parts = element.part_matrix
+    return np.asarray(parts @ components.reshape(len(parts), -1)).reshape(components.shape)
 
 
 def call_kernels(elements: Iterable[Element]) -> None:
@@ -93,85 +96,73 @@ def call_kernels(elements: Iterable[Element]) -> None:
     Args:
         elements: Elements of voxels whose kernels are called.
     """
-    coefficient = np.ones((1, 1, 1))
+    coefficient = [np.ones((1, 1, 1))]
     for element in elements:
         fields = np.zeros((1, element.unknowns, 1, 1, 1))
         mean_modes = np.zeros((len(element.modes), 1))
-        apply_by_rows(element, coefficient, coefficient, fields, mean_modes)
+        apply_by_rows(element, coefficient, fields, mean_modes)
         modes_by_rows(element, fields, z=0, first=0, last=1)
 
 
 @fast
 def _apply(
-    tables: Array, terms: Ints, groups: Ints, factors: Array, shear_factor: float, uniform: Array,
-    trace: Array, deviator: Array, field: Array, result: Array,
+    tables: Array, counts: Ints, terms: Ints, groups: Ints, factors: Array, shear_factor: float,
+    uniform: Array, trace: Array, deviator: Array, field: Array, result: Array,
 ) -> None:  # fmt: skip
     """Add the nodal forces of one field on voxels to `result` in place.
 
     The energy of the modes of a voxel is trace·tr² + deviator·2 dev:dev. Half its derivative by a
     normal component is mean + 2 deviator · component, with mean = (trace − 2/3 deviator)·tr; by a
-    shear component it is shear_factor · deviator · component. The modes are found axis by axis,
-    multiplied by these, and passed back to the unknowns by the transposed products.
+    shear component it is shear_factor · deviator · component. By a component of a gradient or flux
+    it is deviator · component. The modes are found axis by axis, multiplied by these, and passed
+    back to the unknowns by the transposed products.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
             functions).
-        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
-            orders of its derivative along z, y, x).
+        counts: Number of modes that are not zero, by the order of the derivative.
+        terms: A row for each term of the field: (component, number of the unknown, orders of its
+            derivative along z, y, x).
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
         shear_factor: Factor of shear components: 1 for strains, 4 for stresses.
-        uniform: Voigt components of a uniform field to add, shape (6,).
+        uniform: Components of a uniform field to add: Voigt's six of a strain or stress, or three
+            of a gradient or flux.
         trace: Coefficient of the squared trace in each voxel, shape (z, y, x).
         deviator: Coefficient of the squared deviator, of the same shape.
         field: Unknowns of the field, shape (unknowns of a voxel, z, y, x).
         result: Nodal forces of the same shape; changed.
     """
     n = tables.shape[-1]
+    n_components = len(uniform)
     nz, ny, nx = trace.shape
     strips = np.zeros((len(terms), n, n, n * nx))  # (term, mode along z, y % n, modes along x)
     sums = np.zeros((len(terms), n, n, n * nx))  # (term, y % n, mode along z, modes along x)
-    modes = np.zeros((6, n, n, n * nx))
+    modes = np.zeros((n_components, n, n, n * nx))
     lines = np.zeros((n, n * nx))
     shifted = np.empty((n, n, nx))
     for z in range(nz):
         # A row of voxels takes the strips of n rows of unknowns, from y to y + n − 1. They are kept
         # in a ring of n, so that each further row of voxels computes one.
         for y in range(n - 1):
-            _fill_strips(tables, terms, groups, factors, field, z, y, shifted, lines, strips)
+            _fill_strips(
+                tables, counts, terms, groups, factors, field, z, y, shifted, lines, strips
+            )
         for y in range(ny):
             _fill_strips(
-                tables, terms, groups, factors, field, z, y + n - 1, shifted, lines, strips
+                tables, counts, terms, groups, factors, field, z, y + n - 1, shifted, lines, strips
             )
-            _modes_of_row(tables, terms, strips, y, modes)
+            _modes_of_row(tables, counts, terms, strips, y, modes)
             # a uniform field has the constant mode alone
-            for c in range(6):
+            for c in range(n_components):
                 modes[c, 0, 0, :nx] += uniform[c]
-            # from modes of the strain to those of its conjugate, in place
-            of_trace = trace[z, y]
-            of_deviator = deviator[z, y]
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        row = slice(k * nx, (k + 1) * nx)
-                        xx = modes[0, i, j, row]
-                        yy = modes[1, i, j, row]
-                        zz = modes[2, i, j, row]
-                        yz = modes[3, i, j, row]
-                        xz = modes[4, i, j, row]
-                        xy = modes[5, i, j, row]
-                        for x in range(nx):
-                            twice = 2.0 * of_deviator[x]
-                            mean = (of_trace[x] - twice / 3.0) * (xx[x] + yy[x] + zz[x])
-                            xx[x] = twice * xx[x] + mean
-                            yy[x] = twice * yy[x] + mean
-                            zz[x] = twice * zz[x] + mean
-                            shear = shear_factor * of_deviator[x]
-                            yz[x] *= shear
-                            xz[x] *= shear
-                            xy[x] *= shear
+            # from modes of the strain or gradient to those of its conjugate, in place
+            if n_components == 3:
+                _scale(modes, deviator[z, y])
+            else:
+                _make_conjugate(modes, shear_factor, trace[z, y], deviator[z, y])
             # The transposed pass along y: what a row of voxels exerts on n rows of unknowns is
             # added to their sums, which are passed on once no further row adds to them. Derivatives
             # lower the degree, so that the highest modes are zero and are left out.
@@ -179,28 +170,83 @@ def _apply(
                 c, _, dz, dy, dx = terms[term]
                 for b in range(n):
                     weights = tables[1, dy, :, b]
-                    for i in range(n - dz):
+                    for i in range(counts[dz]):
                         out = sums[term, (y + b) % n, i]
-                        _add_combination(out, (n - dx) * nx, n - dy, 1.0, weights, modes[c, i])
-            _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
+                        size = counts[dx] * nx
+                        _add_combination(out, size, counts[dy], 1.0, weights, modes[c, i])
+            _add_forces(tables, counts, terms, groups, factors, sums, z, y, lines, shifted, result)
         # the last rows of unknowns, which are the first ones of the periodic grid
         for y in range(ny, ny + n - 1):
-            _add_forces(tables, terms, groups, factors, sums, z, y, lines, shifted, result)
+            _add_forces(tables, counts, terms, groups, factors, sums, z, y, lines, shifted, result)
+
+
+@fast
+def _scale(modes: Array, factors: Array) -> None:
+    """Multiply the modes of a gradient or flux in a row of nx voxels by a factor of each voxel.
+
+    Args:
+        modes: Changed; shape (3, n, n, n · nx), mode k along x of voxel x at k · nx + x.
+        factors: Shape (nx,).
+    """
+    n = modes.shape[1]
+    nx = len(factors)
+    for c in range(3):
+        for i in range(n):
+            for j in range(n):
+                for k in range(n):
+                    row = modes[c, i, j, k * nx : (k + 1) * nx]
+                    for x in range(nx):
+                        row[x] *= factors[x]
+
+
+@fast
+def _make_conjugate(modes: Array, shear_factor: float, of_trace: Array, of_deviator: Array) -> None:
+    """Turn the modes of a strain or stress in a row of nx voxels into those of its conjugate.
+
+    Args:
+        modes: Changed; shape (6, n, n, n · nx), mode k along x of voxel x at k · nx + x.
+        shear_factor: Factor of shear components: 1 for strains, 4 for stresses.
+        of_trace: Coefficient of the squared trace in each voxel, shape (nx,).
+        of_deviator: Coefficient of the squared deviator, of the same shape.
+    """
+    n = modes.shape[1]
+    nx = len(of_trace)
+    for i in range(n):
+        for j in range(n):
+            for k in range(n):
+                row = slice(k * nx, (k + 1) * nx)
+                xx = modes[0, i, j, row]
+                yy = modes[1, i, j, row]
+                zz = modes[2, i, j, row]
+                yz = modes[3, i, j, row]
+                xz = modes[4, i, j, row]
+                xy = modes[5, i, j, row]
+                for x in range(nx):
+                    twice = 2.0 * of_deviator[x]
+                    mean = (of_trace[x] - twice / 3.0) * (xx[x] + yy[x] + zz[x])
+                    xx[x] = twice * xx[x] + mean
+                    yy[x] = twice * yy[x] + mean
+                    zz[x] = twice * zz[x] + mean
+                    shear = shear_factor * of_deviator[x]
+                    yz[x] *= shear
+                    xz[x] *= shear
+                    xy[x] *= shear
 
 
 @fast
 def _fill_modes(
-    tables: Array, terms: Ints, groups: Ints, factors: Array, fields: Array,
+    tables: Array, counts: Ints, terms: Ints, groups: Ints, factors: Array, fields: Array,
     z: int, first: int, last: int, modes: Array,
 ) -> None:  # fmt: skip
-    """Write the modes of the Voigt components of fields in some rows of a layer of voxels.
+    """Write the modes of the components of fields in some rows of a layer of voxels.
 
     Args:
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
             functions).
-        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
-            orders of its derivative along z, y, x).
+        counts: Number of modes that are not zero, by the order of the derivative.
+        terms: A row for each term of the field: (component, number of the unknown, orders of its
+            derivative along z, y, x).
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
@@ -208,13 +254,13 @@ def _fill_modes(
         z: Index of the layer.
         first: First row along y.
         last: One past the last row.
-        modes: Overwritten; shape (6 components × n modes along z × n along y × n along x, fields,
+        modes: Overwritten; shape (components × n modes along z × n along y × n along x, fields,
             voxels of the rows), the voxels along x within those along y.
     """
     n = tables.shape[-1]
     nx = fields.shape[-1]
     strips = np.zeros((len(terms), n, n, n * nx))
-    by_component = np.zeros((6, n, n, n * nx))
+    by_component = np.zeros((len(modes) // n**3, n, n, n * nx))
     lines = np.zeros((n, n * nx))
     shifted = np.empty((n, n, nx))
     for a in range(len(fields)):
@@ -222,18 +268,19 @@ def _fill_modes(
         # row `first`, fill strips alone.
         for y in range(first + 1 - n, last):
             _fill_strips(
-                tables, terms, groups, factors, fields[a], z, y + n - 1, shifted, lines, strips
-            )
+                tables, counts, terms, groups, factors, fields[a], z, y + n - 1,
+                shifted, lines, strips
+            )  # fmt: skip
             if y >= first:
-                _modes_of_row(tables, terms, strips, y, by_component)
+                _modes_of_row(tables, counts, terms, strips, y, by_component)
                 row = slice((y - first) * nx, (y - first + 1) * nx)
-                modes[:, a, row] = by_component.reshape(6 * n**3, nx)
+                modes[:, a, row] = by_component.reshape(len(modes), nx)
 
 
 @fast
 def _fill_strips(
-    tables: Array, terms: Ints, groups: Ints, factors: Array, field: Array, z: int, y: int,
-    shifted: Array, lines: Array, strips: Array,
+    tables: Array, counts: Ints, terms: Ints, groups: Ints, factors: Array,
+    field: Array, z: int, y: int, shifted: Array, lines: Array, strips: Array,
 ) -> None:  # fmt: skip
     """Compute the modes along x and z of a row of unknowns, and write them into its strip.
 
@@ -245,8 +292,9 @@ def _fill_strips(
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
             functions).
-        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
-            orders of its derivative along z, y, x).
+        counts: Number of modes that are not zero, by the order of the derivative.
+        terms: A row for each term of the field: (component, number of the unknown, orders of its
+            derivative along z, y, x).
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
@@ -276,22 +324,24 @@ def _fill_strips(
                     shifted[a, f, x] = row[x + shift]
                 for x in range(shift):
                     shifted[a, f, nx - shift + x] = row[x]
-            for k in range(n - dx):
+            for k in range(counts[dx]):
                 out = lines[a, k * nx : (k + 1) * nx]
                 _add_combination(out, nx, n, 1.0, tables[2, dx, k], shifted[a])
         # along z, for each term of the group
-        size = (n - dx) * nx
+        size = counts[dx] * nx
         for term in range(start, stop):
             dz = terms[term, 2]
-            for i in range(n - dz):
+            for i in range(counts[dz]):
                 out = strips[term, i, y % n]
                 out[:size] = 0.0
                 _add_combination(out, size, n, factors[term], tables[0, dz, i], lines)
 
 
 @fast
-def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Array) -> None:
-    """Write the modes of the Voigt components in a row of voxels, from n strips of modes.
+def _modes_of_row(
+    tables: Array, counts: Ints, terms: Ints, strips: Array, y: int, modes: Array
+) -> None:
+    """Write the modes of the components in a row of voxels, from n strips of modes.
 
     A row has nx voxels; mode k along x of voxel x stands at k · nx + x.
 
@@ -299,12 +349,13 @@ def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Arra
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
             functions).
-        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
-            orders of its derivative along z, y, x).
+        counts: Number of modes that are not zero, by the order of the derivative.
+        terms: A row for each term of the field: (component, number of the unknown, orders of its
+            derivative along z, y, x).
         strips: Modes along z and x of each term in the rows of unknowns y … y + n − 1, shape
             (terms, n modes along z, n rows, n · nx). A row stands at its index modulo n.
         y: Index of the row of voxels.
-        modes: Overwritten by the sums of the terms; shape (6 components, n modes along z, n modes
+        modes: Overwritten by the sums of the terms; shape (components, n modes along z, n modes
             along y, n · nx).
     """
     n = tables.shape[-1]
@@ -313,18 +364,18 @@ def _modes_of_row(tables: Array, terms: Ints, strips: Array, y: int, modes: Arra
     modes[:] = 0.0
     for term in range(len(terms)):
         c, _, dz, dy, dx = terms[term]
-        for j in range(n - dy):
+        for j in range(counts[dy]):
             # the strip of row y + b stands at (y + b) % n
             for b in range(n):
                 weights[(y + b) % n] = tables[1, dy, j, b]
-            for i in range(n - dz):
-                _add_combination(modes[c, i, j], (n - dx) * nx, n, 1.0, weights, strips[term, i])
+            for i in range(counts[dz]):
+                _add_combination(modes[c, i, j], counts[dx] * nx, n, 1.0, weights, strips[term, i])
 
 
 @fast
 def _add_forces(
-    tables: Array, terms: Ints, groups: Ints, factors: Array, sums: Array, z: int, y: int,
-    lines: Array, shifted: Array, result: Array,
+    tables: Array, counts: Ints, terms: Ints, groups: Ints, factors: Array,
+    sums: Array, z: int, y: int, lines: Array, shifted: Array, result: Array,
 ) -> None:  # fmt: skip
     """Turn the sums of a row into forces on its unknowns, and add them to the nodal forces.
 
@@ -335,8 +386,9 @@ def _add_forces(
         tables: Matrices from the n functions of one coordinate to Legendre modes of their
             derivatives, shape (axes z, y, x; order 0, 1, 2 of the derivative; n modes; n
             functions).
-        terms: A row for each term of the strain or stress: (Voigt component, number of the unknown,
-            orders of its derivative along z, y, x).
+        counts: Number of modes that are not zero, by the order of the derivative.
+        terms: A row for each term of the field: (component, number of the unknown, orders of its
+            derivative along z, y, x).
         groups: Ranges [first, last) of terms with the same unknown and order along x, shape
             (groups, 2).
         factors: Factor of each term.
@@ -360,13 +412,15 @@ def _add_forces(
             row_sums = sums[term, y % n]
             for a in range(n):
                 weights = tables[0, dz, :, a]
-                _add_combination(lines[a], (n - dx) * nx, n - dz, factors[term], weights, row_sums)
+                _add_combination(
+                    lines[a], counts[dx] * nx, counts[dz], factors[term], weights, row_sums
+                )
             row_sums[:] = 0.0
         for a in range(n):
             row = result[u, (z + a) % nz, y % ny]
             by_mode = lines[a].reshape(n, nx)
             for f in range(n):
-                _add_combination(shifted[a, f], nx, n - dx, 1.0, tables[2, dx, :, f], by_mode)
+                _add_combination(shifted[a, f], nx, counts[dx], 1.0, tables[2, dx, :, f], by_mode)
                 shift = f % nx  # as in `_fill_strips`
                 for x in range(nx - shift):
                     row[x + shift] += shifted[a, f, x]

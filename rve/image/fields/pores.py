@@ -1,4 +1,4 @@
-"""Stresses that vanish in closed pores, by potentials that are prescribed there.
+"""Stresses and fluxes that vanish in closed pores, by potentials that are prescribed there.
 
 A stress σ̄ + curl curl Φ vanishes in a pore where Φ is a polynomial of second degree with
 curl curl Φ = −σ̄. B-splines and Hermite functions reproduce such polynomials, so all coefficients of
@@ -7,13 +7,15 @@ that is connected with its own periodic image has none, as Φ is periodic.
 
 What is left free in each pore are polynomials of second degree without stress: in the plane the
 linear ones, which carry forces from pore to pore, in space besides them 30 of gauge, without which
-the potentials between pores would be stiffer than they need be.
+the potentials between pores would be stiffer than they need be. Of a flux q̄ + curl A the
+polynomials are of first degree with curl A = −q̄; free are a constant in the plane, and six
+polynomials in space.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import compress, product
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
@@ -21,7 +23,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.rve.image.fields.element import (
     Element,
-    stress_derivatives,
+    field_derivatives,
     unknown_functions,
 )
 from alphacut.rve.image.fields.grid import Fields, namespace, on_host
@@ -162,15 +164,18 @@ def _unwrapped_pieces(
 
 
 class _Polynomials(NamedTuple):
-    """Polynomials of second degree of the potentials, for coordinates in cells.
+    """Polynomials of the potentials, for coordinates in cells.
 
     Attributes:
-        particular: Coefficients of polynomials whose curl curl is −1 in one Voigt component and 0
+        degree: Degree of the particular polynomials: 2 of stresses, 1 of fluxes.
+        particular: Coefficients of polynomials whose stress or flux is −1 in one component and 0
             in the others, shape (components, potentials, monomials).
-        gauge: Coefficients of all polynomials without stress, shape (J, potentials, monomials);
-            each has one term in a potential.
+        gauge: Coefficients of all polynomials without stress or flux, shape (J, potentials,
+            monomials); each has one term in a potential.
         monomials: Degrees of the monomials along the axes of the grid.
     """
+
+    degree: int
 
     particular: Array
     gauge: Array
@@ -178,67 +183,79 @@ class _Polynomials(NamedTuple):
 
 
 def _polynomials(element: Element) -> _Polynomials:
-    """Return the potentials of second degree with a unit stress, and those without stress.
+    """Return the potentials with a unit stress or flux, and those without one.
 
-    Coordinates are in cells. A polynomial has a coefficient for each potential and each monomial of
-    degree 2 at most along all axes together.
+    Coordinates are in cells. A polynomial has a coefficient for each potential and each monomial
+    whose degree along all axes together is at most 2, or 1 for fluxes.
 
     Args:
-        element: Element of stresses, whose potentials and sides are used.
+        element: Element of stresses or fluxes, whose potentials and sides are used.
 
     Returns:
-        `particular`, polynomials whose stress is −1 in one Voigt component and 0 in the others,
-        shape (components, potentials, monomials); `gauge`, a basis of all polynomials without
-        stress, shape (J, potentials, monomials); and `monomials`, the degrees of each along (y, x)
-        or (z, y, x).
+        `degree`, 2 or 1; `particular`, polynomials whose stress or flux is −1 in one component and
+        0 in the others, shape (components, potentials, monomials); `gauge`, a basis of all
+        polynomials without stress or flux, shape (J, potentials, monomials); and `monomials`, the
+        degrees of each along (y, x) or (z, y, x).
     """
-    monomials = [x for x in product(range(3), repeat=element.dimension) if sum(x) <= 2]
-    derivatives = stress_derivatives(element.dimension)
+    degree = 1 if element.conduction else 2  # that of the derivatives
+    degrees_of_axes = product(range(degree + 1), repeat=element.dimension)
+    monomials = [degrees for degrees in degrees_of_axes if sum(degrees) <= degree]
+    derivatives = field_derivatives(element.dimension, dual=True, conduction=element.conduction)
     potentials = unknown_functions(derivatives)
     shape = (len(potentials), len(monomials))
-    is_free = np.ones(shape, bool)  # monomials that occur in no component of the stress
+    is_free = np.ones(shape, bool)  # monomials that occur in no component of the field
     particular = np.zeros((len(derivatives), *shape))
     gauge = []
     for component, terms in enumerate(derivatives):
         units = []  # for each term the polynomial of stress 1 in this component
         for term in terms:
             degrees = term.orders[::-1]  # along the axes of the grid
+            if element.conduction:  # constant along an axis of the order `EDGE`
+                degrees = tuple(int(order == 1) for order in degrees)
             index = potentials.index(term.function), monomials.index(degrees)
             is_free[index] = False
             area = np.prod(np.array(element.sides) ** degrees)
             unit = np.zeros(shape)
-            unit[index] = area / (term.factor * max(degrees))  # ∂² x² = 2, ∂x ∂y x y = 1
+            unit[index] = area / (term.factor * max(degrees))  # ∂² x² = 2, ∂x ∂y x y = ∂x x = 1
             units.append(unit)
         particular[component] = -units[0]
         # The difference of two polynomials with the same stress has no stress.
         gauge += [unit - units[0] for unit in units[1:]]
+    if element.conduction and element.dimension == 3:
+        for axis in range(3):  # A_i is constant along i
+            is_free[axis, monomials.index(tuple(np.eye(3, dtype=int)[2 - axis]))] = False
     for index in np.argwhere(is_free):
         alone = np.zeros(shape)
         alone[tuple(index)] = 1.0
         gauge.append(alone)
-    return _Polynomials(particular, np.array(gauge), monomials)
+    return _Polynomials(degree, particular, np.array(gauge), monomials)
 
 
 def _coefficients(element: Element, position: Array, degrees: tuple[int, ...]) -> Array:
     """Return the coefficients of the element's functions that make up a monomial, at nodes.
 
     The monomial is a product of powers of the coordinates, of degree 2 at most. The coefficients
-    are exact: whole multiples of 1/32 in space, whole numbers in the plane.
+    are exact: whole multiples of 1/32 in space, of 1/2 in the plane.
 
     Args:
-        element: Element of stresses.
+        element: Element of stresses or fluxes; of the latter the degree is 1 at most.
         position: Whole coordinates of K nodes in cells along the axes, shape (K, dimension).
         degrees: Degrees of the monomial along these axes.
 
     Returns:
-        Coefficients, shape (unknowns of a potential at a node, K). In the plane the unknowns are
-        Hermite's: value, slope along x, slope along y, mixed derivative; in space there is one, of
-        a quadratic B-spline.
+        Coefficients, shape (unknowns of a potential at a node, K). In the plane the unknowns of
+        stresses are Hermite's: value, slope along x, slope along y, mixed derivative; those of
+        fluxes are the values at the node, half a cell further along x, along y, and along both. In
+        space there is one, of a quadratic B-spline.
     """
     along_axes: list[list[Array]] = []
     for axis, degree in enumerate(degrees):
         x = position[:, axis]
-        if element.dimension == 2:  # value and slope of Hermite's functions
+        if element.dimension == 2 and element.conduction:
+            along_axes.append([x**degree, (x + 0.5) ** degree])
+        elif element.conduction:  # the value at a node, or on an edge along a constant monomial
+            along_axes.append([x**degree])
+        elif element.dimension == 2:  # value and slope of Hermite's functions
             along_axes.append([x**degree, degree * x ** max(degree - 1, 0)])
         else:  # coefficients of the quadratic B-splines of `element`, which sum to 2
             of_degrees = np.ones_like(x), x - 0.5, x * (x - 1)
@@ -276,16 +293,15 @@ def _node_matrix(
 
 @dataclass(frozen=True, eq=False)
 class PorePotentials:
-    """Fields of potentials whose total stress vanishes in pores: an affine space.
+    """Fields of potentials whose total stress or flux vanishes in pores: an affine space.
 
-    Under the mean stress σ̄ the unknowns at the nodes of the pores are `particular` σ̄ + `gauge` y,
-    with J parameters y for each of P pores. The rows of both matrices are the unknowns of a node
-    times the K nodes.
+    Under the mean stress σ̄ the R unknowns that act on pores are `particular` σ̄ + `gauge` y, with J
+    parameters y for each of P pores; likewise under a mean flux.
 
     Args:
-        index: Index of the nodes in an array of shape (fields, unknowns, *grid).
-        particular: Matrix from mean stresses, shape (unknowns × K, components).
-        gauge: Matrix from the parameters of all pores, shape (unknowns × K, P × J).
+        index: Index of these unknowns in an array of shape (fields, unknowns, *grid).
+        particular: Matrix from mean stresses, shape (R, components).
+        gauge: Matrix from the parameters of all pores, shape (R, P × J).
         inverse: Pseudo-inverses of the Gram matrices of `gauge` in each pore, shape (P, J, J).
     """
 
@@ -295,22 +311,23 @@ class PorePotentials:
     inverse: Array
 
     @classmethod
-    def of_nodes(cls, element: Element, nodes: PoreNodes) -> Self:
-        """Return the potentials whose total stress vanishes in closed pores.
+    def of_nodes(cls, element: Element, nodes: PoreNodes, is_pore: Mask) -> Self:
+        """Return the potentials whose total stress or flux vanishes in closed pores.
 
-        In each pore the potentials are polynomials of second degree about the pore's centre: a
-        particular one for each component of the mean stress, plus any combination of J polynomials
-        without stress.
+        In each pore the potentials are polynomials about the pore's centre: a particular one for
+        each component of the mean stress or flux, plus any combination of J polynomials without
+        stress or flux.
 
         Args:
-            element: Element of stresses, of the grid's dimension.
+            element: Element of stresses or fluxes, of the grid's dimension.
             nodes: Nodes of the closed pores, at least one, with pores numbered from 0 without gaps.
+            is_pore: Whether each cell is in a pore, of the grid's shape.
 
         Returns:
-            The affine space of the unknowns at these K nodes of P pores: the `index` of the nodes
-            in an array of fields; `particular`, the matrix from mean stresses to unknowns, shape
-            (unknowns × K, components); `gauge`, the matrix from the J parameters of each pore to
-            unknowns, shape (unknowns × K, P × J); and `inverse`, the pseudo-inverses of the pores'
+            The affine space of the R unknowns at these nodes of P pores that act on a cell of a
+            pore: their `index` in an array of fields; `particular`, the matrix from mean stresses
+            or fluxes to them, shape (R, components); `gauge`, the matrix from the J parameters of
+            each pore to them, shape (R, P × J); and `inverse`, the pseudo-inverses of the pores'
             Gram matrices, shape (P, J, J).
         """
         polynomials = _polynomials(element)
@@ -329,17 +346,27 @@ class PorePotentials:
         first_column = n_gauge * np.tile(nodes.pore, n_numbers)
         gauge = _node_matrix(polynomials.gauge, coefficients, first_column, n_pores * n_gauge)
 
-        # The monomials of the particular polynomials are of degree 2.
-        coefficients = coefficients * np.tile(extent**2, n_numbers)
+        # The monomials of the particular polynomials are of the same degree.
+        coefficients = coefficients * np.tile(extent**polynomials.degree, n_numbers)
         n_components = len(polynomials.particular)
         particular = _node_matrix(
             polynomials.particular, coefficients, np.zeros_like(first_column), n_components
         )
+        # An unknown at a node may act on other cells alone, as that half a cell further does.
+        acts_on_pores = np.zeros((element.unknowns, *is_pore.shape), bool)
+        axes = tuple(range(is_pore.ndim))
+        acts: Mask = element.magnitude.max(axis=0) > 0
+        for local in compress(element.local, acts):
+            acts_on_pores[local.unknown] |= np.roll(is_pore, local.offset, axes)
+        unknown, node = np.nonzero(acts_on_pores[:, *nodes.node.T])
+        rows = unknown * len(nodes.pore) + node
+        particular = particular[rows]
+        gauge = gauge[rows]
         # Polynomials whose eigenvalue is below 1e-11 of the largest count as dependent in a small
         # pore. A larger limit would take freedom from the stress, a smaller one keep rounding.
         gram = (gauge.T @ gauge).tobsr(blocksize=(n_gauge, n_gauge)).data
         inverse = np.linalg.pinv(gram, rcond=1e-11, hermitian=True)
-        index = slice(None), slice(None), *nodes.node.T
+        index = slice(None), unknown, *nodes.node[node].T
         return cls(index, particular, gauge, inverse)
 
     def project(self, fields: Fields) -> Fields:
@@ -350,26 +377,26 @@ class PorePotentials:
         return self._set_at_nodes(fields, self.gauge @ self._parameters(self._at_nodes(fields)))
 
     def particular_fields(self, loads: Array, like: Fields) -> Fields:
-        """Return potentials whose total stress under given mean stresses vanishes in pores.
+        """Return potentials whose total stress or flux under given mean ones vanishes in pores.
 
         They are zero outside the nodes of the pores.
 
         Args:
-            loads: Mean stresses in Voigt order, shape (loads, components).
+            loads: Mean stresses in Voigt order or mean fluxes, shape (loads, components).
             like: Array of shape (loads, unknowns of a cell, *grid), whose shape and library the
                 result has; it is not changed.
         """
         return self._set_at_nodes(namespace(like).zeros_like(like), self.particular @ loads.T)
 
     def impose(self, fields: Fields) -> Fields:
-        """Put fields for unit loads into the space of potentials without stress in pores, in place.
+        """Put fields for unit loads into the space of potentials that vanish in pores, in place.
 
         At the pores' nodes the fields become those of the nearest polynomials, whose total stress
-        vanishes in exact arithmetic. What rounding leaves is bounded.
+        or flux vanishes in exact arithmetic. What rounding leaves is bounded.
 
         Args:
-            fields: Potentials under unit mean stresses in Voigt order, shape (loads, unknowns of a
-                cell, *grid); changed at the pores' nodes.
+            fields: Potentials under unit mean stresses in Voigt order or unit mean fluxes, shape
+                (loads, unknowns of a cell, *grid); changed at the pores' nodes.
 
         Returns:
             Bounds of the distances of the new values from the exact polynomials, in the shape of
@@ -388,20 +415,18 @@ class PorePotentials:
         return self._set_at_nodes(namespace(fields).zeros_like(fields), terms * unit * size)
 
     def _at_nodes(self, fields: Fields) -> Array:
-        """Return the unknowns at K nodes of pores in NumPy, shape (unknowns × K, fields)."""
-        found = on_host(fields[self.index])
-        return np.asarray(found.reshape(len(found), -1).T)
+        """Return the R unknowns that act on pores in NumPy, shape (R, fields)."""
+        return on_host(fields[self.index]).T
 
     def _set_at_nodes(self, fields: Fields, at_nodes: Array) -> Fields:
         """Set the unknowns at the pores' nodes in place, and return the changed array.
 
         Args:
-            fields: Array of shape (fields, unknowns of a cell, *grid); changed at the K nodes
+            fields: Array of shape (fields, unknowns of a cell, *grid); changed at the R unknowns
                 alone.
-            at_nodes: Values, shape (unknowns of a cell × K, fields), the unknown as the slow index.
+            at_nodes: Values, shape (R, fields).
         """
-        values = at_nodes.T.reshape(len(fields), fields.shape[1], -1)
-        fields[self.index] = namespace(fields).asarray(values)
+        fields[self.index] = namespace(fields).asarray(at_nodes.T)
         return fields
 
     def _parameters(self, at_nodes: Array) -> Array:

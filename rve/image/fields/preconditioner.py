@@ -1,10 +1,11 @@
 """Inverse of the operator of one constant material, by Fourier transform; the spectrum it leaves.
 
-With t the trace and d the deviator of a periodic fluctuation, ∫d² = c ∫t² (`trace_in_deviator`)
-plus a third square. So a part of the coefficient of d may stand with that of t: the energy of one
-material is at least the smaller of s/s₀ and (b + c s)/(b₀ + c s₀) times that of another, b being
-the coefficient of t and s that of d. For displacements these are the moduli of shear and of
-longitudinal waves.
+With t the trace and d the deviator of a periodic strain or stress, ∫d² = c ∫t²
+(`trace_in_deviator`) plus a third square. So a part of the coefficient of d may stand with that of
+t: the energy of one material is at least the smaller of s/s₀ and (b + c s)/(b₀ + c s₀) times that
+of another, b being the coefficient of t and s that of d. For displacements these are the moduli of
+shear and of longitudinal waves. Of conduction there is one coefficient, whose ratio is that of the
+energies.
 """
 
 from __future__ import annotations
@@ -30,17 +31,16 @@ class Reference:
     """A constant material.
 
     Args:
-        trace: Coefficient of the square of the trace.
-        deviator: Positive coefficient of the square of the deviator.
+        coefficients: Coefficient of the square of each of the element's parts: trace and deviator,
+            of which the latter is positive; or one positive number of conduction.
         trace_in_deviator: The element's number c of this name.
     """
 
-    trace: float
-    deviator: float
+    coefficients: tuple[float, ...]
     trace_in_deviator: float
 
     @classmethod
-    def of_grid(cls, element: Element, trace: Fields, deviator: Fields) -> Reference:
+    def of_grid(cls, element: Element, coefficients: Sequence[Fields]) -> Reference:
         """Return the constant material of a preconditioner, between the extremes of a grid.
 
         Let b and s be the coefficients of the squared trace and deviator, and c the largest number
@@ -49,16 +49,18 @@ class Reference:
         their extremes in the grid, which make the spectrum narrow.
 
         Args:
-            element: Element of displacements or of stresses, which knows c.
-            trace: Coefficient b of the squared trace in each cell, not negative, of the grid's
-                shape.
-            deviator: Coefficient s of the squared deviator in each cell, positive, of the same
-                shape.
+            element: Element of the fields, which knows c.
+            coefficients: Coefficients b, not negative, and s, positive, in each cell; or the one of
+                conduction; of the grid's shape.
 
         Returns:
-            The material's coefficients b and s, and c.
+            The material's coefficients, and c.
         """
         c = element.trace_in_deviator
+        trace = coefficients[0]
+        deviator = coefficients[-1]
+        if element.conduction:
+            return cls((float(np.sqrt(trace.min() * trace.max())),), c)
         min_deviator = float(deviator.min())
         max_deviator = float(deviator.max())
         min_sum = float(trace.min()) + c * min_deviator
@@ -67,11 +69,11 @@ class Reference:
         mean_deviator = float(np.sqrt(min_deviator * max_deviator))
         # For the stress of the plane ∫ deviator² = c ∫ trace² exactly, so that b + c s alone
         # counts; s then keeps the ratio of the grid's smallest coefficients.
-        if element.stress and element.dimension == 2:
+        if element.dual and element.dimension == 2:
             mean_deviator = mean_sum * min_deviator / min_sum
-        return cls(mean_sum - c * mean_deviator, mean_deviator, c)
+        return cls((mean_sum - c * mean_deviator, mean_deviator), c)
 
-    def min_energy_ratio(self, trace: Fields, deviator: Fields) -> float:
+    def min_energy_ratio(self, coefficients: Sequence[Fields]) -> float:
         """Return a lower bound of the energy of fluctuations in a grid over that in this material.
 
         For a fluctuation ∫ deviator² = c ∫ trace² + a third square, with the number c of
@@ -81,14 +83,17 @@ class Reference:
         of a preconditioner in single precision.
 
         Args:
-            trace: Coefficient of the squared trace in each cell, not negative, of the grid's shape.
-            deviator: Coefficient of the squared deviator in each cell, positive, of the same shape.
+            coefficients: Coefficients of the squares of trace, not negative, and deviator,
+                positive, in each cell; or the one of conduction; of the grid's shape.
         """
         rounding = 1e-3
-        shear = float(deviator.min())
-        grid_sum = float(trace.min()) + self.trace_in_deviator * shear
-        constant_sum = self.trace + self.trace_in_deviator * self.deviator
-        return min(shear / self.deviator, grid_sum / constant_sum) * (1 - rounding)
+        c = self.trace_in_deviator
+        least = [float(coefficient.min()) for coefficient in coefficients]
+        ratio = least[-1] / self.coefficients[-1]
+        if len(least) == 2:
+            trace, deviator = self.coefficients
+            ratio = min(ratio, (least[0] + c * least[1]) / (trace + c * deviator))
+        return ratio * (1 - rounding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +129,8 @@ class FourierPreconditioner:
         Fields without energy, such as potentials without stress, have a pseudo-inverse.
 
         Args:
-            element: Element of displacements or of stresses.
-            constant: Coefficients of the squares of trace and deviator of the material.
+            element: Element of the fields.
+            constant: The material.
             shape: Numbers of cells along each axis of the grid, (y, x) or (z, y, x).
             xp: Module of the library of the arrays that the inverse is applied to.
 
@@ -145,15 +150,15 @@ class FourierPreconditioner:
         if element.dimension == 3:
             real_type = xp.float32
             complex_type = xp.complex64
-            scale = float(2.0 ** np.round(np.log2(constant.deviator)))
+            scale = float(2.0 ** np.round(np.log2(constant.coefficients[-1])))
         first_block = _block_of_uniform_fields(element, constant, waves)
         n = element.unknowns
         half = *shape[:-1], waves[-1].size
         inverse = xp.empty((n, n, *half), dtype=real_type)
         phases = xp.empty((n, *half), dtype=complex_type)
-        # Six potentials in space are more than stresses need: some fields of potentials have no
-        # stress, and so no energy.
-        has_gauge = element.stress and element.dimension == 3
+        # Six potentials in space are more than stresses need, and three more than fluxes need: some
+        # fields of potentials have no stress or flux, and so no energy.
+        has_gauge = element.dual and element.dimension == 3
         for slab in slabs(inverse):
             slab_waves = [waves[0][slab], *waves[1:]]
             phase = _phases(element, slab_waves, xp)
@@ -222,8 +227,8 @@ def _block_of_uniform_fields(
     In space such fields have no energy but rounding; the result is then zero.
 
     Args:
-        element: Element of displacements or of stresses.
-        constant: Coefficients of the squares of trace and deviator of the constant material.
+        element: Element of the fields.
+        constant: The constant material.
         waves: Wave numbers along each axis of the grid, whose first one is 0; only that is used.
 
     Returns:
@@ -233,7 +238,7 @@ def _block_of_uniform_fields(
     block = fourier_blocks(element, constant, [k[:1] for k in waves]).real.reshape(n, n)
     # The sum of the squared entries of a matrix M is at least the largest eigenvalue of MᵀM. It is
     # the scale of what counts as no energy.
-    max_energy = float(np.sum(element.magnitude**2)) * max(constant.trace, constant.deviator)
+    max_energy = float(np.sum(element.magnitude**2)) * max(constant.coefficients)
     if np.linalg.norm(block, 2) <= GAUGE * max_energy:
         return np.zeros((n, n))
     # In a plane's block, fields without energy have eigenvalues of 1e-16 of the largest one, by
@@ -268,17 +273,18 @@ def fourier_blocks(
     A field u(cell) = exp(i k·cell) U has the nodal forces exp(i k·cell) S(k) U with the block S(k).
 
     Args:
-        element: Element of displacements or of stresses.
-        constant: Coefficients of the squares of trace and deviator of the constant material.
+        element: Element of the fields.
+        constant: The constant material.
         waves: Wave numbers k along each axis of the grid, in radians per cell, shape (waves,) each.
         xp: Module of the result's array library.
 
     Returns:
         Hermitian blocks, shape (*waves along each axis, unknowns of a cell, unknowns of a cell).
     """
-    # energy of the local unknowns of a cell: by the trace and by the deviator
-    trace, deviator = (element.modes[rows].T @ element.modes[rows] for rows in element.parts)
-    matrix = constant.trace * trace + constant.deviator * deviator
+    # energy of the local unknowns of a cell
+    matrix = np.zeros((len(element.local), len(element.local)))
+    for rows, coefficient in zip(element.parts, constant.coefficients, strict=True):
+        matrix += coefficient * element.modes[rows].T @ element.modes[rows]
     unknown = np.array([local.unknown for local in element.local])
     offsets = np.array([local.offset for local in element.local])
     reach = element.reach

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
-from alphacut.rve.image.fields.element import element_of, isotropic_parts, stress_derivatives
+from alphacut.rve.image.fields.element import element_of, field_derivatives
 from alphacut.rve.image.fields.energy import (
     COEFFICIENT,
     UNIT,
@@ -31,42 +31,54 @@ from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from tests.rve.image.test_bounds import LOST, TIGHT, discs, image_of, in_order, random_moduli, tight
 
-SIDES = pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
+KINDS = {
+    "displacement": {"dual": False},
+    "stress": {"dual": True},
+    "temperature": {"dual": False, "conduction": True},
+    "flux": {"dual": True, "conduction": True},
+}
+SIDES = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 
 
-ELEMENTS = [element_of((1.0, 1.0), stress=stress) for stress in (False, True)]
+ELEMENTS = [element_of((1.0, 1.0), **kind) for kind in KINDS.values()]
+
+
+def moduli_of(kind, moduli):
+    """Two moduli, or the second one alone as a conductivity."""
+    return list(moduli[1:] if "conduction" in kind else moduli)
 
 
 @SIDES
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 10.0])
-def test_a_perturbed_field_still_bounds(stress, size):
-    rng, element = np.random.default_rng(3), element_of((1.0, 1.0), stress=stress)
-    bulk, shear = image_of(discs(24, rng), ((40.0, 25.0), (7.0, 3.0)))
-    best = solve_side(element, bulk, shear, solver=TIGHT)
+def test_a_perturbed_field_still_bounds(kind, size):
+    rng, element = np.random.default_rng(3), element_of((1.0, 1.0), **kind)
+    moduli = moduli_of(kind, image_of(discs(24, rng), ((40.0, 25.0), (7.0, 3.0))))
+    best = solve_side(element, moduli, solver=TIGHT)
     noise = size * rng.normal(size=best.fields.shape)
-    trial = energies_of(element, bulk, shear, best.fields + noise)
+    trial = energies_of(element, moduli, best.fields + noise)
     least = best.energy.value.sum(axis=0)
-    gap = np.linalg.eigvalsh(trial.upper - least + 1e-11 * np.eye(3))
+    gap = np.linalg.eigvalsh(trial.upper - least + 1e-11 * np.eye(len(least)))
     assert gap[0] >= 0
     assert size < 1e-3 or gap[0] > 1e-4 * np.abs(least).max()
 
 
-def energies_of(element, bulk, shear, fields):
+def energies_of(element, moduli, fields):
     """Energies of fields under the unit loads."""
-    weights = coefficients_of(element, bulk, shear)
-    return energies(element, fields, element.mean_modes(np.eye(3)), weights)
+    weights = coefficients_of(element, moduli)
+    return energies(element, fields, element.mean_modes(np.eye(len(fields))), weights)
 
 
 @SIDES
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("load", range(3))
-def test_no_system_lacks_more_energy_than_its_accuracy(stress, seed, load):
+@pytest.mark.parametrize("load", range(2))
+def test_no_system_lacks_more_energy_than_its_accuracy(kind, seed, load):
     """With bulk moduli nearly equal the first steps gain nearly nothing: a pause, not the end."""
     rng = np.random.default_rng([seed, 517])
     mask = np.kron(rng.random((5, 5)) < 0.2, np.ones((4, 4))) > 0
     mask[:4, :4] = True
-    element = element_of((0.7, 1.0), stress=stress)
-    system = system_of(element, np.where(mask, 1.4785, 1.4780), np.where(mask, 92.2, 1.78), load)
+    element = element_of((0.7, 1.0), **kind)
+    weights = np.where(mask, 1.4785, 1.4780), np.where(mask, 92.2, 1.78)
+    system = system_of(element, moduli_of(kind, weights), load)
     solved = ConjugateGradient(1e-14).solve(system)
     shares = []
     for accuracy in 10.0 ** np.arange(-8, 0):
@@ -77,25 +89,25 @@ def test_no_system_lacks_more_energy_than_its_accuracy(stress, seed, load):
     assert max(shares) > 0.02  # so no work is wasted
 
 
-def system_of(element, trace, deviator, load=0):
-    """The system of one of three loads on periodic fields."""
-    constant = Reference.of_grid(element, trace, deviator)
-    inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
-    operator, modes = Operator(element, trace, deviator), element.mean_modes(solved_loads(2))
-    scale = minimum_energy(element, trace, deviator, modes)[load]
-    ratio = constant.min_energy_ratio(trace, deviator)
+def system_of(element, coefficients, load=0):
+    """The system of one of the loads on periodic fields."""
+    constant = Reference.of_grid(element, coefficients)
+    inverse = FourierPreconditioner.of_material(element, constant, coefficients[0].shape)
+    operator, modes = Operator(element, coefficients), element.mean_modes(solved_loads(element))
+    scale = minimum_energy(element, coefficients, modes)[load]
+    ratio = constant.min_energy_ratio(coefficients)
     right_hand_side = operator.load(modes[:, load : load + 1])
     return System(operator.apply, inverse.apply, right_hand_side, scale, ratio)
 
 
 @SIDES
 @pytest.mark.parametrize("seed", range(3))
-def test_no_field_has_less_energy_than_the_constant_material_says(stress, seed):
+def test_no_field_has_less_energy_than_the_constant_material_says(kind, seed):
     """All ratios of a small image, as eigenvalues; uniform fields have none."""
-    element = element_of((0.7, 1.0), stress=stress)
-    trace, deviator = random_moduli(np.random.default_rng(seed), (5, 6), span=100)
-    system = system_of(element, trace, deviator)
-    size = element.unknowns * trace.size
+    element = element_of((0.7, 1.0), **kind)
+    coefficients = random_moduli(np.random.default_rng(seed), (5, 6), span=100)
+    system = system_of(element, moduli_of(kind, coefficients))
+    size = element.unknowns * 30
     units = np.eye(size).reshape(size, -1, 5, 6)
     maps = (m(units).reshape(size, size) for m in (system.preconditioner, system.operator))
     ratios = np.linalg.eigvals(np.linalg.multi_dot([x.T for x in maps])).real
@@ -104,42 +116,43 @@ def test_no_field_has_less_energy_than_the_constant_material_says(stress, seed):
 
 
 @SIDES
-def test_the_preconditioner_inverts_waves_of_any_length(stress, rng):
+def test_the_preconditioner_inverts_waves_of_any_length(kind, rng):
     """The longest ones of a slope have 1e-8 of the energy of the shortest."""
-    element, shape = element_of((0.7, 1.0), stress=stress), (300, 2)
-    constant = Reference.of_grid(element, np.full(shape, 2.0), np.full(shape, 0.7))
+    element, shape = element_of((0.7, 1.0), **kind), (300, 2)
+    weights = moduli_of(kind, [np.full(shape, 2.0), np.full(shape, 0.7)])
+    constant = Reference.of_grid(element, weights)
     inverse = FourierPreconditioner.of_material(element, constant, shape)
-    operator = Operator(element, np.full(shape, constant.trace), np.full(shape, constant.deviator))
+    operator = Operator(element, [np.full(shape, x) for x in constant.coefficients])
     fields = inverse.apply(rng.normal(size=(1, element.unknowns, *shape)))
     again = inverse.apply(operator.apply(fields))
     assert np.abs(again - fields).max() < 1e-5 * np.abs(fields).max()
 
 
-@pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
-def test_the_preconditioner_inverts_one_material_to_single_precision(stress, rng):
-    element, shape = element_of((0.7, 2.0, 1.0), stress=stress), (16, 3, 40)
-    constant = Reference(3e-12, 2e-12, element.trace_in_deviator)
+@SIDES
+def test_the_preconditioner_inverts_one_material_to_single_precision(kind, rng):
+    element, shape = element_of((0.7, 2.0, 1.0), **kind), (16, 3, 40)
+    weights = moduli_of(kind, [3e-12, 2e-12])
+    constant = Reference(tuple(weights), element.trace_in_deviator)
     inverse = FourierPreconditioner.of_material(element, constant, shape)
-    operator = Operator(element, *(x * np.ones(shape) for x in (constant.trace, constant.deviator)))
+    operator = Operator(element, [x * np.ones(shape) for x in weights])
     noise = rng.normal(size=(1, element.unknowns, *shape))
     fields = inverse.apply(operator.apply(noise))  # without gauge
     wrong = inverse.apply(operator.apply(fields)) - fields
     energy, off = (np.sum(x * operator.apply(x)) for x in (fields, wrong))
-    assert 0 < off < (1e-6 if stress else 1e-12) * energy
+    assert 0 < off < (1e-6 if element.dual else 1e-12) * energy
 
 
-@pytest.mark.parametrize("stress", [False, True], ids=["displacement", "stress"])
-def test_kernels_do_what_the_elements_matrices_do(stress, rng):
-    element = element_of((0.7, 2.0, 1.0), stress=stress)
+@SIDES
+def test_kernels_do_what_the_elements_matrices_do(kind, rng):
+    element = element_of((0.7, 2.0, 1.0), **kind)
     for shape in ((2, 3, 4), (5, 2, 7), (3, 4, 1)):
-        trace, deviator = rng.uniform(0.1, 2, (2, *shape))
-        operator = Operator(element, trace, deviator)
+        weights = moduli_of(kind, rng.uniform(0.1, 2, (2, *shape)))
+        operator = Operator(element, weights)
         fields = rng.normal(size=(2, element.unknowns, *shape))
         by_matrices = operator.apply_by_matrices(fields)
         largest = np.abs(by_matrices).max()
         assert operator.apply(fields) == pytest.approx(by_matrices, abs=1e-14 * largest)
-        means = element.mean_modes(rng.normal(size=(2, 6)))
-        weights = trace, deviator
+        means = element.mean_modes(rng.normal(size=(2, len(element.part_matrix))))
         found = energies(element, fields, means, weights)
         ((_, expected, *bound),) = modes_by_matrices(element, fields, means)
         for (z, rows), modes, *error in modes_of(element, fields, means):
@@ -155,13 +168,13 @@ def test_kernels_do_what_the_elements_matrices_do(stress, rng):
         )
         uniform = energies(element, 0 * fields, means, weights).value.sum(axis=0)
         total = found.value.sum(axis=0) - uniform
-        assert (total + alone) * trace.size == pytest.approx(work + work.T)
+        assert (total + alone) * weights[0].size == pytest.approx(work + work.T)
 
 
 def test_energies_are_those_of_three_gauss_points_an_axis(rng):
     """Stresses at the points by splines and Beltrami's derivatives written out."""
     sides, shape = np.array([0.7, 2.0, 1.0]), (3, 4, 5)
-    element = element_of(tuple(sides), stress=True)
+    element = element_of(tuple(sides), dual=True)
     trace, deviator = rng.uniform(0.1, 2, (2, *shape))
     potentials = rng.normal(size=(1, 6, *shape))  # 11, 12, 13, 22, 23, 33
     points, weights = np.polynomial.legendre.leggauss(3)
@@ -206,16 +219,19 @@ def test_energies_are_those_of_three_gauss_points_an_axis(rng):
     assert exact <= found.upper[0, 0] < exact * (1 + 1e-11)
 
 
-def test_stresses_of_potentials_are_in_equilibrium(rng):
-    """They do no work on any compatible strain, nor on a uniform one."""
-    stress, strain = (element_of((0.7, 2.0, 1.0), stress=x) for x in (True, False))
+@pytest.mark.parametrize("conduction", [False, True], ids=["stress", "flux"])
+def test_fields_of_potentials_are_in_equilibrium(conduction, rng):
+    """They do no work on any compatible field, nor on a uniform one."""
+    sides = 0.7, 2.0, 1.0
+    stress, strain = (element_of(sides, dual=x, conduction=conduction) for x in (True, False))
     shape = 4, 5, 6
-    potentials = rng.normal(size=(1, 6, *shape))
+    potentials = rng.normal(size=(1, stress.unknowns, *shape))
     stresses = _components(stress, potentials)
-    for displacements in (rng.normal(size=(1, 3, *shape)), np.zeros((1, 3, *shape))):
-        strains = _components(strain, displacements)
-        if not displacements.any():
-            strains[:, 0, 0, 0] += rng.normal(size=(6, 1, 1, 1))
+    displacements = rng.normal(size=(1, strain.unknowns, *shape))
+    for unknowns in (displacements, 0 * displacements):
+        strains = _components(strain, unknowns)
+        if not unknowns.any():
+            strains[:, 0, 0, 0] += rng.normal(size=(len(strains), 1, 1, 1))
         work = np.sum(stresses * strains)
         assert abs(work) < 1e-13 * np.sqrt(np.sum(stresses**2) * np.sum(strains**2))
 
@@ -223,10 +239,10 @@ def test_stresses_of_potentials_are_in_equilibrium(rng):
 def _components(element, fields):
     """Voigt components of a field in orthonormal modes, (6, modes along z, y, x, *grid)."""
     ((_, modes, _, _),) = modes_by_matrices(element, fields, np.zeros((len(element.modes), 1)))
-    modes = modes.reshape(6, *[round((len(modes) / 6) ** (1 / 3))] * 3, *fields.shape[2:])
+    n = len(element.part_matrix)
+    modes = modes.reshape(n, *[round((len(modes) / n) ** (1 / 3))] * 3, *fields.shape[2:])
     widths = [(0, 3 - n if axis in (1, 2, 3) else 0) for axis, n in enumerate(modes.shape)]
-    parts = isotropic_parts(3, stress=element.stress)
-    return np.tensordot(np.linalg.inv(parts), np.pad(modes, widths), axes=1)
+    return np.tensordot(np.linalg.inv(element.part_matrix), np.pad(modes, widths), axes=1)
 
 
 def test_the_sum_of_products():
@@ -238,7 +254,7 @@ def test_the_sum_of_products():
     assert tight(Fraction(result.summed), lost)
 
 
-@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+@pytest.mark.parametrize("element", ELEMENTS, ids=KINDS)
 def test_the_product_of_modes_and_unknowns(element):
     count = len(element.local)
     row = int(np.argmax((element.modes != 0).sum(axis=1)))
@@ -277,13 +293,14 @@ def test_errors_of_entries_that_all_lift_one_load():
     assert np.linalg.eigvalsh(inverse @ (half - lifted) @ inverse)[0] < 0
 
 
+@pytest.mark.parametrize("conduction", [False, True], ids=["stress", "flux"])
 @pytest.mark.parametrize("sides", [(0.8, 1.0), (0.8, 1.2, 1.0)])
-def test_what_fields_are_off_by_is_in_the_rounding_of_their_energies(sides, rng):
-    element = element_of(sides, stress=True)
+def test_what_fields_are_off_by_is_in_the_rounding_of_their_energies(sides, conduction, rng):
+    element = element_of(sides, dual=True, conduction=conduction)
     shape = (2, element.unknowns, *(3, 4, 5)[: len(sides)])
     fields, off = rng.normal(size=shape), 1e-6 * rng.normal(size=shape)
     means = element.mean_modes(rng.normal(size=(2, len(element.of_voigt.T))))
-    weights = tuple(rng.uniform(0.5, 2.0, (2, *shape[2:])))
+    weights = rng.uniform(0.5, 2.0, (len(element.parts), *shape[2:]))
     found = energies(element, fields, means, weights, abs(off))
     exact, without = (energies(element, x, means, weights) for x in (fields + off, fields))
     error = abs(exact.value - without.value)
@@ -303,12 +320,14 @@ def closed_pores(rng, shape):
     return np.roll(is_pore, rng.integers(0, 8, len(shape)), range(len(shape)))
 
 
+@pytest.mark.parametrize("conduction", [False, True], ids=["stress", "flux"])
 @pytest.mark.parametrize("sides", [(1.0, 1.0), (0.7, 1.0), (1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
-def test_the_stress_in_pores_is_zero_but_for_the_declared_rounding(sides, rng):
+def test_the_field_in_pores_is_zero_but_for_the_declared_rounding(sides, conduction, rng):
     n = len(sides)
     is_pore = closed_pores(rng, (10, 15)[:n] if n == 2 else (5, 10, 10))
-    element = element_of(sides, stress=True)
-    potentials = PorePotentials.of_nodes(element, PoreNodes.of_mask(is_pore, element.reach))
+    element = element_of(sides, dual=True, conduction=conduction)
+    nodes = PoreNodes.of_mask(is_pore, element.reach)
+    potentials = PorePotentials.of_nodes(element, nodes, is_pore)
     count = len(element.of_voigt.T)
     fields = rng.normal(size=(count, element.unknowns, *is_pore.shape))
     errors = potentials.impose(fields)
@@ -338,7 +357,12 @@ def exact_stress(element, fields, errors, cell):
         ],
         3: [[Fraction(1, 3), -1, 2], [Fraction(4, 3), 0, -4], [Fraction(1, 3), 1, 2]],
     }[element.dimension]
-    n, derivatives = element.dimension, stress_derivatives(element.dimension)
+    if element.conduction and element.dimension == 2:
+        functions = [[Fraction(1, 6), -1], [Fraction(2, 3), 0], [Fraction(1, 6), 1]]
+    elif element.conduction:  # order 2 is the constant function of an edge
+        functions = [[Fraction(1, 2), -1, 1], [Fraction(1, 2), 1, 0]]
+    n = element.dimension
+    derivatives = field_derivatives(n, dual=True, conduction=element.conduction)
     potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
     numbers = list(product(range(len(functions)), repeat=n))
     for field, error in zip(fields, errors, strict=True):
@@ -350,7 +374,8 @@ def exact_stress(element, fields, errors, cell):
                     unknown, offset = element.local[potentials.index(potential) * len(numbers) + k]
                     weight = Fraction(factor)
                     for f, order, side in zip(number, orders[::-1], element.sides, strict=True):
-                        weight *= functions[f][order] / Fraction(side) ** order
+                        is_edge = element.conduction and order == 2
+                        weight *= functions[f][order] / Fraction(side) ** (0 if is_edge else order)
                     at = (unknown, *(cell + offset) % field.shape[1:])
                     total += weight * Fraction(field[at])
                     added += abs(weight) * Fraction(error[at])
