@@ -33,8 +33,10 @@ if TYPE_CHECKING:
     from alphacut.rve.prism.product_space import ProductSpace
     from alphacut.rve.result.loss_factors import loss_factors
     from alphacut.rve.result.reference_bounds import ReferenceBounds, reference_bounds
+    from alphacut.rve.series.fibre_constants import fibre_conductivity
     from alphacut.rve.series.model import SeriesModel
     from alphacut.rve.slices.model import SlicesModel
+    from alphacut.rve.spheres.conduction import sphere_conductivity
     from alphacut.rve.spheres.model import SpheresModel
 
 __all__ = [
@@ -42,9 +44,9 @@ __all__ = [
     "FuzzyImageStiffness", "FuzzyStiffness", "GreyImage", "HomogenisedStiffness", "ImageFields",
     "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
     "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase", "constants",
-    "effective_modulus", "fuzzy_image_conductivity", "fuzzy_image_stiffness", "fuzzy_stiffness",
-    "image_fields", "loss_factors", "read_image", "reference_bounds", "solve_conduction",
-    "solve_image",
+    "effective_modulus", "fibre_conductivity", "fuzzy_image_conductivity", "fuzzy_image_stiffness",
+    "fuzzy_stiffness", "image_fields", "loss_factors", "read_image", "reference_bounds",
+    "solve_conduction", "solve_image", "sphere_conductivity",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
@@ -62,6 +64,7 @@ AT_FIRST_USE = {
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
     "constants": "engineering",
+    "fibre_conductivity": "series.fibre_constants",
     "fuzzy_image_conductivity": "image.conductivity",
     "fuzzy_image_stiffness": "image.study",
     "fuzzy_stiffness": "fuzzy_cell",
@@ -71,6 +74,7 @@ AT_FIRST_USE = {
     "reference_bounds": "result.reference_bounds",
     "solve_conduction": "image.model",
     "solve_image": "image.model",
+    "sphere_conductivity": "spheres.conduction",
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""
 

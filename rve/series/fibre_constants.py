@@ -1,27 +1,30 @@
-"""Elastic constants of a material of aligned fibres, with their declared errors.
+"""Elastic constants and conductivities of a material of aligned fibres, with declared errors.
 
 With the in-plane bulk modulus k, l = C13 and n = C33 of `engineering_constants`,
 
     E_L = n − l²/k,   ν_LT = l/(2 k),   1/E_T = 1/(4 G_T) + 1/(4 K_T) + ν_LT²/E_L.
 
 G_T and K_T are those of the result's average. G_L, the shear modulus along the fibres, is that of
-the square array by Rayleigh's harmonic multipoles (1892).
+the square array by Rayleigh's harmonic multipoles (1892). The conductivity across the fibres is
+found by the same equation: shear moduli are conductivities there, and axial displacements
+temperatures.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError
-from alphacut.rve.cell.cell import Cell, Phase
+from alphacut.base.errors import RefusedError, checked_number
 from alphacut.rve.result.engineering_constants import Mixture
 from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness
 from alphacut.rve.series.lattice_sums import LatticeSums, lattice_images, lattice_sums
 from alphacut.rve.series.means import SAFETY, finer_count
-from alphacut.stochastic import gauss_rule
+from alphacut.stochastic import RadiusMap, gauss_rule
+from alphacut.stochastic.radius_map import require_map
 
 
 def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
@@ -51,7 +54,8 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
     mixture = Mixture.of_cell(cell)
     K_T = result.moduli[0] / 2
     G_T = result.shear
-    G_L, G_L_error = _mean_longitudinal_shear(cell)
+    shear = (cell.matrix.stiffness[2, 2], cell.inclusion.stiffness[2, 2])
+    G_L, G_L_error = theta_mean(cell.radius_map, lambda radius: longitudinal_shear(radius, *shear))
     G_T_error = float(result.error_of(result.shear_of)) / G_T
     z, lowest_z, highest_z = mixture.z_from_bulk(K_T, result.modulus_errors[0])
     values = _constants(mixture, z, K_T=K_T, G_T=G_T, G_L=G_L)
@@ -79,36 +83,71 @@ def _constants(mixture: Mixture, z: float, *, K_T: float, G_T: float, G_L: float
     return np.array([E_T, E_L, nu_LT, G_T, G_L, K_T])
 
 
-def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
-    """Return the mean over θ of the shear modulus G_L along the fibres, and its relative error.
+def fibre_conductivity(radius_map: RadiusMap, matrix: float, inclusion: float) -> DeclaredConstants:
+    """Return the conductivities of a square array of fibres of random radius, with their errors.
 
-    The mean, in Pa, is by Gauss quadrature with 32 nodes. Its declared error is the mean error of
-    G_L at the nodes plus 1.6 times the larger distance from the means by two finer rules.
+    They are means over θ, as those of the stiffness.
 
     Args:
-        cell: Cell of a round fibre in a matrix, both isotropic.
+        radius_map: Function of θ: the radius over half the cell's side.
+        matrix: Conductivity around the fibres (of heat, electricity, or a diffusivity), positive.
+        inclusion: Conductivity of the fibres along and across their axis, positive, in the same
+            unit.
+
+    Returns:
+        "k_T", across the fibres, and "k_L", along them, in that unit, with absolute errors.
+
+    Raises:
+        RefusedError: A conductivity is not positive and finite, or the radius map is not one.
     """
-    matrix = cell.matrix
-    inclusion = cell.inclusion
-    assert isinstance(matrix, Phase)
-    assert isinstance(inclusion, Phase)
+    require_map(radius_map)
+    checked_number("matrix", matrix, positive=True)
+    checked_number("inclusion", inclusion, positive=True)
+
+    def across(radius: Array) -> tuple[Array, Array]:
+        """Return the conductivity across the fibres at each radius, and its relative error."""
+        return longitudinal_shear(radius, matrix, inclusion)
+
+    def along(radius: Array) -> tuple[Array, Array]:
+        """Return the mean of both conductivities at each radius, which is exact."""
+        fraction = np.pi * radius**2 / 4
+        return matrix + (inclusion - matrix) * fraction, np.full_like(radius, 1e-15)
+
+    means = np.array([theta_mean(radius_map, values_at) for values_at in (across, along)])
+    values, relative_errors = means.T
+    return DeclaredConstants.from_arrays(("k_T", "k_L"), values, values * relative_errors)
+
+
+def theta_mean(
+    radius_map: RadiusMap, values_at: Callable[[Array], tuple[Array, Array]]
+) -> tuple[float, float]:
+    """Return the mean over θ of a positive function of the radius, and its relative error.
+
+    The mean is by Gauss quadrature with 32 nodes. Its declared error is the mean error of the
+    function at the nodes plus 1.6 times the larger distance from the means by two finer rules.
+
+    Args:
+        radius_map: Function of θ: the radius over half the cell's side.
+        values_at: Function from radii, shape (n,), to values and their relative errors, of the same
+            shape.
+    """
     points = 32
     rules = []
     for _ in range(3):
-        rules.append(gauss_rule(cell.radius_map.distribution, points=points))
+        rules.append(gauss_rule(radius_map.distribution, points=points))
         points = finer_count(points)
     # The nodes of all rules are solved at once: one batch of small systems is faster than three.
     nodes = np.concatenate([rule.nodes for rule in rules])
-    moduli, relative_errors = longitudinal_shear(cell.radius_map(nodes), matrix, inclusion)
+    values, relative_errors = values_at(radius_map(nodes))
     ends = np.cumsum([rule.nodes.size for rule in rules])[:-1]
-    of_rules = zip(rules, np.split(moduli, ends), strict=True)
-    mean, finer, finest = [float(rule.weights @ values) for rule, values in of_rules]
+    of_rules = zip(rules, np.split(values, ends), strict=True)
+    mean, finer, finest = [float(rule.weights @ at_nodes) for rule, at_nodes in of_rules]
     weights = rules[0].weights
-    error = float(weights @ (moduli * relative_errors)[: weights.size]) / mean
+    error = float(weights @ (values * relative_errors)[: weights.size]) / mean
     return mean, error + SAFETY * max(abs(mean / finer - 1), abs(mean / finest - 1))
 
 
-def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
+def longitudinal_shear(radius: Array, matrix: float, inclusion: float) -> tuple[Array, Array]:
     """Return the shear modulus G_L along the fibres of a square array, and its relative error.
 
     The number of harmonics of Rayleigh's series (1892) is doubled from 4 until no modulus changes
@@ -116,8 +155,8 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
 
     Args:
         radius: Radii over half the cell's side, in [0, 1), shape (n,), one at least.
-        matrix: Isotropic material around the fibres.
-        inclusion: Isotropic material of the fibres.
+        matrix: Shear modulus around the fibres, in Pa.
+        inclusion: Shear modulus of the fibres, in Pa.
 
     Returns:
         G_L in Pa and its relative errors, shape (n,) each. The error is larger where 128 harmonics
@@ -125,14 +164,12 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
     """
     tolerance = 1e-12
     max_harmonics = 128  # more would cost their third power
-    matrix_shear = float(matrix.stiffness[2, 2])
-    inclusion_shear = float(inclusion.stiffness[2, 2])
     harmonics = 4
-    moduli = _rayleigh_moduli(radius, matrix_shear, inclusion_shear, harmonics=harmonics)
+    moduli = _rayleigh_moduli(radius, matrix, inclusion, harmonics=harmonics)
     while True:
         harmonics *= 2
         previous = moduli
-        moduli = _rayleigh_moduli(radius, matrix_shear, inclusion_shear, harmonics=harmonics)
+        moduli = _rayleigh_moduli(radius, matrix, inclusion, harmonics=harmonics)
         change = np.abs(moduli / previous - 1)
         if change.max() <= tolerance or harmonics >= max_harmonics:
             return moduli, change + tolerance

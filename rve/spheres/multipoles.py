@@ -128,6 +128,35 @@ def couplings(highest: int, poisson: complex, *, shear: bool) -> Array:
     return coupling
 
 
+class HarmonicCouplings(NamedTuple):
+    """Multipoles of Laplace's equation that a gradient along z excites, and what images add.
+
+    Attributes:
+        n: Degrees, odd, rising, shape (N,).
+        coupling: Regular amplitudes at one sphere (rows) by unit multipoles at all its images
+            (columns), for Racah's harmonics and a cell of side 2, shape (N, N).
+    """
+
+    n: Array
+    coupling: Array
+
+
+@lru_cache(maxsize=16)
+def harmonic_couplings(highest: int) -> HarmonicCouplings:
+    """Return the multipoles up to an odd degree, with the orders 0, 4, …, and their couplings.
+
+    The multipole of the order −m has the same amplitude as that of m, and is not listed. Equal
+    arguments give the same arrays, which must not be changed.
+    """
+    listed = [(n, m) for n in range(1, highest + 1, 2) for m in range(0, n + 1, 4)]
+    n, m = np.array(listed).T
+    sums = lattice_sums(2 * highest).harmonic
+    pair = _Pair(n=n[np.newaxis], m=m[np.newaxis], k=n[:, np.newaxis], j=m[:, np.newaxis])
+    of_m = _weighted_sum(sums, pair, 0)
+    of_minus_m = np.where(pair.m > 0, _weighted_sum(sums, pair._replace(m=-pair.m), 0), 0.0)
+    return HarmonicCouplings(n, of_m + of_minus_m)
+
+
 class _Pair(NamedTuple):
     """Degrees and orders of a multipole (n, m) and of a regular solution (k, j); all broadcast."""
 
