@@ -17,6 +17,8 @@ EXTRAS = {
     ),
     "cell": ("basix", "cffi", "dolfinx", "gmsh", "h5py", "meshio", "mpi4py", "petsc4py", "ufl"),
     "device": ("array_api_compat", "cupy"),
+    "mapdl": ("ansys",),
+    "nastran": ("pyyeti",),
     "obspy": ("obspy",),
     "particles": ("skimage",),
     "volumes": ("tifffile",),

@@ -9,6 +9,7 @@ direction of each row in a file .dof beside.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,7 +48,7 @@ def read_abaqus(name: str, content: bytes, *, max_rows: int) -> NamedMatrix:
     # Lines with two asterisks are comments. One asterisk begins the keyword of another file.
     lines = [x for x in content.splitlines() if x.strip() and not x.startswith(b"**")]
     table = _table(name, lines, widths=(3, 5))
-    places = _whole_numbers(name, table[:, :-1])
+    places = whole_numbers(name, table[:, :-1])
     if places.shape[1] == 2:
         # A file of Matrix Market whose first line is lost begins with rows, columns and entries.
         is_head = len(table) > 1 and table[0, 2] == len(table) - 1
@@ -77,7 +78,7 @@ def read_calculix(path: Path, content: bytes, *, max_rows: int) -> NamedMatrix:
     """
     lines = [line for line in content.splitlines() if line.strip()]
     table = _table(path.name, lines, widths=(3,))
-    places = _whole_numbers(path.name, table[:, :-1])
+    places = whole_numbers(path.name, table[:, :-1])
     array = matrix_of_entries(path.name, places - 1, table[:, -1], max_rows=max_rows)
     beside = path.with_suffix(".dof")
     if not beside.exists():
@@ -125,6 +126,23 @@ def named_matrix(
         is_mirrored=is_mirrored,
     )
     return NamedMatrix(array, unknowns)
+
+
+def chosen_place(file: str, names: Sequence[str], member: str) -> int:
+    """Return the place of the matrix of a file that is named, or of the only one without a name.
+
+    Args:
+        file: Name of the file, for the message.
+        names: Names of its matrices.
+        member: The name, in large or small letters; may be empty.
+
+    Raises:
+        RefusedError: There is no such matrix, or several of this name or without a name.
+    """
+    places = [k for k, x in enumerate(names) if not member or x.lower() == member.lower()]
+    what = f"with {len(places)} matrices {member}".rstrip()
+    require(len(places) == 1, file, what, f"{file}:NAME, one of {', '.join(names)}")
+    return places[0]
 
 
 def matrix_of_entries(
@@ -217,7 +235,7 @@ def _table(name: str, lines: list[bytes], widths: tuple[int, ...]) -> Array:
     return numbers_in(name, b"\n".join(lines).replace(b",", b" ")).reshape(-1, width)
 
 
-def _whole_numbers(name: str, numbers: Array) -> Ints:
+def whole_numbers(name: str, numbers: Array) -> Ints:
     """Return numbers as integers; refuse others than whole ones of up to nine digits."""
     is_whole = (numbers == np.floor(numbers)) & (np.abs(numbers) < 1e9)
     if not is_whole.all():

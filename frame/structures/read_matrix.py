@@ -19,11 +19,18 @@ from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, cure_of, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
-from alphacut.frame.structures.entry_lists import NamedMatrix, read_abaqus, read_calculix
+from alphacut.frame.structures.entry_lists import (
+    NamedMatrix,
+    chosen_place,
+    read_abaqus,
+    read_calculix,
+)
+from alphacut.frame.structures.mapdl import read_full
 from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
+from alphacut.frame.structures.nastran import read_dmig, read_op4
 
 # The allowed value in messages of all formats.
-ALLOWED = "a file .mtx, .sti, .mas, .npz, .npy or .csv with one array of finite real numbers"
+ALLOWED = "a file .mtx, .sti, .mas, .pch, .op4, .full, .npz, .npy or .csv of finite real numbers"
 # Rows of the largest matrix where nothing else is said: it is dense here, and takes 200 MB.
 MAX_ROWS = 5000
 # Abaqus writes 1e36 or more on the diagonal of an unknown that it holds. No spring comes near it.
@@ -37,10 +44,11 @@ def read_matrix(
 
     Args:
         path: File of Matrix Market or of Abaqus's *MATRIX OUTPUT (.mtx), of CalculiX's *FREQUENCY,
-            SOLVER=MATRIXSTORAGE (.sti and .mas, with .dof beside), of `scipy.sparse.save_npz` or
+            SOLVER=MATRIXSTORAGE (.sti and .mas, with .dof beside), of Nastran's DMIG cards (.pch,
+            .bdf or .nas) or OUTPUT4 (.op4), of MAPDL (.full), of `scipy.sparse.save_npz` or
             `numpy.savez` (.npz), of `numpy.save` (.npy), or of numbers between commas, semicolons
             or blanks (.csv).
-        name: Name of the array in a .npz file of several.
+        name: Name of the array in a .npz, .pch or .op4 file of several; K or M of a .full file.
         max_rows: Largest number of rows and of columns, as the number of unknowns.
         unknowns: Names of the rows to return, in their order, where the file names its own
             (`read_unknowns`). Unknowns that are left out are held, and their rows go; those that
@@ -84,12 +92,13 @@ def read_matrix(
 def read_unknowns(path: str | Path, *, name: str = "") -> tuple[str, ...]:
     """Return the names of the free unknowns of a matrix in a file, in the order of its rows.
 
-    They are NODE.DIRECTION, with the program's own numbers: "12.1" is node 12 along 1. Unknowns
-    that a boundary condition holds are left out; Abaqus adds 1e36 to their stiffness.
+    They are NODE.DIRECTION, with the program's own numbers: "12.1" is node 12 along 1; of MAPDL it
+    is "12.UX". Unknowns that a boundary condition holds are left out; Abaqus adds 1e36 to their
+    stiffness.
 
     Args:
-        path: File of Abaqus in the formats MATRIX INPUT or LABELS (.mtx), or of CalculiX (.sti or
-            .mas) with its .dof beside.
+        path: File of Abaqus in the formats MATRIX INPUT or LABELS (.mtx), of CalculiX (.sti or
+            .mas) with its .dof beside, of Nastran's DMIG cards, or of MAPDL (.full).
         name: Name of the matrix in a file of several.
 
     Raises:
@@ -176,6 +185,14 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
         if re.match(rb"\s*[-\d*]", content):
             return read_abaqus(path.name, content, max_rows=max_named_rows)
         return NamedMatrix(matrix_market(path.name, content, max_rows=max_rows))
+    if ending in (".op4", ".pch", ".bdf", ".nas", ".full"):
+        require_text(path)
+        content = path.read_bytes()
+        if ending == ".op4":
+            return NamedMatrix(read_op4(path, content, member=name, max_rows=max_rows))
+        if ending == ".full":
+            return read_full(path, content, member=name, max_rows=MAX_ROWS)
+        return read_dmig(path.name, content, member=name, max_rows=MAX_ROWS)
     if ending == ".csv":
         require_text(path)
         return NamedMatrix(_read_csv(path.name, path.read_text(encoding="utf-8-sig")))
@@ -292,12 +309,7 @@ def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers
     names = archive.names
     if set(names) >= {"format", "shape", "data"}:  # as scipy.sparse.save_npz writes it
         return _read_sparse(archive, max_rows=max_rows)
-    chosen = [x for x in names if not name or x == name]
-    if len(chosen) != 1:
-        what = f"array {name or 'not named'}"
-        allowed = f"{archive.path.name}:NAME, one of {', '.join(names)}"
-        raise RefusedError(archive.path.name, what, allowed)
-    return archive.read(chosen[0])
+    return archive.read(names[chosen_place(archive.path.name, names, name)])
 
 
 def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:

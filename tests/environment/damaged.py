@@ -11,6 +11,7 @@ of its own, which must neither end by a signal, nor raise what is no refusal, no
 from __future__ import annotations
 
 import argparse
+import importlib
 import importlib.util
 import io
 import os
@@ -21,7 +22,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -287,7 +288,27 @@ def _matrices() -> list[Format]:
     for name, is_named in (("abaqus.mtx", True), ("coordinate.mtx", False), ("beam.sti", False)):
         save = saved_by(name, lambda p, is_named=is_named: listed(p, is_named=is_named))
         found.append(Format(name, save, read_symmetric))
-    return found
+    return [*found, *_program_files()]
+
+
+def _program_files() -> list[Format]:
+    """Matrices of Nastran and MAPDL, which the packages that read them bring."""
+    folders = {}
+    for package in ("pyyeti", "ansys.mapdl.reader"):
+        with suppress(ModuleNotFoundError):
+            folders[package] = Path(importlib.import_module(package).__path__[0])
+    files = [("pyyeti", "nastran_dmig_data/matrix_factory.pch", "RANDM")]
+    for kind in ("ascii", "le", "be_i64"):
+        for layout in ("dense", "bigmat", "nonbigmat"):
+            files.append(("pyyeti", f"nastran_op4_data/double_{layout}_{kind}.op4", "rmat"))
+    files += [("ansys.mapdl.reader", "file.full", member) for member in "KM"]
+    subfolders = {"pyyeti": "tests", "ansys.mapdl.reader": "examples"}
+    return [
+        Format(f"{path.name} {member}", bytes_to(path.name, path.read_bytes),
+               lambda path, member=member: read_matrix(path, name=member))
+        for package, name, member in files if package in folders
+        for path in [folders[package] / subfolders[package] / name]
+    ]  # fmt: skip
 
 
 def read_symmetric(path: Path) -> None:

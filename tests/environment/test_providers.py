@@ -46,16 +46,19 @@ INDIRECT = {  # imported by others on this project's behalf
     "sphinx": "python3-sphinx",
 }
 FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
+    "ansys": "frame/structures/mapdl.py",
     "array_api_compat": "rve/image/fields/grid.py",
     "cupy": "rve/image/fields/grid.py",
     "obspy": "frame/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
+    "pyyeti": "frame/structures/nastran.py",
 }
 
 IN_WHEELS = dict.fromkeys(
     ("basix", "cffi", "dolfinx", "mpi4py", "petsc4py", "ufl"), "dolfinx-solver-real"
 ) | {
     "PIL": "pillow",
+    "ansys": "ansys-mapdl-reader",
     "cupy": "cupy-cuda13x",
     "pydantic_core": "pydantic",
     "skimage": "scikit-image",
