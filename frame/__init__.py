@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         spectral_acceleration,
     )
     from alphacut.frame.spectra.target import TargetSpectrum, read_spectrum
+    from alphacut.frame.structures.affine import affine_terms
     from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
     from alphacut.frame.structures.loads import Force
     from alphacut.frame.structures.material_damping import damping_from_loss
@@ -65,12 +66,13 @@ __all__ = [
     "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak",
     "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
     "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumResponse", "StoreyFrame",
-    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "asce7_multi_period",
-    "asce7_two_period", "damping_from_loss", "decide", "envelope", "eurocode8_spectrum",
-    "fragility", "identify", "incremental", "measured_mode", "over_angles", "over_records", "peaks",
-    "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
-    "read_suite", "read_unknowns", "require_envelope", "response_spectrum", "rotated_spectra",
-    "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
+    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "affine_terms",
+    "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
+    "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode", "over_angles",
+    "over_records", "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
+    "read_spectrum", "read_suite", "read_unknowns", "require_envelope", "response_spectrum",
+    "rotated_spectra", "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_response",
+    "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -115,6 +117,7 @@ AT_FIRST_USE = {
     "TargetSpectrum": "spectra.target",
     "Tolerances": "analyses.tolerances",
     "UnprovedError": "calculus.unproved",
+    "affine_terms": "structures.affine",
     "asce7_multi_period": "spectra.asce7",
     "asce7_two_period": "spectra.asce7",
     "damping_from_loss": "structures.material_damping",

@@ -26,6 +26,7 @@ from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, t
 from alphacut.frame import (
     Accelerogram,
     MatrixStructure,
+    affine_terms,
     damping_from_loss,
     read_matrix,
     read_unknowns,
@@ -41,9 +42,9 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
     """Return the factor and the matrix of one term of M, K or D.
 
     Args:
-        value: Pair of texts [FACTOR, FILE]. FACTOR is a product of powers of parameters, such as
-            "Ec*I/l^3". FILE is a matrix file, in the folder of the case; "K.npz:columns" names one
-            array of several in it.
+        value: Pair of texts [FACTOR, FILE], or the pair to return. FACTOR is a product of powers of
+            parameters, such as "Ec*I/l^3". FILE is a matrix file, in the folder of the case;
+            "K.npz:columns" names one array of several in it.
         info: Context of the case; its `data` has the names of the unknowns if these were accepted.
 
     Returns:
@@ -55,19 +56,55 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             missing or holds no matrix of this shape, or the matrix is not symmetric or zero.
     """
     match value:
+        case (Monomial() as monomial, array):  # of exports
+            return monomial, array
         case [str(factor), str(file)]:
-            path, member = _file_and_member(file, info)
-            # Pydantic leaves refused keys out: without names the number of rows is not judged.
-            unknowns = info.data.get("unknowns", ())
-            rows = len(unknowns) or MAX_ROWS
-            array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
-            if unknowns:
-                _require_shape(path.name, array, rows)
-                require_symmetric(path.name, array, unknowns)
-            # A term of zeros does nothing: its author meant another array.
-            require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
-            return Monomial.parse(factor), array
+            return Monomial.parse(factor), _array(file, info)
     raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
+
+
+def _array(file: str, info: ValidationInfo) -> Array:
+    """Return the matrix in a file of the case, shape (unknowns, unknowns); see `_term`."""
+    path, member = _file_and_member(file, info)
+    # Pydantic leaves refused keys out: without names the number of rows is not judged.
+    unknowns = info.data.get("unknowns", ())
+    rows = len(unknowns) or MAX_ROWS
+    array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
+    if unknowns:
+        _require_shape(path.name, array, rows)
+        require_symmetric(path.name, array, unknowns)
+    # A term of zeros does nothing: its author meant another array.
+    require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
+    return array
+
+
+def _terms_of_exports(value: object, info: ValidationInfo) -> object:
+    """Return the terms of a matrix for which a list of tables names exports; see `affine_terms`.
+
+    Args:
+        value: List of tables, each with a matrix `file` and the values of the parameters for which
+            it was written, as { file = "soft.mtx", E = "100 GPa" }; or anything else, which is
+            returned as it is.
+        info: As of `_term`.
+
+    Raises:
+        RefusedError: A file or a parameter cannot be read, or the matrix is not affine.
+    """
+    if not isinstance(value, list) or not any(isinstance(export, dict) for export in value):
+        return value
+    exports: list[tuple[dict[str, float], Array]] = []
+    for export in value:
+        is_export = isinstance(export, dict) and isinstance(export.get("file"), str)
+        allowed = 'tables alone, as { file = "soft.mtx", E = "100 GPa" }'
+        require(is_export, "", export, allowed)
+        parameters = {
+            name: _parameter(number, info).nominal
+            for name, number in export.items()
+            if name != "file"
+        }
+        exports.append((parameters, _array(export["file"], info)))
+    terms = affine_terms(exports, unknowns=info.data.get("unknowns", ()))
+    return [(Monomial.parse(str(factor)), array) for factor, array in terms]
 
 
 def _file_and_member(text: str, info: ValidationInfo) -> tuple[Path, str]:
@@ -125,7 +162,10 @@ def _one_direction(value: object) -> object:
     return value
 
 
-Term = Annotated[tuple[Monomial, Array], PlainValidator(_term)]
+Terms = Annotated[
+    tuple[Annotated[tuple[Monomial, Array], PlainValidator(_term)], ...],
+    BeforeValidator(_terms_of_exports),
+]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
 
@@ -169,10 +209,11 @@ class MatricesSection(StructureSection):
     """names of the unknowns in the order of the matrices, as NODE.DIRECTION; or a matrix file that
     names them"""
     parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
-    mass: Annotated[tuple[Term, ...], NotEmpty] = Field(description="pairs [factor, file] of M")
-    stiffness: Annotated[tuple[Term, ...], NotEmpty]
-    """pairs [factor, file] of K"""
-    damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
+    mass: Annotated[Terms, NotEmpty] = Field(description="pairs [factor, file] of M, or exports")
+    stiffness: Annotated[Terms, NotEmpty]
+    """pairs [factor, file] of K; or tables { file = FILE, NAME = VALUE } of exports for several
+    values of the parameters, of which K is a sum of terms with one parameter each"""
+    damping: Terms = Field(default=(), description="pairs [factor, file] of D, or exports")
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
     direction: Annotated[str | dict[str, float], BeforeValidator(_one_direction)] = ""
     """direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves each, by

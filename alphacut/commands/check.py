@@ -67,12 +67,21 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     document: dict[str, object] = {"case": options.case, "stages": list(content.stages)}
     document |= {"period_s": None, "modes": None}
     if structure is not None and structure.linear is not None:
-        from alphacut.commands.motion_text import modes_document, modes_text, motion_text
+        from alphacut.commands.motion_text import (
+            matrices_text,
+            modes_document,
+            modes_text,
+            motion_text,
+        )
+        from alphacut.frame import MatrixStructure
         from alphacut.frame.structures.linear import nominal_modes
 
         modes = nominal_modes(structure.linear)
         document["modes"] = modes_document(modes)
         document["period_s"] = 2 * pi / float(modes.frequencies[0])
+        section = content.structure_section
+        if section is not None and isinstance(structure.linear, MatrixStructure):
+            text += matrices_text(structure.linear, section.places, modes)
         is_shaken = content.records is not None or structure.linear.ground is not None
         text += modes_text(modes, is_shaken=is_shaken)
         text += motion_text(content, structure, records)

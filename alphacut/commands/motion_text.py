@@ -11,7 +11,7 @@ from alphacut.base.number_text import STANDARD_GRAVITY, engineering, percent_tex
 from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
-from alphacut.frame import Exact, LinearFlow
+from alphacut.frame import Exact, LinearFlow, MatrixStructure
 from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import (
     NominalMode,
@@ -156,6 +156,22 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
         weight = engineering(moved * STANDARD_GRAVITY, "N")
         text += f"total weight: {weight}, of {moved:,.6g} kg that move with the ground\n"
     return text
+
+
+def matrices_text(model: MatrixStructure, unknowns: Sequence[str], modes: NominalModes) -> str:
+    """Return lines on the matrices of a structure: unknowns, those without mass, and five periods.
+
+    Args:
+        model: The structure.
+        unknowns: Names of its unknowns.
+        modes: Its undamped modes by rising frequency, at the most plausible values.
+    """
+    massless = [unknowns[k] for k in model.massless]
+    text = f"matrices: {model.size} unknowns in N, m, kg, s, {len(massless)} of them without mass"
+    if massless:
+        text += f": {', '.join(massless[:8])}{', …' * (len(massless) > 8)}"
+    periods = [f"{engineering(2 * pi / max(x, 1e-300), 's')}" for x in modes.frequencies[:5]]
+    return f"{text}\nfirst periods: {', '.join(periods)}\n"
 
 
 def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[str]:

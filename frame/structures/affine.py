@@ -1,0 +1,157 @@
+"""Matrices that are affine in parameters, K(p) = K_0 + Σ p_i K_i, from exports of a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import (
+    checked_number,
+    require,
+    require_numbers,
+    require_sequence,
+)
+from alphacut.frame.structures.matrix import require_symmetric
+
+# Fewer printed digits than these do not tell a rounding from a term that is not affine.
+MIN_DIGITS = 6
+# Largest rounding of what a program adds up, relative to √(K_ii K_jj). Tuned: some thousand units
+# of double precision, since entries of several elements may cancel.
+ASSEMBLY_ROUNDING = 1e-12
+# A step of a tenth of a parameter loses one printed digit of its term.
+MIN_STEP = 0.1
+
+
+def affine_terms(
+    exports: Sequence[tuple[Mapping[str, float], Array]], *, unknowns: Sequence[str] = ()
+) -> tuple[tuple[str | float, Array], ...]:
+    """Return the terms of a matrix that a program wrote for several values of its parameters.
+
+    The matrix must be affine in each parameter and in all together, K(p) = K_0 + Σ p_i K_i, as the
+    stiffness is in a modulus or a spring. K_i is the difference of two exports over the step of
+    p_i. All other exports must lie on the sum to within the rounding of their digits, whose number
+    is estimated; E and I of one beam, for example, do not.
+
+    Args:
+        exports: Pairs of the values of all parameters by name, in SI units, and the symmetric array
+            (n, n). The first pair is the nominal one. For each parameter there are two more at
+            least in which it alone differs, by a tenth of its value or more; of several parameters
+            all differ in one more.
+        unknowns: Names of the n rows, for messages; their numbers, from 1 on, where empty.
+
+    Returns:
+        Pairs (factor, array) as `MatrixStructure` takes them: the name of each parameter with K_i,
+        and 1.0 with K_0 where it is not 0. Entries within the rounding are 0.
+
+    Raises:
+        RefusedError: There are too few exports, or steps too small to tell; arrays are not square,
+            finite, symmetric, or of one shape; a parameter changes nothing; or the matrix is not
+            affine. The message has the largest deviation, relative to its entry.
+
+    Example:
+        >>> import numpy as np
+        >>> exports = [({"k": k}, np.array([[100.0 + k]])) for k in (200.0, 400.0, 300.0)]
+        >>> [(factor, float(array[0, 0])) for factor, array in affine_terms(exports)]
+        [('k', 1.0), (1.0, 100.0)]
+    """
+    _require_exports(exports, unknowns)
+    names = tuple(exports[0][0])
+    values = np.array([[parameters[name] for name in names] for parameters, _ in exports], float)
+    arrays = np.array([array for _, array in exports], float)
+    nominal = arrays[0]
+    is_moved = values != values[0]
+    chosen: list[int] = []
+    for k, name in enumerate(names):
+        alone = np.flatnonzero(is_moved[:, k] & (is_moved.sum(axis=1) == 1))
+        require(len(alone) >= 2, f"exports that move {name} alone", len(alone), "two or more")
+        steps = values[alone, k] - values[0, k]
+        far = int(np.abs(steps).argmax())
+        chosen.append(int(alone[far]))
+        # The further export is to tell a straight line from a bent one: it is at neither end.
+        fractions = steps / steps[far]
+        is_told = np.abs(fractions * (1 - fractions)).max() >= MIN_STEP * (1 - MIN_STEP) / 2
+        is_told = is_told and bool(abs(steps[far]) >= MIN_STEP * abs(values[0, k]))
+        value = f"moved to {', '.join(f'{x:g}' for x in values[alone, k])} from {values[0, k]:g}"
+        cure = "move it by its own size, and once by half of this"
+        require(is_told, name, value, "steps of a tenth or more, well apart", cure)
+    is_joint = len(names) == 1 or bool(is_moved.all(axis=1).any())
+    require(
+        is_joint, "exports that move all parameters", 0, "one, to see that they do not multiply"
+    )
+
+    steps = np.diag(values[chosen] - values[0])
+    differences = arrays[chosen] - nominal
+    # Each entry is rounded to `unit` of its magnitude by printing, and by what the program adds up.
+    unit = _rounding_unit(arrays)
+    diagonal = np.sqrt(np.abs(np.diagonal(arrays, axis1=1, axis2=2)).max(axis=0))
+    assembly = ASSEMBLY_ROUNDING * np.outer(diagonal, diagonal)
+    roundings = unit * np.abs(arrays) + assembly
+    of_differences = roundings[chosen] + roundings[0]
+    fractions_of_steps = (values - values[0]) / steps
+    for k, fractions in enumerate(fractions_of_steps):
+        deviation = np.abs(arrays[k] - nominal - np.tensordot(fractions, differences, 1))
+        allowed = roundings[k] + roundings[0] + np.tensordot(np.abs(fractions), of_differences, 1)
+        i, j = np.unravel_index(int((deviation - allowed).argmax()), deviation.shape)
+        relative = deviation[i, j] / max(np.abs(arrays[:, i, j]).max(), assembly[i, j])
+        rows = unknowns or range(1, len(nominal) + 1)
+        moved = " and ".join(name for name, x in zip(names, is_moved[k], strict=True) if x)
+        value = f"not affine in {moved}: {relative:.2g} of the entry at [{rows[i]}, {rows[j]}]"
+        cure = "let exports differ in this parameter alone"
+        if " and " in moved:
+            cure = "make one parameter of what is multiplied, as EI"
+        is_affine = bool(deviation[i, j] <= allowed[i, j])
+        require(is_affine, f"export {k + 1}", value, "a sum of terms with one parameter each", cure)
+
+    constant = nominal - np.tensordot(values[0] / steps, differences, 1)
+    of_constant = roundings[0] + np.tensordot(np.abs(values[0] / steps), of_differences, 1)
+    constant[np.abs(constant) <= of_constant] = 0.0
+    differences[np.abs(differences) <= of_differences] = 0.0
+    terms: list[tuple[str | float, Array]] = []
+    for name, difference, step in zip(names, differences, steps, strict=True):
+        require(bool(difference.any()), name, "without any effect", "parameters of the matrix")
+        terms.append((name, difference / step))
+    if constant.any():
+        terms.append((1.0, constant))
+    return tuple(terms)
+
+
+def _require_exports(
+    exports: Sequence[tuple[Mapping[str, float], Array]], unknowns: Sequence[str]
+) -> None:
+    """Check that exports have the same parameters and symmetric arrays of one shape.
+
+    Raises:
+        RefusedError: One is of another kind, or there are fewer than three.
+    """
+    require_sequence("exports", exports, "pairs of a dict of parameters and an array")
+    require(len(exports) > 2, "exports", len(exports), "three or more, each with its parameters")
+    names = tuple(exports[0][0])
+    shape = np.shape(exports[0][1])
+    for number, (parameters, array) in enumerate(exports, 1):
+        key = f"export {number}"
+        value = f"of parameters {', '.join(parameters)}"
+        require(set(parameters) == set(names) != set(), key, value, ", ".join(names) or "names")
+        for name, parameter in parameters.items():
+            checked_number(f"{key}: {name}", parameter)
+        is_square = np.shape(array) == shape == shape[:1] * 2 and np.size(array) > 0
+        value = f"of shape {np.shape(array)}"
+        cure = "write all from one model, with the same unknowns"
+        require(is_square, key, value, f"a square array of shape {shape}", cure)
+        require_numbers(key, array)
+        require_symmetric(key, np.asarray(array), unknowns or range(1, len(array) + 1))
+
+
+def _rounding_unit(arrays: Array) -> float:
+    """Return the largest relative rounding of numbers that were printed with as many digits."""
+    numbers = arrays[arrays != 0]
+    sample = numbers[:: len(numbers) // 10000 + 1]
+    digits = 0
+    for number in np.abs(sample):
+        mantissa = np.format_float_scientific(number, trim="-").partition("e")[0]
+        digits = max(digits, len(mantissa.replace(".", "")))
+    unit = 0.5 * 10.0 ** (1 - max(digits, MIN_DIGITS))
+    if np.array_equal(arrays, arrays.astype(np.float32)):  # as binary files of single precision
+        unit = max(unit, 2.0**-24)
+    return max(unit, 2.0**-53)

@@ -1,0 +1,101 @@
+"""A case whose stiffness follows from exports of a program for several parameters."""
+
+import re
+from math import pi
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg
+
+from alphacut import main
+from alphacut.case.content import load
+from tests.frame.structures.test_affine import NOMINAL, beam
+
+CASE = """title = "Cantilever on a spring"
+stages = ["envelope"]
+
+[matrices]
+unknowns = ["2.w", "2.r", "3.w", "3.r", "4.w", "4.r"]
+mass = [["1", "mass.mtx"]]
+stiffness = [
+EXPORTS]
+
+[matrices.parameters]
+E = "210 GPa ± 10 %"
+k = "3.7e6 ± 20 %"
+
+[matrices.outputs]
+tip = { row = { "4.w" = 1.0 }, unit = "m" }
+
+[[force]]
+history = "harmonic, 9 Hz"
+amplitude = { "4.w" = "1 kN" }
+
+[envelope]
+fuzzy = ["E", "k"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.01 s"
+"""
+POINTS = [("210 GPa", 3.7e6), ("420 GPa", 3.7e6), ("315 GPa", 3.7e6), ("210 GPa", 7.4e6),
+          ("210 GPa", 5.5e6), ("300 GPa", 5e6)]  # fmt: skip
+
+
+@pytest.fixture
+def case(tmp_path):
+    """A case with a mass at two of three nodes, and files of nine digits."""
+    mass = np.diag([0, 0, 40.0, 0.5, 60.0, 0.7])
+    scipy.io.mmwrite(tmp_path / "mass.mtx", mass)
+    rows = []
+    for number, (modulus, spring) in enumerate(POINTS):
+        stiffness = beam(1e9 * float(modulus.split()[0]), spring)
+        scipy.io.mmwrite(tmp_path / f"k{number}.mtx", stiffness, precision=9)
+        rows.append(f'{{ file = "k{number}.mtx", E = "{modulus}", k = {spring} }},\n')
+    path = tmp_path / "case.toml"
+    path.write_text(CASE.replace("EXPORTS", "".join(rows)))
+    return path
+
+
+def test_terms_of_exports_stand_in_the_structure(case):
+    model = load(str(case)).content.structure.model
+    assert [factor for factor, _ in model.stiffness] == ["E", "k"]
+    for values in (NOMINAL, {"E": 1.9e11, "k": 4.4e6}):
+        total = sum(values[factor] * array for factor, array in model.stiffness)
+        assert total == pytest.approx(beam(*values.values()), rel=1e-6, abs=1.0)
+
+
+def test_check_tells_unknowns_and_periods(case, capsys):
+    assert main(["check", str(case)]) == 0
+    told = capsys.readouterr().out
+    assert "matrices: 6 unknowns in N, m, kg, s, 2 of them without mass: 2.w, 2.r\n" in told
+    stiffness = beam(*NOMINAL.values())
+    inner = np.linalg.solve(stiffness[:2, :2], stiffness[:2, 2:])
+    condensed = stiffness[2:, 2:] - stiffness[2:, :2] @ inner
+    squares = scipy.linalg.eigh(condensed, np.diag([40, 0.5, 60, 0.7]), eigvals_only=True)
+    line = next(x for x in told.splitlines() if x.startswith("first periods: "))
+    units = {"s": 1.0, "ms": 1e-3, "µs": 1e-6}
+    periods = [x.split() for x in line.removeprefix("first periods: ").split(", ")]
+    found = [float(number) * units[unit] for number, unit in periods]
+    assert found == pytest.approx(2 * pi / np.sqrt(squares), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("k5.mtx", "k0.mtx", r"not affine in E and k: \S+ of the entry at \[2\.w, 2\.w\]"),
+        ("k2.mtx", "k3.mtx", r"not affine in E: \S+ of the entry at \["),
+        ('file = "k3.mtx"', 'name = "k3.mtx"', r"file = \"soft\.mtx\""),
+        ("k = 5500000.0", "kk = 5500000.0", r"export 5 is of parameters E, kk; allowed: E, k"),
+        ("k4.mtx", "mass.mtx", "not affine in k"),
+        ('"4.w", "4.r"]', '"4.w"]', "mass.mtx is 6 × 6"),
+    ],
+)
+def test_exports_of_another_model_are_refused_in_one_line(case, capsys, old, new, message):
+    text = case.read_text()
+    assert old in text
+    case.write_text(text.replace(old, new, 1))
+    assert main(["check", str(case)]) == 2
+    told = capsys.readouterr().err
+    assert sum("not affine" in line for line in told.splitlines()) <= 1
+    assert re.search(message, told), told
