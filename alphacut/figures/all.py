@@ -9,21 +9,22 @@ from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
-from alphacut.figures import answers, envelope, material
+from alphacut.figures import answers, envelope, material, structure
 from alphacut.figures.style import figure_style, save
-from alphacut.frame import Fragility
+from alphacut.frame import Fragility, StoreyFrame
+from alphacut.frame.structures.storey import yields
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 from alphacut.stages.suite import scaled_suite
-from alphacut.stages.summary import Results
+from alphacut.stages.summary import Parts, Results
 
 
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
-    Names are "modulus", "image", "update-inputs", "spectra", the key of each answered question,
-    "fragility-curves", and "envelope-STUDY-OUTPUT" for each drawn output of a study. Figures of the
-    paper have "figNUMBER-" before the name.
+    Names are "modulus", "image", "update-inputs", "structure", "spectra", the key of each answered
+    question, "fragility-curves", and of a study "envelope-STUDY-OUTPUT" for each drawn output,
+    "profile-STUDY" and "loops-STUDY". Figures of the paper have "figNUMBER-" before the name.
 
     Args:
         results: Results of a run; stages that are missing have no figures.
@@ -35,6 +36,9 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         yield "image", material.image(results.image.arrays)
     if results.learned is not None and not results.learned.is_refuted:
         yield "update-inputs", answers.identified_inputs(results.learned)
+    model = None if results.structure is None else results.structure.model
+    if isinstance(model, StoreyFrame):
+        yield "structure", structure.sketch(model)
     if results.suite is not None and results.content.records and results.structure:
         scaled = scaled_suite(results.content.records, results.structure)
         if scaled is not None:
@@ -43,8 +47,16 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         yield key, answers.DRAWINGS[key](answer)
         if isinstance(answer, Fragility) and answer.increments:  # of a frame that yields
             yield "fragility-curves", answers.draw_incremental(answer)
+    units = Parts.of(results).shown_units
     for task in results.tasks:
         yield from envelope.drawings(task, results)
+        peaks = results.envelopes[task.name].numbers.peak
+        profile = structure.profiles(peaks, units)
+        if profile is not None:
+            yield f"profile-{task.name}", profile
+        if yields(model):
+            times = {"duration": task.duration, "step": task.section.step}
+            yield f"loops-{task.name}", structure.loops(model, peaks, **times)
 
 
 def draw_figures(results: Results, store: StageStore) -> list[str]:

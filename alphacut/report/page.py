@@ -19,7 +19,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
 from alphacut.frame import Sensitivity
-from alphacut.frame.analyses.answer import enclosing_box_words
+from alphacut.frame.analyses.answer import enclosing_box_words, table_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
@@ -52,9 +52,12 @@ def render_page(folder: ResultsFolder) -> str:
     summary.require_run_of(folder)
     words = named_words()
     periods = ""
+    storeys = None
     if (frame := summary.structure) is not None:
         # The first four periods show whether the structure is what its author meant.
         periods = ", ".join(f"{2 * math.pi / x:.3g}" for x in frame.omega_rad_per_s[:4])
+        if frame.storeys:
+            storeys = table_of(frame.storeys)
     envelopes: list[Document] = []
     for name, study in summary.envelopes.items():
         dataset = folder.dataset(f"envelope_{name}.nc")
@@ -71,6 +74,7 @@ def render_page(folder: ResultsFolder) -> str:
         tables=tables(summary),
         figures=Figures(summary, folder, words["figures"]),
         periods=periods,
+        storeys=storeys,
         sensitivity=Sensitivity(summary.shares),
         terms=words["terms"] | {str(x).capitalize(): x.sentence for x in Nature},
         versions=Table(("program", "version"), list(summary.versions.items())),
@@ -224,7 +228,7 @@ def caption(name: str, captions: Mapping[str, str]) -> str:
     Args:
         name: Name of the file without its ending. "figNUMBER-" before it gives the number in the
             paper, with which the caption begins. "envelope-STUDY-OUTPUT" is the envelope of an
-            output.
+            output, "profile-STUDY" and "loops-STUDY" are figures of a study.
         captions: Captions of other figures by name, written with hyphens. A figure without an entry
             has its name as its caption, with blanks for the hyphens.
     """
@@ -239,6 +243,11 @@ def caption(name: str, captions: Mapping[str, str]) -> str:
         text = f"Envelope of {output}"
         if study != "all":  # the name of the study that [envelope] alone makes
             text += f", study {study}"
+    elif match := re.fullmatch(r"(profile|loops)-(.+)", rest):
+        # "profile" and "loops" have captions of their own, whatever the study.
+        text = captions[match[1]]
+        if match[2] != "all":
+            text += f", study {match[2]}"
     else:
         text = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
     return number + text

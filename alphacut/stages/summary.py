@@ -18,11 +18,13 @@ from alphacut.frame import (
     Fragility,
     LearnedInputs,
     Probability,
+    StoreyFrame,
     SuitePeaks,
     Tolerances,
 )
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.analyses.limits import LimitResult
+from alphacut.frame.analyses.storey_table import assumptions, storey_table
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
@@ -47,12 +49,16 @@ class FrameResult:
         period_s: First period.
         weight_N: Weight of all floors.
         heights_m: Heights of storeys by the names of the observed drifts.
+        storeys: Texts of each storey of a frame by column, the top one first.
+        assumptions: Sentences on what the model assumes.
     """
 
     omega_rad_per_s: Array
     period_s: float
     weight_N: float
     heights_m: dict[str, float]
+    storeys: list[dict[str, str]] = field(default_factory=list)
+    assumptions: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -113,11 +119,19 @@ class Results:
         omega = frequencies(structure.linear)
         observed = set(structure.outputs)
         heights = {x: height.nominal for x, height in structure.heights.items() if x in observed}
+        described: dict[str, Any] = {}
+        if isinstance(structure.model, StoreyFrame):
+            table = storey_table(structure.model)
+            described = {
+                "storeys": [dict(zip(table.head, row, strict=True)) for row in table.rows],
+                "assumptions": assumptions(structure.model),
+            }
         return FrameResult(
             omega_rad_per_s=omega,
             period_s=float(2 * np.pi / omega[0]),
             weight_N=sum(mass.nominal for mass in structure.floor_masses) * STANDARD_GRAVITY,
             heights_m=heights,
+            **described,
         )
 
     @property
