@@ -7,12 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import (
-    checked_number,
-    require,
-    require_numbers,
-    require_sequence,
-)
+from alphacut.base.errors import require, require_numbers
 from alphacut.frame.structures.matrix import require_symmetric
 
 # Fewer printed digits than these do not tell a rounding from a term that is not affine.
@@ -65,17 +60,16 @@ def affine_terms(
     chosen: list[int] = []
     for k, name in enumerate(names):
         alone = np.flatnonzero(is_moved[:, k] & (is_moved.sum(axis=1) == 1))
-        require(len(alone) >= 2, f"exports that move {name} alone", len(alone), "two or more")
-        steps = values[alone, k] - values[0, k]
+        steps = np.append(values[alone, k] - values[0, k], 0.0)
         far = int(np.abs(steps).argmax())
-        chosen.append(int(alone[far]))
-        # The further export is to tell a straight line from a bent one: it is at neither end.
-        fractions = steps / steps[far]
-        is_told = np.abs(fractions * (1 - fractions)).max() >= MIN_STEP * (1 - MIN_STEP) / 2
-        is_told = is_told and bool(abs(steps[far]) >= MIN_STEP * abs(values[0, k]))
-        value = f"moved to {', '.join(f'{x:g}' for x in values[alone, k])} from {values[0, k]:g}"
+        # A further export tells a straight line from a bent one if it is well inside of its ends.
+        inner = np.abs(steps * (steps[far] - steps)).max()
+        is_told = inner > MIN_STEP / 2 * steps[far] ** 2
+        is_told = is_told and abs(steps[far]) >= MIN_STEP * abs(values[0, k])
+        value = f"moved alone by {', '.join(f'{step:g}' for step in steps[:-1]) or 'none'}"
         cure = "move it by its own size, and once by half of this"
-        require(is_told, name, value, "steps of a tenth or more, well apart", cure)
+        require(is_told, name, value, "two steps of a tenth or more, well apart", cure)
+        chosen.append(int(alone[far]))
     is_joint = len(names) == 1 or bool(is_moved.all(axis=1).any())
     require(
         is_joint, "exports that move all parameters", 0, "one, to see that they do not multiply"
@@ -84,29 +78,35 @@ def affine_terms(
     steps = np.diag(values[chosen] - values[0])
     differences = arrays[chosen] - nominal
     # Each entry is rounded to `unit` of its magnitude by printing, and by what the program adds up.
-    unit = _rounding_unit(arrays)
     diagonal = np.sqrt(np.abs(np.diagonal(arrays, axis1=1, axis2=2)).max(axis=0))
     assembly = ASSEMBLY_ROUNDING * np.outer(diagonal, diagonal)
-    roundings = unit * np.abs(arrays) + assembly
+    roundings = _rounding_unit(arrays) * np.abs(arrays) + assembly
     of_differences = roundings[chosen] + roundings[0]
-    fractions_of_steps = (values - values[0]) / steps
-    for k, fractions in enumerate(fractions_of_steps):
-        deviation = np.abs(arrays[k] - nominal - np.tensordot(fractions, differences, 1))
-        allowed = roundings[k] + roundings[0] + np.tensordot(np.abs(fractions), of_differences, 1)
-        i, j = np.unravel_index(int((deviation - allowed).argmax()), deviation.shape)
-        relative = deviation[i, j] / max(np.abs(arrays[:, i, j]).max(), assembly[i, j])
-        rows = unknowns or range(1, len(nominal) + 1)
-        moved = " and ".join(name for name, x in zip(names, is_moved[k], strict=True) if x)
-        value = f"not affine in {moved}: {relative:.2g} of the entry at [{rows[i]}, {rows[j]}]"
-        cure = "let exports differ in this parameter alone"
-        if " and " in moved:
-            cure = "make one parameter of what is multiplied, as EI"
-        is_affine = bool(deviation[i, j] <= allowed[i, j])
-        require(is_affine, f"export {k + 1}", value, "a sum of terms with one parameter each", cure)
 
-    constant = nominal - np.tensordot(values[0] / steps, differences, 1)
-    of_constant = roundings[0] + np.tensordot(np.abs(values[0] / steps), of_differences, 1)
-    constant[np.abs(constant) <= of_constant] = 0.0
+    def prediction(point: Array) -> tuple[Array, Array]:
+        """Return the affine matrix at a point, and the rounding of its entries."""
+        fractions = (point - values[0]) / steps
+        rounding = roundings[0] + np.tensordot(np.abs(fractions), of_differences, 1)
+        return nominal + np.tensordot(fractions, differences, 1), rounding
+
+    rows = unknowns or range(1, len(nominal) + 1)
+    for k, array in enumerate(arrays):
+        expected, rounding = prediction(values[k])
+        deviation = np.abs(array - expected)
+        excess = deviation - rounding - roundings[k]
+        i, j = np.unravel_index(int(excess.argmax()), excess.shape)
+        relative = deviation[i, j] / max(np.abs(arrays[:, i, j]).max(), assembly[i, j])
+        moved = [name for name, x in zip(names, is_moved[k], strict=True) if x]
+        value = f"not affine in {' and '.join(moved)}:"
+        value += f" {relative:.2g} of the entry at [{rows[i]}, {rows[j]}]"
+        cure = "let exports differ in this parameter alone"
+        if len(moved) > 1:
+            cure = "make one parameter of what is multiplied, as EI"
+        allowed = "a sum of terms with one parameter each"
+        require(bool(excess[i, j] <= 0), f"export {k + 1}", value, allowed, cure)
+
+    constant, rounding = prediction(np.zeros(len(names)))
+    constant[np.abs(constant) <= rounding] = 0.0
     differences[np.abs(differences) <= of_differences] = 0.0
     terms: list[tuple[str | float, Array]] = []
     for name, difference, step in zip(names, differences, steps, strict=True):
@@ -125,19 +125,17 @@ def _require_exports(
     Raises:
         RefusedError: One is of another kind, or there are fewer than three.
     """
-    require_sequence("exports", exports, "pairs of a dict of parameters and an array")
     require(len(exports) > 2, "exports", len(exports), "three or more, each with its parameters")
-    names = tuple(exports[0][0])
+    names = set(exports[0][0])
     shape = np.shape(exports[0][1])
     for number, (parameters, array) in enumerate(exports, 1):
         key = f"export {number}"
         value = f"of parameters {', '.join(parameters)}"
-        require(set(parameters) == set(names) != set(), key, value, ", ".join(names) or "names")
-        for name, parameter in parameters.items():
-            checked_number(f"{key}: {name}", parameter)
+        require(set(parameters) == names != set(), key, value, ", ".join(names) or "names")
+        require_numbers(key, [*parameters.values()])
         is_square = np.shape(array) == shape == shape[:1] * 2 and np.size(array) > 0
-        value = f"of shape {np.shape(array)}"
         cure = "write all from one model, with the same unknowns"
+        value = f"of shape {np.shape(array)}"
         require(is_square, key, value, f"a square array of shape {shape}", cure)
         require_numbers(key, array)
         require_symmetric(key, np.asarray(array), unknowns or range(1, len(array) + 1))
