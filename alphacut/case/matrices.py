@@ -56,7 +56,7 @@ def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
             missing or holds no matrix of this shape, or the matrix is not symmetric or zero.
     """
     match value:
-        case (Monomial() as monomial, array):  # of exports
+        case (Monomial() as monomial, np.ndarray() as array):  # of exports
             return monomial, array
         case [str(factor), str(file)]:
             return Monomial.parse(factor), _array(file, info)

@@ -94,7 +94,7 @@ def affine_terms(
         expected, rounding = prediction(values[k])
         deviation = np.abs(array - expected)
         excess = deviation - rounding - roundings[k]
-        i, j = np.unravel_index(int(excess.argmax()), excess.shape)
+        i, j = divmod(int(excess.argmax()), len(nominal))  # entries are counted row by row
         relative = deviation[i, j] / max(np.abs(arrays[:, i, j]).max(), assembly[i, j])
         moved = [name for name, x in zip(names, is_moved[k], strict=True) if x]
         value = f"not affine in {' and '.join(moved)}:"
@@ -126,12 +126,13 @@ def _require_exports(
         RefusedError: One is of another kind, or there are fewer than three.
     """
     require(len(exports) > 2, "exports", len(exports), "three or more, each with its parameters")
-    names = set(exports[0][0])
+    names = list(exports[0][0])
     shape = np.shape(exports[0][1])
     for number, (parameters, array) in enumerate(exports, 1):
         key = f"export {number}"
         value = f"of parameters {', '.join(parameters)}"
-        require(set(parameters) == names != set(), key, value, ", ".join(names) or "names")
+        is_same = bool(names) and set(parameters) == set(names)
+        require(is_same, key, value, ", ".join(names) or "names")
         require_numbers(key, [*parameters.values()])
         is_square = np.shape(array) == shape == shape[:1] * 2 and np.size(array) > 0
         cure = "write all from one model, with the same unknowns"
