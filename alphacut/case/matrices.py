@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo
+from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, model_validator
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
@@ -71,6 +72,10 @@ def _array(file: str, info: ValidationInfo) -> Array:
     rows = len(unknowns) or MAX_ROWS
     array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
     if unknowns:
+        with suppress(RefusedError):  # of files that name no unknowns
+            context = {} if info.context is None else info.context
+            unnamed = [x for x in read_unknowns(path, name=member) if x not in unknowns]
+            context["unnamed"] = context.get("unnamed", {}) | dict.fromkeys(unnamed)
         _require_shape(path.name, array, rows)
         require_symmetric(path.name, array, unknowns)
     # A term of zeros does nothing: its author meant another array.
@@ -222,6 +227,14 @@ class MatricesSection(StructureSection):
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
+    _unnamed: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _keep_unnamed(self, info: ValidationInfo) -> Self:
+        """Keep the names of unknowns of the files that the case does not name, for a warning."""
+        self._unnamed = tuple((info.context or {}).get("unnamed", ()))
+        return self
+
     @property
     def places(self) -> tuple[str, ...]:
         """Names of the unknowns, on which forces act."""
@@ -287,7 +300,7 @@ class MatricesSection(StructureSection):
         return Structure(model, numbers)
 
     def warnings(self, structure: Structure | None) -> Iterator[str]:
-        """Yield a sentence for each fuzzy parameter that appears in no factor.
+        """Yield sentences on fuzzy parameters in no factor, and on unknowns that are not named.
 
         Args:
             structure: The structure, which is not looked at.
@@ -297,6 +310,9 @@ class MatricesSection(StructureSection):
             used.update(dict(factor.powers))
         for output in self.outputs.values():
             used.update(dict(output.factor.powers))
+        if names := self._unnamed:
+            shown = ", ".join(names[:6])
+            yield f"{len(names)} unknowns of the files are not named, and so are held: {shown}"
         for name, number in self.parameters.items():
             if number.support.width > 0 and name not in used:
                 yield f"matrices.parameters.{name} is in no factor: is a name misspelt?"

@@ -99,3 +99,31 @@ def test_exports_of_another_model_are_refused_in_one_line(case, capsys, old, new
     told = capsys.readouterr().err
     assert sum("not affine" in line for line in told.splitlines()) <= 1
     assert re.search(message, told), told
+
+
+def test_unknowns_that_are_not_named_are_told(case, capsys):
+    folder = case.parent
+    stiffness = beam(*NOMINAL.values())
+    names = [(node, direction) for node in (2, 3, 4) for direction in (2, 6)]
+    entries = [
+        f"{n},{i}, {m},{j}, {stiffness[row, column]:.12e}\n"
+        for row, (n, i) in enumerate(names)
+        for column, (m, j) in enumerate(names[: row + 1])
+    ]
+    (folder / "job_STIF1.mtx").write_text("".join(entries))
+    text = case.read_text()
+    begin, end = text.index("unknowns = "), text.index("[matrices.parameters]")
+    keys = """unknowns = UNKNOWNS
+mass = [["7800", "job_STIF1.mtx"]]
+stiffness = [["E", "job_STIF1.mtx"]]
+
+"""
+    text = (text[:begin] + keys + text[end:]).replace("4.w", "4.2").replace('"E", "k"', '"E"')
+    told = {}
+    for unknowns in ('"job_STIF1.mtx"', '["4.2", "4.6", "3.2"]'):
+        case.write_text(text.replace("UNKNOWNS", unknowns))
+        assert main(["check", str(case)]) == 0
+        told[unknowns] = capsys.readouterr().out
+    assert [("not named" in words) for words in told.values()] == [False, True]
+    line = "warning: 3 unknowns of the files are not named, and so are held: 2.2, 2.6, 3.6\n"
+    assert line in told['["4.2", "4.6", "3.2"]']
