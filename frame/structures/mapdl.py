@@ -6,6 +6,7 @@ all of these are checked here before. The items of the heads are those of Ansys'
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,9 @@ def read_full(path: Path, content: bytes, *, member: str, max_rows: int) -> Name
         from ansys.mapdl.reader.full import FullFile
     directions = _require_sound(path.name, content, max_rows=max_rows)
     full = FullFile(path)
-    unknowns, *triangles = full.load_km(sort=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the matrix that a file has not, and nobody asks for
+        unknowns, *triangles = full.load_km(sort=False)
     require(triangles[place] is not None, path.name, f"without {member}", "a run that makes it")
     array = triangles[place].toarray()
     array += np.triu(array, 1).T
