@@ -13,13 +13,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self, cast
 
-from pydantic import PlainValidator
+from pydantic import Field, PlainValidator
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.structure import Structure
 from alphacut.case.types import NotEmpty, Quantity, Section
 from alphacut.frame import Limit
+from alphacut.frame.analyses.damage_states import require_states
 from alphacut.frame.analyses.limits import Side, limits_by_name, require_fragile
 from alphacut.frame.structures.quantities import OUTPUTS, Output
 from alphacut.frame.structures.storey import yields
@@ -283,6 +284,8 @@ def _naming(key: str) -> Iterator[None]:
         name = error.key
         if name == "limits" or name.startswith("limit of"):
             name = key
+        if name == "states":
+            name = "fragility.states"
         raise RefusedError(name, error.value, error.allowed, error.cure) from None
 
 
@@ -338,6 +341,11 @@ class FragilitySection(QuestionSection):
     key = "fragility"
     reads_peaks = True
 
+    limits: tuple[AnyLimit, ...] = ()
+    """limits of outputs, as of [decision]; or states"""
+    states: dict[str, Limits] = Field(default_factory=dict)
+    """in place of limits: those of damage states by name, from the slightest on, as
+    'slight = ["drift <= 0.5 %"]'; a state begins with the first of its limits in any storey"""
     measure: Literal["Sa(T1)", "PGA", "scale"] = "Sa(T1)"
     """measure of a record; Sa(T1) is the pseudo-acceleration `ω² max |u|` at the nominal
     structure's first period, with its own damping ratio (not 5 %)"""
@@ -347,6 +355,24 @@ class FragilitySection(QuestionSection):
     """of columns that yield: largest measure tried, as a multiple of the one at which the nominal
     structure would reach all limits under all records if it were elastic"""
 
+    def require_consistent(self) -> None:
+        """Refuse limits beside states, and neither of them."""
+        super().require_consistent()
+        value = "beside states" if self.limits else None
+        is_one = bool(self.limits) != bool(self.states)
+        require(is_one, "fragility.limits", value, "limits, or the limits of states")
+
+    def with_storeys(self, structure: Structure) -> Self:
+        """Return the section with each limit of every storey as one limit for each storey.
+
+        The limits of the states are among them, each with its state as its event.
+        """
+        limits = list(super().with_storeys(structure).limits)
+        for name, members in self.states.items():
+            of_storeys = (x for limit in members for x in limit.by_storey(structure))
+            limits += [replace(limit, event=name) for limit in of_storeys]
+        return self.model_copy(update={"limits": tuple(limits)})
+
     def require_answerable(self, structure: Structure) -> None:
         """Refuse a structure and limits of which no fragility can be computed.
 
@@ -355,12 +381,15 @@ class FragilitySection(QuestionSection):
 
         Raises:
             RefusedError: The structure has forces or does not start at rest; a limit does not fit
-                it, or does not limit a magnitude; or `most`, the largest intensity tried, is stated
-                though no columns yield.
+                it, or does not limit a magnitude; the states do not rise; or `most`, the largest
+                intensity tried, is stated though no columns yield.
         """
         super().require_answerable(structure)
         with _naming("fragility.limits"):
-            require_fragile(structure.model, self.limits_of(structure))
+            limits = self.limits_of(structure)
+            require_fragile(structure.model, limits)
+            if self.states:
+                require_states(list(self.states), limits_by_name(limits, ()))
         # Peaks of elastic columns are proportional to the record: no intensities are tried.
         is_used = yields(structure.model) or not self.has_key("most")
         require(is_used, "fragility.most", self.most, "beside columns that yield")

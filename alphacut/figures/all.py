@@ -23,8 +23,9 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
     Names are "modulus", "image", "update-inputs", "structure", "spectra", the key of each answered
-    question, "fragility-curves", and of a study "envelope-STUDY-OUTPUT" for each drawn output,
-    "profile-STUDY" and "loops-STUDY". Figures of the paper have "figNUMBER-" before the name.
+    question, "fragility-curves", "damage-states", and of a study "envelope-STUDY-OUTPUT" for each
+    drawn output, "profile-STUDY" and "loops-STUDY". Figures of the paper have "figNUMBER-" before
+    the name.
 
     Args:
         results: Results of a run; stages that are missing have no figures.
@@ -47,6 +48,8 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         yield key, answers.DRAWINGS[key](answer)
         if isinstance(answer, Fragility) and answer.increments:  # of a frame that yields
             yield "fragility-curves", answers.draw_incremental(answer)
+        if isinstance(answer, Fragility) and answer.states:
+            yield "damage-states", answers.draw_states(answer)
     units = Parts.of(results).shown_units
     for task in results.tasks:
         yield from envelope.drawings(task, results)

@@ -8,12 +8,14 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from scipy.special import ndtr
 
 from alphacut.base.arrays import Array
-from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.number_text import STANDARD_GRAVITY, engineering
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
 from alphacut.frame import (
@@ -259,6 +261,45 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
     axes.set_title(part.words.replace("^2", "²"))
     axes.set_ylabel("fraction of records")
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+
+
+def draw_states(answer: Fragility) -> Figure:
+    """Draw all damage states over the intensity measure, each in a colour.
+
+    Of each state there are the band of the fraction of records on the lowest level, and for the
+    highest level the first crossings of the records as points and the lognormal fit as a line.
+
+    Args:
+        answer: Fragility with damage states.
+    """
+    figure, axes = plt.subplots()
+    parts = [answer.limits[state] for state in answer.states]
+    top = max(float(part.measure[-1]) for part in parts)
+    axes.set(xlim=(0.0, top), ylim=(0.0, 1.02))
+    style.prefix_axis(axes, answer.measure, answer.unit, across=True)
+    colours = colormaps["viridis_r"](np.linspace(0.15, 0.95, len(parts)))
+    for part, colour in zip(parts, colours, strict=True):
+        band: Look = {"color": colour, "alpha": 0.25, "lw": 0, "step": "post"}
+        axes.fill_between(part.measure, part.band.lower[0], part.band.upper[0], **band)
+        low, high = part.critical.first_crossings
+        # Records that do not bring the state are missing at the upper end.
+        crossings = np.sort(np.sqrt(low[-1] * high[-1]))
+        fractions = np.arange(1, len(crossings) + 1) / len(crossings)
+        axes.plot(crossings, fractions, color=colour, ls="none", marker="o", ms=3)
+        fit = part.critical.fits(-1)[0]
+        label = part.words
+        if np.isfinite(fit).all() and fit.dispersion > 0:
+            x = np.linspace(top / 400, top, 400)
+            axes.plot(x, ndtr(np.log(x / fit.median) / fit.dispersion), color=colour, lw=1.8)
+            label += f": θ = {engineering(fit.median, answer.unit)}, β = {fit.dispersion:.2f}"
+        axes.plot([], [], color=colour, lw=1.8, label=label.replace("^2", "²"))
+    axes.set_title(
+        f"damage states under {len(crossings)} records, α = {answer.alpha[-1]:g};"
+        f" bands: α = {answer.alpha[0]:g}"
+    )
+    axes.set_ylabel("fraction of records")
+    axes.legend(loc="lower right")
+    return figure
 
 
 def draw_spectra(scaled: ScaledSuite) -> Figure:

@@ -57,6 +57,8 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
     if parts.fragility is not None and parts.fragility.increments:
         found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
         found["fragility_curves"] = pd.DataFrame(parts.fragility.curves())
+    if parts.fragility is not None and parts.fragility.has_pelicun_table:
+        found["pelicun"] = pd.DataFrame(parts.fragility.pelicun())
     for answer in parts.answers:
         found[answer.key] = rows_of(answer)
     return found

@@ -181,6 +181,7 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
         alpha=response.task.section.alpha,
         suite=response.suite,
         increments=response.increments,
+        states=tuple(section.states),
     )
 
 

@@ -76,10 +76,7 @@ class Answer(ABC):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the rows of numbers to a CSV file, with all digits and in SI units."""
-        rows = self.records()
-        # An empty cell is an unknown number in every spreadsheet.
-        cells = [["" if x is None else str(x) for x in row.values()] for row in rows]
-        Path(path).write_text(csv_text(_titles(rows), cells), encoding="utf-8")
+        Path(path).write_text(records_csv(self.records()), encoding="utf-8")
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the rows of numbers of the result as an xarray dataset.
@@ -101,6 +98,13 @@ class Answer(ABC):
             is_text = any(isinstance(value, str) for value in column)
             variables[title] = ("row", np.array(column, str if is_text else float))
         return xarray.Dataset(variables, attrs={"title": self.title, "notes": self.all_words()})
+
+
+def records_csv(rows: Sequence[Record]) -> str:
+    """Return rows of numbers and texts, with the same columns, as the text of a CSV file."""
+    # An empty cell is an unknown number in every spreadsheet.
+    cells = [["" if x is None else str(x) for x in row.values()] for row in rows]
+    return csv_text(_titles(rows), cells)
 
 
 def _titles(rows: Sequence[Record]) -> list[str]:

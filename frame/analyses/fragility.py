@@ -20,7 +20,8 @@ fit, are written by `alphacut/report/tables.py`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -28,7 +29,15 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
 from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.answer import Answer, Record, known, records_csv, table_of
+from alphacut.frame.analyses.damage_states import (
+    LognormalFit,
+    fits_between,
+    limits_of_states,
+    lognormal_fit,
+    pelicun_rows,
+    require_states,
+)
 from alphacut.frame.analyses.incremental import (
     GRID_RATIO,
     RESOLUTION,
@@ -74,6 +83,9 @@ class CriticalMeasures:
         high_reached: A structure of the cut is known not to exceed the limit up to this measure.
         high: Every structure of the cut exceeds the limit above this measure; infinite if the
             smallest peak may be zero.
+        crossed: Every structure of the cut has exceeded the limit at this measure or below;
+            `high` if it is not given. The range from `low` to it is that of the first crossings.
+        largest: Largest measure that was tried; infinite for a linear structure.
 
     Raises:
         RefusedError: A measure is not positive, or an attained value lies outside its bounds.
@@ -83,6 +95,8 @@ class CriticalMeasures:
     low_reached: Array
     high_reached: Array
     high: Array
+    crossed: Array | None = None
+    largest: float = np.inf
 
     def __post_init__(self) -> None:
         """Make unknown measures infinite, and check that `low` ≤ reached ≤ `high` and `low` > 0.
@@ -96,9 +110,11 @@ class CriticalMeasures:
             RefusedError: A measure is not positive, or an attained one lies outside its bounds by
                 more than a relative rounding of 1e-9.
         """
-        for end in fields(self):
-            values = getattr(self, end.name)
-            object.__setattr__(self, end.name, np.where(np.isnan(values), np.inf, values))
+        if self.crossed is None:
+            object.__setattr__(self, "crossed", self.high)
+        for end in ("low", "low_reached", "high_reached", "high", "crossed"):
+            values = getattr(self, end)
+            object.__setattr__(self, end, np.where(np.isnan(values), np.inf, values))
         # Ends that agree but for rounding are accepted. They are checked because results are read
         # back from files, too.
         reached = np.stack([self.low_reached, self.high_reached])
@@ -186,15 +202,19 @@ class CriticalMeasures:
             # which some structure keeps it. argmax gives the first true entry of a mask.
             crossing = np.where(by_some.any(axis=1), by_some.argmax(axis=1), count)
             after_last = count - (~by_all)[:, ::-1].argmax(axis=1)
+            # At the first measure at which all structures exceed it, each has its first crossing.
+            crossed = np.where(by_all.any(axis=1), by_all.argmax(axis=1), count)
             ends = (
                 record.measure[crossing - 1],
                 measure_or_infinite[crossing],
                 np.where(after_last == count, np.inf, record.measure[after_last - 1]),
                 measure_or_infinite[after_last],
+                measure_or_infinite[crossed],
             )
             of_records.append(ends)
-        low, low_reached, high_reached, high = np.moveaxis(np.array(of_records), 0, -1)
-        return cls(low, low_reached, high_reached, high)
+        # All records are tried up to the same measure.
+        ends_of_records = np.moveaxis(np.array(of_records), 0, -1)  # (ends, levels, records)
+        return cls(*ends_of_records, largest=float(records[0].measure[-1]))
 
     @classmethod
     def of_any(cls, limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
@@ -239,33 +259,65 @@ class CriticalMeasures:
         return Ends(np.median(self.low, axis=1), np.median(self.high, axis=1))
 
     @property
-    def lognormal_median(self) -> Ends:
-        """Bounds of the median of the lognormal fit, exp of the mean logarithm, (levels,) each."""
-        low = np.log(self.low)
-        high = np.log(self.high)
-        return Ends(np.exp(low.mean(axis=1)), np.exp(high.mean(axis=1)))
+    def first_crossings(self) -> Ends:
+        """Bounds of the smallest measure at which a structure exceeds the limit, (levels, records).
 
-    @property
-    def dispersion(self) -> Ends:
-        """Bounds of the standard deviation of the logarithms of critical measures over the records.
+        They are infinite where no structure, or not every structure, is known to exceed it up to
+        the largest measure that was tried.
+        """
+        assert self.crossed is not None  # set at the start
+        return Ends(np.where(self.low < self.largest, self.low, np.inf), self.crossed)
+
+    def lognormal_range(self) -> tuple[Ends, Ends | None]:
+        """Return ranges of median and dispersion of lognormal fits to the first crossings.
+
+        On a level on which each structure is known to exceed the limit under all records, or of a
+        linear structure, they are bounds for each structure of the cut, with the guarantee of the
+        crossings. On other levels they are estimates, see `fits_between`.
+
+        Returns:
+            Ranges of the median and of the dispersion, shape (levels,) each; no dispersion of a
+            single record.
+        """
+        low, high = self.first_crossings
+        if low.shape[1] == 1:
+            return Ends(low[:, 0], high[:, 0]), None
+        median = Ends(np.exp(np.log(low).mean(axis=1)), np.exp(np.log(high).mean(axis=1)))
+        dispersion = self._dispersion(low, high)
+        is_censored = np.isinf(high).any(axis=1)
+        if np.isfinite(self.largest) and is_censored.any():
+            estimates = fits_between(low, high, self.largest)
+            for ends, estimated in zip((median, dispersion), estimates, strict=True):
+                ends.lower[is_censored] = estimated.lower[is_censored]
+                ends.upper[is_censored] = estimated.upper[is_censored]
+        return median, dispersion
+
+    def fits(self, level: int) -> tuple[LognormalFit, LognormalFit]:
+        """Return lognormal fits to the lower and to the upper ends of the first crossings."""
+        low, high = self.first_crossings
+        return lognormal_fit(low[level], self.largest), lognormal_fit(high[level], self.largest)
+
+    @staticmethod
+    def _dispersion(low: Array, high: Array) -> Ends:
+        """Bounds of the standard deviation of the logarithms of measures over the records.
 
         They hold for each structure of the α-cut, shape (levels,) each. On a level with an
-        infinite critical measure they are 0 and +∞.
+        infinite measure they are 0 and +∞.
 
-        Raises:
-            RefusedError: There is only one record.
+        Args:
+            low: Lower ends of the measures, shape (levels, records), two records or more.
+            high: Upper ends.
         """
-        n_records = self.low.shape[1]
-        require(n_records > 1, "records", value=n_records, allowed="two records or more")
-        low = np.log(self.low)
-        high = np.log(self.high)
+        n_records = low.shape[1]
+        low = np.log(low)
+        high = np.log(high)
         # Let x be the logarithms, z the midpoints of their intervals and r the radii. The standard
         # deviation is the norm of x minus its mean over √(n - 1). Subtracting the mean is a
         # projection, which lengthens no vector, so that the standard deviations of x and z differ
         # by at most |x - z| / √(n - 1) ≤ |r| / √(n - 1). Without a finite end nothing is known.
         with np.errstate(invalid="ignore"):
             deviation = ((low + high) / 2).std(axis=1, ddof=1)
-        distance = np.linalg.norm((high - low) / 2, axis=1) / np.sqrt(n_records - 1)
+            distance = np.linalg.norm((high - low) / 2, axis=1) / np.sqrt(n_records - 1)
         is_known = np.isfinite(distance)
         lower = np.where(is_known, np.maximum(deviation - distance, 0.0), 0.0)
         return Ends(lower, np.where(is_known, deviation + distance, np.inf))
@@ -320,9 +372,9 @@ class LimitFragility(LimitResult):
         band: Lower and upper bound of the fraction of the records under which a structure exceeds
             the limit, shape (levels, measures) each. They hold for each structure of the α-cut.
         median: Bounds of the sample median of the critical measures, shape (levels,) each.
-        lognormal_median: Bounds of the median of the lognormal fit, shape (levels,) each.
-        dispersion: Bounds of the standard deviation of the logarithms of the critical measures,
-            shape (levels,) each; None for a single record.
+        lognormal_median: Range of the median of the lognormal fit, shape (levels,) each.
+        dispersion: Range of the dispersion of the lognormal fit, shape (levels,) each; None for a
+            single record. Both are bounds or estimates, see `CriticalMeasures.lognormal_range`.
         confidence: Limits of the fraction with a confidence of 95 % if the records are independent
             draws (Clopper and Pearson 1934), shape (levels, measures) each; None if they are not.
     """
@@ -337,34 +389,25 @@ class LimitFragility(LimitResult):
     confidence: Ends | None
 
     def lognormal_fit(self, level: int) -> list[Array]:
-        """Return the lognormal distribution functions fitted to both ends of the critical measures.
+        """Return the lognormal distribution functions fitted to both ends of the first crossings.
 
-        A function has the mean and the standard deviation of the logarithms of the critical
-        measures of all records.
+        See `alphacut.frame.analyses.damage_states.lognormal_fit`.
 
         Args:
             level: Index of the level.
 
         Returns:
             Values at the intensity measures `self.measure`, shape (measures,), for the lower ends
-            and then for the upper ends; once if the ends agree. Ends of which one is infinite, or
-            that are all equal, have no fit and are left out, so that the list may be empty.
+            and then for the upper ends; once if the fits agree. Ends that are all equal or mostly
+            infinite have no fit and are left out, so that the list may be empty.
         """
         from scipy.special import ndtr
 
-        low = self.critical.low[level]
-        high = self.critical.high[level]
-        curves = []
         # The ends agree on a level where the inputs are crisp; one curve is drawn then.
-        ends = [low, high]
-        if np.array_equal(low, high):
-            ends = [low]
-        for end in ends:
-            logarithms = np.log(end)
-            if np.isfinite(end).all() and np.ptp(logarithms) > 0:
-                # The fit has the mean and the standard deviation of the logarithms of the sample.
-                deviation = logarithms.std(ddof=1)
-                curves.append(ndtr((np.log(self.measure) - logarithms.mean()) / deviation))
+        curves = []
+        for fit in dict.fromkeys(self.critical.fits(level)):
+            if np.isfinite(fit).all() and fit.dispersion > 0:
+                curves.append(ndtr(np.log(self.measure / fit.median) / fit.dispersion))
         return curves
 
 
@@ -380,6 +423,7 @@ class Fragility(Answer):
         damping_ratio: Damping ratio of the first mode.
         limits: Fragility of each limit by its name, then of each event of several limits.
         increments: Demands over the measure of each record by its name, for a frame that yields.
+        states: Names of the damage states, from the slightest on; each is an event in `limits`.
     """
 
     key = "fragility"
@@ -391,27 +435,31 @@ class Fragility(Answer):
     damping_ratio: float
     limits: dict[str, LimitFragility]
     increments: dict[str, Increments] = field(default_factory=dict)
+    states: tuple[str, ...] = ()
 
     def table(self) -> Table:
         """Return a table of texts with a row for each limit and for each event of several limits.
 
         The columns are the limit; the median of the critical measures at the lowest level, for a
         frame that yields with the ranges over the records; the guarantee; median and dispersion of
-        the lognormal fit at the lowest level; and the median at the highest level.
+        the lognormal fit at the lowest level; and the median at the highest level. Of damage states
+        there are rows of the states alone, with the fit beside the median and at both levels.
         """
         rows = []
         for part in self.limits.values():
-            fit = f"median {_level_text(part.lognormal_median, 0, self.unit)}"
-            if part.dispersion is not None:
-                fit += f", dispersion {_level_text(part.dispersion, 0, '')}"
+            if self.states and part.event_name:
+                continue
             row = {
                 "limit": part.words,
                 "median at the lowest α": self._median_text(part, 0),
                 "nature": self.nature_text(part.nature),
-                "lognormal fit at the lowest α": fit,
+                "lognormal fit at the lowest α": self._fit_text(part, 0),
                 "median at the highest α": self._median_text(part, -1),
             }
-            if self.increments:
+            if self.states:
+                row["median at the lowest α"] += f"; lognormal {self._fit_text(part, 0)}"
+                row["lognormal fit at the highest α"] = self._fit_text(part, -1)
+            elif self.increments:
                 row["median at the lowest α"] += f"; over the records {self._crossings_text(part)}"
             rows.append(row)
         return table_of(rows)
@@ -431,6 +479,13 @@ class Fragility(Answer):
         # Engineers state accelerations in g.
         in_g = _level_text(part.median, level, "g", unit_size=STANDARD_GRAVITY)
         return f"{text} ({in_g})"
+
+    def _fit_text(self, part: LimitFragility, level: int) -> str:
+        """Return the ranges of median and dispersion of the lognormal fit on a level as text."""
+        text = f"median {_level_text(part.lognormal_median, level, self.unit)}"
+        if part.dispersion is not None:
+            text += f", dispersion {_level_text(part.dispersion, level, '')}"
+        return text
 
     def _crossings_text(self, part: LimitFragility) -> str:
         """Return the ranges over the records of first crossing and last non-exceedance as text.
@@ -556,6 +611,46 @@ class Fragility(Answer):
                 rows += curve_rows(head, self.alpha, measure=measure, demands=demands)
         return rows
 
+    @property
+    def has_pelicun_table(self) -> bool:
+        """Whether there are damage states over a measure that Pelicun has as a demand."""
+        return bool(self.states) and self.measure != "scale"
+
+    def pelicun(self, component: str = "structure") -> list[Record]:
+        """Return the damage states as rows of a table of damage models of Pelicun 3.10.
+
+        There are three components: one with the fits on the highest level (of both ends of the
+        measures their geometric and arithmetic mean), and the weakest and the strongest one on the
+        lowest level, with fits to all lower and to all upper ends. Medians are in g. A component
+        of which a state has no fit is marked as incomplete.
+
+        Args:
+            component: Name of the first component.
+
+        Raises:
+            RefusedError: There are no damage states, the measure is the scale of the records, or
+                the name has a hyphen.
+        """
+        # Pelicun splits names at hyphens into levels of an index.
+        is_name = "-" not in component
+        require(is_name, "component", value=component, allowed="a name without hyphens")
+        require(bool(self.states), "Pelicun's table", value="without states", allowed="states")
+        components: dict[str, dict[str, LognormalFit]] = {}
+        for state in self.states:
+            critical = self.limits[state].critical
+            low, high = critical.fits(-1)
+            median = float(np.sqrt(low.median * high.median))
+            middle = LognormalFit(median, (low.dispersion + high.dispersion) / 2)
+            weakest, strongest = critical.fits(0)
+            components.setdefault(component, {})[state] = middle
+            components.setdefault(f"{component}.weakest", {})[state] = weakest
+            components.setdefault(f"{component}.strongest", {})[state] = strongest
+        return pelicun_rows(components, self.measure, self.period_s)
+
+    def to_pelicun(self, path: str | Path, component: str = "structure") -> None:
+        """Write the rows of `pelicun` to a CSV file."""
+        Path(path).write_text(records_csv(self.pelicun(component)), encoding="utf-8")
+
     def words(self) -> str:
         """Return sentences that explain the result to its reader.
 
@@ -594,6 +689,23 @@ class Fragility(Answer):
                 " For each structure within the α-cut, the fraction of this suite's records under"
                 " which it exceeds the limit lies in the band."
                 " This is damage limitation of a linear structure, not collapse."
+            )
+        if self.states:
+            text += (
+                f" A damage state ({', '.join(self.states)}) begins with the first of its limits,"
+                " under each record at its first crossing; α is that of the inputs' tolerances."
+            )
+        # Where a record does not bring a limit, its crossing is censored.
+        censored = [
+            f"{part.words}: {np.isinf(part.critical.first_crossings.upper[0]).sum()}"
+            for part in self.limits.values()
+            if np.isinf(part.critical.first_crossings.upper[0]).any() and not part.event_name
+        ]
+        if censored and self.increments:
+            text += (
+                " Under some records not every structure exceeds a limit at any measure tried"
+                f" ({'; '.join(censored)} of {len(self.increments)} records); they count as"
+                " censored, and the fit has the largest likelihood (Baker 2015)."
             )
         if any(part.confidence for part in self.limits.values()):
             text += " Dashed: pointwise 95 % limits, if the records are independent draws."
@@ -638,11 +750,12 @@ def fragility(
     model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
     suite: Sequence[Accelerogram],
-    limits: Limit | Sequence[Limit],
+    limits: Limit | Sequence[Limit] = (),
     *,
     duration: float,
     step: float,
     alpha: Sequence[float] = ALPHA,
+    states: Mapping[str, Limit | Sequence[Limit]] | None = None,
     intensity: str = "Sa(T1)",
     independent: bool = False,
     most: float = 2.0,
@@ -660,6 +773,8 @@ def fragility(
         duration: Longest response, in s; a response ends five natural periods after its record.
         step: Distance of the time nodes, in s.
         alpha: Levels.
+        states: Limits of damage states by name, from the slightest state on, in place of `limits`.
+            A state begins with the first of its limits.
         intensity: Intensity measure of a record: "Sa(T1)", "PGA" or "scale".
         independent: Whether the records are independent draws, for 95 % limits.
         most: For a frame that yields: largest measure that is tried, as a multiple of the measure
@@ -672,6 +787,9 @@ def fragility(
             an argument is out of range.
         FailedError: No bounds are found for a record, or a time step did not converge.
     """
+    if states:
+        require(not limits, "limits", value="beside states", allowed="one of them")
+        limits = limits_of_states(states)
     named = limits_by_name(limits, ())
     require_fragile(model, list(named.values()))
     require_choice("intensity", intensity, MEASURES)
@@ -706,16 +824,17 @@ def fragility(
         alpha=alpha,
         suite=peaks,
         increments=increments,
+        states=tuple(states or ()),
     )
 
 
 def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:
-    """Return the names of the limits of each event of several limits, by the event's name."""
+    """Return the names of the limits of each event by its name, such as a damage state."""
     events: dict[str, list[str]] = {}
     for name, limit in limits.items():
         if limit.event:
             events.setdefault(limit.event, []).append(name)
-    return {event: names for event, names in events.items() if len(names) > 1}
+    return events
 
 
 def incremental_analyses(
@@ -805,6 +924,7 @@ def fragility_of(
     alpha: Sequence[float],
     suite: SuitePeaks | None = None,
     increments: Mapping[str, Increments] | None = None,
+    states: tuple[str, ...] = (),
 ) -> Fragility:
     """Return the fragility from the peaks over a suite, or from the increments of a yielding frame.
 
@@ -816,7 +936,13 @@ def fragility_of(
         alpha: Levels.
         suite: Peaks under each record. They are not needed if increments are given.
         increments: Demands over the measure of each record, for a frame that yields.
+        states: Names of the damage states, from the slightest on; each limit has one as its event.
+
+    Raises:
+        RefusedError: States do not fit, see `require_states`.
     """
+    if states:
+        require_states(states, limits)
     events = events_of(limits)
     demands = list((increments or {}).values())
     critical: dict[str, CriticalMeasures] = {}
@@ -866,6 +992,7 @@ def fragility_of(
         damping_ratio=mode.ratio,
         limits=parts,
         increments=dict(increments or {}),
+        states=states,
     )
 
 
@@ -893,13 +1020,12 @@ def _limit_fragility(
             the fraction are None. The dispersion is None if there is a single record.
     """
     n_records = critical.low.shape[1]
-    confidence = dispersion = None
+    confidence = None
     if independent:
         # The probability of a miss is divided between both limits.
         tail = (1 - CONFIDENCE) / 2
         confidence = clopper_pearson(counts.lower, counts.upper, n_records, tail)
-    if n_records > 1:
-        dispersion = critical.dispersion
+    lognormal_median, dispersion = critical.lognormal_range()
     return LimitFragility(
         **vars(about),
         nature=nature,
@@ -907,14 +1033,19 @@ def _limit_fragility(
         measure=measure,
         band=Ends(counts.lower / n_records, counts.upper / n_records),
         median=critical.median,
-        lognormal_median=critical.lognormal_median,
+        lognormal_median=lognormal_median,
         dispersion=dispersion,
         confidence=confidence,
     )
 
 
 def event_words(event: str) -> str:
-    """Return the text of an event of the limits of all storeys: "drift ≤ 1 % everywhere"."""
+    """Return the text of an event of the limits of all storeys: "drift ≤ 1 % everywhere".
+
+    A damage state is its own text.
+    """
+    if "=" not in event:
+        return event
     return f"{event.replace('<=', '≤').replace('>=', '≥')} everywhere"
 
 

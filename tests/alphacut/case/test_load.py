@@ -241,6 +241,44 @@ def test_fragility_of_columns_that_yield_is_of_magnitudes_and_has_a_largest_meas
         assert re.search(r"fragility\.(most|limits)", line)
 
 
+SLIGHT = "slight = ['drift <= 0.5 %']"
+
+
+def test_damage_states_take_the_place_of_limits_and_rise(tmp_path):
+    """Each storey's limits belong to their state; other states are refused in one line."""
+    no_limits = "fragility.limits=[]"
+
+    def states(*others):
+        return f"fragility.states={{ {', '.join([SLIGHT, *others])} }}"
+
+    content = load(
+        ROOT / "cases/suite.toml",
+        [no_limits, states("worse = ['drift <= 1 %', 'a4 <= 0.6 g']")],
+    ).content
+    limits = content.questions["fragility"].limits_of(content.structure)
+    assert [(x.output, x.event) for x in limits] == [
+        *((f"drift{storey}", "slight") for storey in (1, 2, 3, 4)),
+        *((f"drift{storey}", "worse") for storey in (1, 2, 3, 4)),
+        ("a4", "worse"),
+    ]
+    for changes, words in (
+        ([states()], "fragility.limits is beside states"),
+        ([no_limits], "fragility.limits is missing"),
+        ([no_limits, states("worse = ['drift3 <= 0.4 %']")], "fragility.states is drift3"),
+        ([no_limits, states("Slight = ['drift <= 1 %']")], "fragility.states is Slight"),
+        ([no_limits, states("worse = ['drift9 <= 4 %']")], "drift9"),
+        ([no_limits, states("worse = []")], "worse"),
+    ):
+        (line,) = refusals(ROOT / "cases/suite.toml", *changes)
+        assert words in line
+    text = (ROOT / "cases/suite.toml").read_text(encoding="utf-8")
+    twice = tmp_path / "twice.toml"
+    state = "x = ['drift <= 1 %']\n"
+    twice.write_text(f"{text}[fragility.states]\n{state}{state}", encoding="utf-8")
+    (line,) = refusals(twice)
+    assert "twice.toml" in line
+
+
 MATRICES = """
 title = "Two storeys as matrices"
 stages = ["envelope"]

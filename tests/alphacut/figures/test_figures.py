@@ -177,6 +177,25 @@ def test_every_limit_of_a_fragility_is_drawn_with_its_fit_and_the_highest_level_
         assert styles.count(":") in (1, 2)
 
 
+def test_damage_states_share_a_figure_with_the_crossings_of_the_records(rng):
+    suite = [Accelerogram(0.02, rng.normal(size=40), name=f"r{x}") for x in range(3)]
+    frame = StoreyFrame([2e4], stiffness=[8e6], damping_ratio=0.05)
+    states = {"slight": Limit("drift1", 0.01), "severe": Limit("drift1", 0.02)}
+    times = {"duration": 1.0, "step": 0.02, "alpha": (0, 1), "intensity": "PGA"}
+    answer = fragility(frame, {"k1": Triangular(7.5e6, 8e6, 8.5e6)}, suite, states=states, **times)
+    with figure_style():
+        (axes,) = answers.draw_states(answer).axes
+    points, fit, _, of_severe, *_ = axes.lines
+    crossings = np.sort(answer.limits["slight"].critical.low[-1])
+    assert points.get_xdata() == pytest.approx(crossings, rel=0.01)
+    # Twice the limit of a linear frame is exceeded at twice the measure.
+    assert of_severe.get_xdata() == pytest.approx(2 * points.get_xdata(), rel=0.02)
+    median = float(answer.limits["slight"].lognormal_median.lower[-1])
+    assert np.interp(0.5, fit.get_ydata(), fit.get_xdata()) == pytest.approx(median, rel=0.02)
+    texts = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert [text.split(":")[0] for text in texts] == ["slight", "severe"]
+
+
 def test_an_axis_takes_the_unit_that_is_shown():
     with figure_style():
         figure, axes = plt.subplots()
