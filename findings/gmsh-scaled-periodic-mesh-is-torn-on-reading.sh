@@ -5,8 +5,8 @@
 #   dependent side at that map of their masters: one metre, not one millimetre, from them, without a word, and elements
 #   along two sides are drawn out. Mesh.IgnorePeriodicity (1 unless told otherwise) holds for MSH 2.2 alone, which is
 #   read right; meshio reads the nodes of both as they were written.
-# Why it matters here: a cell is periodic and often drawn in another unit than it is solved in: such a file is refused
-#   here, with the version to write.
+# Why it matters here: a cell is periodic and often drawn in another unit than it is solved in: such a file is
+#   read here without Gmsh.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

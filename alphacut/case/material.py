@@ -470,8 +470,8 @@ class Mesh(Section):
     """Discretisation of the product domain."""
 
     file: CaseFile | None = None
-    """mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and layers; its
-    physical groups are the phases of [cell.phases]"""
+    """mesh of Gmsh, prisms of 15 nodes over a parallelogram and θ, in place of size and
+    layers; its physical groups are the phases of [cell.phases]"""
     refine: bool = False
     """whether to refine the mesh of a file once, for a declared error"""
     layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12

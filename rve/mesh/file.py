@@ -16,6 +16,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.memory import require_text
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
 from alphacut.rve.mesh.msh import REWRITE, DamagedMeshError, MshFile, element_name, parse_msh
@@ -31,8 +32,9 @@ PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, orde
 def read_grid(path: Path | str) -> PrismGrid:
     """Read a mesh of the cell from a file in Gmsh's format MSH and check it.
 
-    The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on the square [−1,
-    1]², with the random number θ as third coordinate. Each physical group of volumes is a material.
+    The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on a
+    parallelogram, with the random number θ as third coordinate. Each physical group of volumes is a
+    material.
 
     Args:
         path: The file, MSH 2.x or 4.1, text or binary.
@@ -43,9 +45,8 @@ def read_grid(path: Path | str) -> PrismGrid:
     Raises:
         RefusedError: The file cannot be read, is not in that format, or contradicts itself.
         MeshError: It is no mesh of a cell: other elements than prisms, a volume without a group or
-            in two, θ along another axis, a square other than [−1, 1]², no columns, folded prisms,
-            voids or overlaps, opposite sides that do not match, slits, or a material that changes
-            along θ.
+            in two, θ along another axis, no parallelogram, no columns, folded prisms, voids or
+            overlaps, opposite sides that do not match, slits, or a material that changes along θ.
     """
     try:
         mesh = parse_msh(mesh_content(path))
@@ -53,11 +54,15 @@ def read_grid(path: Path | str) -> PrismGrid:
         cure = "" if REWRITE in str(error) else "copy the file anew, or write it anew by Gmsh"
         raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES, cure) from None
     prisms = read_prisms(mesh)
-    _require_theta_last(prisms.points)
-    _require_square(prisms.points[:, :2], "the cell")
-    grid = grid_of(orient(prisms))
-    _require_filled(grid)
-    _require_periodic_square(grid)
+    try:
+        grid = grid_of(orient(prisms))
+    except MeshError:
+        _require_theta_last(prisms.points)
+        raise
+    plane = grid.plane
+    grid = replace(grid, plane=replace(plane, lattice=lattice_of(plane.points)))
+    _require_unfolded_and_filled(grid)
+    _require_periodic(grid)
     _require_joined_columns(grid)
     return grid
 
@@ -204,7 +209,8 @@ def refined(grid: PrismGrid) -> PrismGrid:
     _, first, nodes = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     points = (shapes @ grid.fixed[grid.cells]).reshape(-1, 3)[first]
     phase = np.repeat(grid.phase, len(parts))
-    return grid_of(Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names))
+    fine = grid_of(Prisms(points, nodes.reshape(-1, len(z)), phase, grid.names))
+    return replace(fine, plane=replace(fine.plane, lattice=grid.plane.lattice))
 
 
 def _quarters() -> Array:
@@ -252,20 +258,19 @@ def orient(prisms: Prisms) -> Prisms:
     return replace(prisms, cells=cells)
 
 
-def _require_filled(grid: PrismGrid) -> None:
+def _require_unfolded_and_filled(grid: PrismGrid) -> None:
     """Raise unless the prisms of a mesh from a file fill the cell, by det J at quadrature points.
 
     J is the Jacobian matrix of the map from the reference prism. The sum of its determinants times
-    the weights is the volume of the prisms; it is compared with the volume of the box around all
-    nodes.
+    the weights is the volume of the prisms; it is compared with the volume of the cell.
 
     Args:
-        grid: A mesh with the positions `fixed` of all nodes; without them an AssertionError is
-            raised.
+        grid: A mesh with its lattice and the positions `fixed` of all nodes; without them an
+            AssertionError is raised.
 
     Raises:
         MeshError: A determinant is zero or negative, so that a prism is folded; or the volume
-            differs from that of the box by more than a millionth (voids, prisms that overlap).
+            differs from that of the cell by more than a millionth (voids, prisms that overlap).
     """
     assert grid.fixed is not None
     points, weights = prism_rule()
@@ -278,8 +283,8 @@ def _require_filled(grid: PrismGrid) -> None:
         cure = "move corners of prisms back, and middle nodes near the middles of their edges"
         cure += " (Mesh.HighOrderOptimize = 2)"
         raise MeshError(what, cure)
-    low, high = grid.fixed.min(axis=0), grid.fixed.max(axis=0)
-    filled = float((determinants @ weights).sum() / np.prod(high - low))
+    volume = grid.plane.lattice.area * np.ptp(grid.fixed[:, 2])
+    filled = float((determinants @ weights).sum() / volume)
     # Round-off of the volume is far below 1e-6, and a single missing prism of any usable mesh is
     # far above it.
     if abs(filled - 1) > 1e-6:
@@ -292,7 +297,7 @@ def _require_filled(grid: PrismGrid) -> None:
 def _require_joined_columns(grid: PrismGrid) -> None:
     """Raise if a mesh has slits, or columns of prisms whose phase changes along θ.
 
-    A slit is an edge inside the square that belongs to one triangle alone: surfaces that touch
+    A slit is an edge inside the cell that belongs to one triangle alone: surfaces that touch
     without common nodes.
 
     Args:
@@ -304,7 +309,8 @@ def _require_joined_columns(grid: PrismGrid) -> None:
     triangles, points = grid.plane.triangles[:, :3], grid.plane.points
     ends, edges, _ = square.edges(triangles, grid.plane.inside)
     middles = points[ends].mean(axis=1)
-    is_inside = abs(middles).max(axis=1) < 1 - SAME_PLACE
+    reaches = abs(grid.plane.lattice.side_coordinates(middles)).max(axis=1)
+    is_inside = reaches < 1 - SAME_PLACE
     is_open = (np.bincount(edges.ravel()) == 1) & is_inside
     if is_open.any():
         x, y = middles[np.argmax(is_open)]
@@ -326,9 +332,10 @@ def _require_joined_columns(grid: PrismGrid) -> None:
 def _require_theta_last(points: Array) -> None:
     """Raise if the third coordinate of a cell is not the one along θ but one along a side.
 
-    The cell spans −1 … 1 in the two coordinates of its sides, and any range along θ. If it spans −1
-    … 1 in the third coordinate and in only one of the others, θ was taken along the remaining one.
-    Where all three span −1 … 1, nothing is raised, since the axes cannot be told apart.
+    It is called where prisms do not stand along the third coordinate. A square cell spans −1 … 1 in
+    the two coordinates of its sides, and any range along θ. If it spans −1 … 1 in the third
+    coordinate and in only one of the others, θ was taken along the remaining one. Of other cells,
+    and where all three span −1 … 1, nothing is raised, since the axes cannot be told apart.
 
     Args:
         points: Positions of the nodes, shape (n, 3), n at least 1.
@@ -347,48 +354,65 @@ def _require_theta_last(points: Array) -> None:
         )
 
 
-def _require_square(xy: Array, what: str) -> None:
-    """Raise unless the box around points is the square [−1, 1]², within 1e-8.
+def lattice_of(xy: Array) -> Lattice:
+    """Return the parallelogram whose corners are among points, as a cell of a lattice.
+
+    The first vector of the lattice is the one nearer to the x1 axis, and the second one stands
+    counterclockwise from it. Other points may lie outside of the parallelogram.
 
     Args:
-        xy: Points, shape (n, 2), n at least 1.
-        what: What the points are of, the subject of the message, such as "the cell".
+        xy: Points, shape (n, 2), at least three of them not on a line.
 
-    Raises:
-        MeshError: The box is another one. For a square the hint says how to scale and move the
-            mesh.
+    Returns:
+        The cell; exactly the square [−1, 1]² where the corners are within 1e-8 of its corners.
     """
-    box = np.array([xy.min(axis=0), xy.max(axis=0)])
-    if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
-        shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
-        size, other = box[1] - box[0]
-        cure = "the cell is a square, not a rectangle: mesh the square −1 … 1 × −1 … 1 anew"
-        if abs(size - other) <= SAME_PLACE * size:
-            x, y = box.mean(axis=0)
-            cure = f"scale and move the mesh: 2 (x − {x:g}) / {size:g}, 2 (y − {y:g}) / {size:g}"
-        raise MeshError(f"{what} spans {shown}, not −1 … 1 × −1 … 1", cure)
+    # A parallelogram has the centre of its box, a corner farthest from there, and the other two
+    # corners farthest from the line through that corner and the centre.
+    centre = (xy.min(axis=0) + xy.max(axis=0)) / 2
+    offsets = xy - centre
+    diagonal = offsets[np.argmax(np.hypot(offsets[:, 0], offsets[:, 1]))]
+    distances = diagonal[0] * offsets[:, 1] - diagonal[1] * offsets[:, 0]
+    other = offsets[np.argmax(abs(distances))]
+    half_vectors = np.array([diagonal - other, diagonal + other]) / 2
+    # The sine of the angle with the x1 axis orders the two.
+    sines = abs(half_vectors[:, 1]) / np.hypot(half_vectors[:, 0], half_vectors[:, 1])
+    half_vectors = half_vectors[np.argsort(sines)]
+    half_vectors[0] *= np.copysign(1, half_vectors[0, 0])
+    half_vectors[1] *= np.sign(np.linalg.det(half_vectors))
+    found = np.vstack([half_vectors, centre])
+    if abs(found - [[1, 0], [0, 1], [0, 0]]).max() <= SAME_PLACE:
+        return SQUARE
+    first, second, middle = map(tuple, found.tolist())
+    return Lattice((first, second), middle)
 
 
-def _require_periodic_square(grid: PrismGrid) -> None:
-    """Raise unless each level of θ fills the square [−1, 1]² and its opposite sides match.
+def _require_periodic(grid: PrismGrid) -> None:
+    """Raise unless each level of θ fills the same parallelogram and its opposite sides match.
 
     Args:
         grid: A mesh with the positions `fixed` of all nodes (else an AssertionError is raised),
-            which are numbered level by level.
+            which are numbered level by level, and with the lattice of its lowest level.
 
     Raises:
-        MeshError: The nodes of a level span another square, a node on a side has no partner on the
-            opposite side, or nodes are partners on one level and not on another.
+        MeshError: The nodes of a level reach out of the parallelogram or do not reach its sides, a
+            node on a side has no partner on the opposite side, or nodes are partners on one level
+            and not on another.
     """
     assert grid.fixed is not None
+    lattice = grid.plane.lattice
     per_level = len(grid.plane.points)
     lowest: Ints | None = None  # unknowns of its nodes, which partners have in common
     for level in range(grid.layers + 1):
         points = grid.fixed[level * per_level : (level + 1) * per_level]
         xy, theta = points[:, :2], points[0, 2]
-        _require_square(xy, f"the level θ = {theta:.4g}")
+        reaches = abs(lattice.side_coordinates(xy)).max(axis=0)
+        if abs(reaches - 1).max() > SAME_PLACE:
+            vectors = " and ".join(f"({2 * x:.6g}, {2 * y:.6g})" for x, y in lattice.half_vectors)
+            what = f"the level θ = {theta:.4g} is not the parallelogram of the sides {vectors}"
+            what += " of the lowest level"
+            raise MeshError(what, "mesh a square, a rectangle or a parallelogram, alike at all θ")
         try:
-            unknown = unknowns(xy)
+            unknown = unknowns(xy, lattice)
         except MeshError as error:
             raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
         if lowest is not None and not np.array_equal(unknown, lowest):

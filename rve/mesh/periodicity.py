@@ -1,7 +1,7 @@
 """Periodicity by elimination of degrees of freedom; the corner is fixed (section 4.2).
 
 The four corners are one periodic node; its fluctuation is fixed on the whole line over θ, because a
-translation u = c(θ) costs no energy at any θ.
+translation u = c(θ) costs no energy at any θ. A hexagon has two such nodes, of which one is fixed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import FailedError
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 
 SAME_PLACE = 1e-8
 """Distance below which two nodes coincide, in halves of the side: far above the noise of Gmsh's
@@ -20,40 +21,46 @@ class MeshError(FailedError):
     """A mesh of the cell is invalid."""
 
 
-def unknowns(points: Array) -> Ints:
-    """Number the unknowns of a periodic field on a square: partners on opposite sides share one.
+def unknowns(points: Array, lattice: Lattice = SQUARE) -> Ints:
+    """Number the unknowns of a periodic field on a cell: partners on opposite sides share one.
 
     Args:
-        points: Positions of the nodes in the cell [−1, 1]², shape (n, 2).
+        points: Positions of the nodes in the cell, shape (n, 2).
+        lattice: The cell and its pairs of opposite sides.
 
     Returns:
-        Number of each node's unknown, shape (n,), from 0 without gaps. Nodes with the same
-        coordinate on two opposite sides have the same number. The corners, where the field is held
-        at zero, have −1.
+        Number of each node's unknown, shape (n,), from 0 without gaps. Nodes of opposite sides that
+        differ by the vector of the lattice have the same number. Corners that the lattice leads
+        from one to the other share one too; those of the first corner, where the field is held at
+        zero, have −1. These are all corners of a parallelogram, and every second one of a hexagon.
 
     Raises:
         MeshError: A node on a side has no partner within 1e-8 on the opposite side.
     """
-    on_side = abs(abs(points) - 1) <= SAME_PLACE
+    on_side = abs(abs(lattice.side_coordinates(points)) - 1) <= SAME_PLACE
+    pairs = range(len(lattice.half_vectors))
+    partners = [_partners(points, on_side[:, pair], lattice, pair) for pair in pairs]
     representative: Ints = np.arange(len(points))
-    for axis in (0, 1):
-        first, second = _partners(points, on_side[:, axis], axis)
-        # Only corners lie on both pairs of sides, so all other pairs of the first axis stay as they
-        # are when the second axis follows.
-        representative[first] = representative[second] = np.minimum(first, second)
-    free = ~on_side.all(axis=1)
+    # All other nodes have one partner. A corner has two, and the second round reaches the partner
+    # of its partner.
+    for first, second in partners + partners:
+        smaller = np.minimum(representative[first], representative[second])
+        representative[first] = representative[second] = smaller
+    corners = np.flatnonzero(on_side.sum(axis=1) > 1)
+    free = ~np.isin(representative, representative[corners[:1]])
     unknown: Ints = np.full(len(points), -1)
     unknown[free] = np.unique(representative[free], return_inverse=True)[1]
     return unknown
 
 
-def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
-    """Pair the nodes of two opposite sides of the square [−1, 1]², sorted along the sides.
+def _partners(points: Array, on_side: Mask, lattice: Lattice, pair: int) -> tuple[Ints, Ints]:
+    """Pair the nodes of two opposite sides of a cell, sorted along the sides.
 
     Args:
         points: Positions of all nodes, shape (n, 2).
         on_side: Whether a node lies on one of the two sides, shape (n,).
-        axis: 0 or 1: the coordinate that is −1 on the first side and 1 on the second.
+        lattice: The cell.
+        pair: Number of the pair of sides.
 
     Returns:
         Nodes of the first side, and their partners on the second, shape (k,) each; empty if no node
@@ -63,8 +70,8 @@ def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
         MeshError: The sides have different numbers of nodes, or two nodes of the same rank are more
             than 1e-8 apart along the sides.
     """
-    along = points[:, 1 - axis]
-    is_first = points[:, axis] < 0
+    along = lattice.along_sides(points, pair)
+    is_first = lattice.side_coordinates(points)[:, pair] < 0
     first = np.flatnonzero(on_side & is_first)
     second = np.flatnonzero(on_side & ~is_first)
     first = first[np.argsort(along[first])]
@@ -75,10 +82,9 @@ def _partners(points: Array, on_side: Mask, axis: int) -> tuple[Ints, Ints]:
         # The first node that is apart from its partner, or else the first extra node of the longer
         # side.
         unpaired = int(np.argmax(np.append(is_apart, True)))
-        coordinate = along[max(first, second, key=len)[unpaired]]
-        side = f"x{axis + 1} = ±1 at x{2 - axis} = {coordinate:.6g}"
+        x, y = points[max(first, second, key=len)[unpaired]]
         raise MeshError(
-            f"a node of the sides {side} has no partner on the opposite side",
+            f"the node at ({x:.6g}, {y:.6g}) of a side has no partner on the opposite side",
             "mesh opposite sides alike",
         )
     return first, second

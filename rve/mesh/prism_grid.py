@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError, array_of_call
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.cell.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, ThetaDistribution, require_map
 
@@ -24,7 +25,7 @@ NAMES = "matrix", "inclusion"
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """Six-node triangles of the cell [−1, 1]², vertices numbered before edge midpoints.
+    """Six-node triangles of the cell, vertices numbered before edge midpoints.
 
     Args:
         points: Positions of all nodes, shape (n, 2), edge midpoints at the middle of their straight
@@ -37,6 +38,7 @@ class Triangulation:
         arc: Whether a node lies on the interface, shape (n,).
         radius: Radius of the particle in this mesh, 0 if the mesh has none.
         outline: Of the particle.
+        lattice: The cell.
     """
 
     points: Array
@@ -47,6 +49,7 @@ class Triangulation:
     arc: Mask
     radius: float
     outline: Outline = circle
+    lattice: Lattice = SQUARE
 
 
 @dataclass(frozen=True, eq=False)

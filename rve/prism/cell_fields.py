@@ -22,7 +22,8 @@ class CellFields:
         points: (x1, x2, θ), shape (n, 3).
         cells: Nodes of the prisms in Basix's order, shape (m, 15).
         phase: Index of the phase of each prism in `names`, shape (m,).
-        displacement: In halves of the cell's side, shape (n, 2, loads).
+        displacement: In halves of the cell's side, or in the unit of a mesh from a file, shape (n,
+            2, loads).
         stress: (σ11, σ22, σ12), means over the prisms of one phase that meet in a node, shape
             (n, 3, loads), in Pa.
         names: Names of the phases.

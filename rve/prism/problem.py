@@ -10,7 +10,6 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import FailedError, RefusedError
-from alphacut.rve.cell.cell import AREA
 from alphacut.rve.cell.outline import is_round
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, petsc, ufl
 from alphacut.rve.mesh.curved import MIN_JACOBIAN_RATIO
@@ -198,7 +197,8 @@ class PrismProblem:
         layer: Layer of each of these prisms, shape (m,).
         dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
         density: f_Θ at the quadrature points.
-        areas: Weights of the points in their slice, shape (m, 3, points); a slice's sum is 4.
+        areas: Weights of the points in their slice, shape (m, 3, points); a slice's sum is the
+            area of the cell.
         numbering: Reduced unknowns.
         map: The radius map.
         matrix: The reduced stiffness.
@@ -401,7 +401,7 @@ class PrismProblem:
             u = self.elimination.displacements(vector)
             values[..., field] = self._strains(u).reshape(shape[:-1]) + strains[field]
         # Shape (phases, prisms, slices, points).
-        areas: Array = np.asarray(self._phases * self.areas / AREA, float)
+        areas: Array = np.asarray(self._phases * self.areas / self.grid.plane.lattice.area, float)
         slices = self.layer[:, np.newaxis] * SLICES_PER_LAYER + np.arange(SLICES_PER_LAYER)
         integrals = SliceStrains.zeros(self._rule, phases=len(areas), fields=len(strains))
         of_slices: Array = areas.reshape(len(areas), -1, POINTS_PER_SLICE)

@@ -129,7 +129,7 @@ class LevelNumbering:
         comm: Communicator.
 
     Attributes:
-        planar: Unknown of each planar node, −1 at the corners, shape (n,); vertices' come first.
+        planar: Unknown of each planar node, −1 where held, shape (n,); vertices' come first.
         level_size: Number of unknowns of a level.
         mid_level_size: Number of unknowns of a mid-level, half-way between two: those of vertices.
         stride: Sum of both.
@@ -142,7 +142,7 @@ class LevelNumbering:
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
         self.grid = grid
-        self.planar = unknowns(grid.plane.points)
+        self.planar = unknowns(grid.plane.points, grid.plane.lattice)
         self.level_size = 2 * (int(self.planar.max()) + 1)
         self.mid_level_size = 2 * (int(self.planar[: grid.plane.vertices].max()) + 1)
         self.stride = self.level_size + self.mid_level_size
