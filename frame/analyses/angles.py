@@ -16,29 +16,65 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import checked_number, require
+from alphacut.base.errors import RefusedError, checked_number
 from alphacut.base.number_text import Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
-from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks
-from alphacut.frame.analyses.suites import largest_peaks
+from alphacut.frame.analyses.peaks import Peak, WorstCase, close_peaks, largest_peaks
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.structures.matrix import MatrixStructure
+from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
 
+GAP = 0.01
+"""Distance of the bound over all angles from the attained value, as a fraction of this value, at
+which no further direction is bounded (tuned: of it 0.5 % are those of the peaks themselves)."""
+GAIN = 2e-3
+"""Fraction of the bound that further directions must promise (tuned: each costs a proof)."""
+FURTHER = 12
+"""Number of further directions of an output at most (tuned: frames in plan take one to five)."""
+COARSE_ERROR = 0.02
+"""Error of the peaks that is aimed at in the first directions (tuned: it costs a fifth of 0.5 %,
+and matters little in directions far from the worst one)."""
 
-class WorstCase(NamedTuple):
-    """Angle in degrees, from 0 to 360, and time in s at which an attained peak occurs."""
 
-    angle: float
-    time: float
+class AngleBounds(NamedTuple):
+    """Bounds of peaks at some directions, by angle in degrees and name, and over all angles."""
+
+    by_angle: dict[float, dict[str, Peak]]
+    peak: dict[str, Peak]
+
+
+class AngleResponse(NamedTuple):
+    """The terms of the response r₀ + r_x cos φ + r_y sin φ, each (structures, times, outputs).
+
+    Args:
+        fixed: r₀, which does not turn with the ground motion.
+        along_cosine: r_x.
+        along_sine: r_y.
+    """
+
+    fixed: Array
+    along_cosine: Array
+    along_sine: Array
+
+    @property
+    def magnitudes(self) -> Array:
+        """Largest magnitudes over all angles, |r₀| + √(r_x² + r_y²)."""
+        return np.asarray(np.abs(self.fixed) + np.hypot(self.along_cosine, self.along_sine))
+
+    @property
+    def angles(self) -> Array:
+        """Angles at which the largest magnitudes occur, in degrees from 0 to 360."""
+        angles = np.arctan2(self.along_sine, self.along_cosine) + np.where(self.fixed < 0, pi, 0.0)
+        return np.asarray(np.degrees(angles) % 360)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -53,18 +89,17 @@ class AnglePeaks(Answer):
         by_angle: Peaks by name under each of the directions that were bounded, by their angles in
             degrees.
         units: SI units of the outputs.
-        peak: Bounds of the largest magnitude of each output over all angles and times.
-        worst: Angle and time of the attained values on the lowest level; without the outputs of
-            which no response is known.
+        peak: Bounds of the largest magnitude of each output over all angles and times; `worst` of
+            each is the angle and the time of the attained value on the lowest level, None if no
+            response is known.
     """
 
     key = "angles"
     title = "How far does it move, from whichever direction the ground motion comes?"
     alpha: Array
-    by_angle: dict[float, Peaks]
+    by_angle: dict[float, dict[str, Peak]]
     units: dict[str, str]
     peak: dict[str, Peak]
-    worst: dict[str, WorstCase]
 
     def table(self) -> Table:
         """Return a table of texts with a row for each output.
@@ -83,8 +118,7 @@ class AnglePeaks(Answer):
                 "reached": "not known",
                 "angle and time": "",
             }
-            if name in self.worst:
-                worst = self.worst[name]
+            if (worst := peak.worst) is not None:
                 row["reached"] = engineering(float(peak.reached[0]), unit)
                 row["angle and time"] = f"{worst.angle:.1f}°, {worst.time:.4g} s"
             rows.append(row)
@@ -99,7 +133,7 @@ class AnglePeaks(Answer):
         """
         rows: list[Record] = []
         for name, peak in self.peak.items():
-            worst = self.worst.get(name, WorstCase(np.nan, np.nan))
+            worst = peak.worst or WorstCase(np.nan, np.nan)
             row: Record = {
                 "output": name,
                 "unit": self.units[name],
@@ -129,7 +163,7 @@ def over_angles(
     step: float,
     alpha: Sequence[float] = ALPHA,
     names: Sequence[str] = (),
-    directions: int = 12,
+    directions: int = 4,
     progress: Progress | None = None,
 ) -> AnglePeaks:
     """Return bounds of peaks over all angles of incidence of the ground motion.
@@ -144,8 +178,9 @@ def over_angles(
         step: Distance of the time nodes, in s.
         alpha: Levels, rising within [0, 1].
         names: Names of the outputs whose magnitudes are bounded; by default all.
-        directions: Number K of directions on the half circle at which peaks are bounded. The bound
-            of all angles is 1/cos(π/(2 K)) times the largest of theirs, 0.9 % above it for 12.
+        directions: Number of directions on the half circle at which all peaks are bounded first.
+            Each output has further directions where it moves farthest, until its bound is 1 %
+            above the attained value, or more of them would not narrow it.
         progress: Called with the completed fraction.
 
     Returns:
@@ -157,44 +192,82 @@ def over_angles(
             output, or an argument is out of range.
         FailedError: No bounds are found.
     """
-    has_two = structure.ground is not None and len(structure.components) > 0
-    allowed = "two or three, MatrixStructure(ground=x, components=[(y, north)])"
-    require(has_two, "ground", "of one component at most", allowed)
-    count = int(checked_number("directions", directions, least=2))
     names = tuple(names) or tuple(map(str, structure.outputs))
+    found = angle_peaks(
+        structure,
+        inputs,
+        names,
+        duration=duration,
+        step=step,
+        alpha=alpha,
+        directions=directions,
+        progress=progress,
+    )
+    return AnglePeaks(
+        encloses=next(iter(found.peak.values())).encloses,
+        alpha=np.array(alpha, float),
+        by_angle=found.by_angle,
+        units={name: structure.unit_of(name) for name in names},
+        peak=found.peak,
+    )
+
+
+def angle_peaks(
+    structure: StructureModel,
+    inputs: Mapping[str, FuzzyNumber],
+    names: Sequence[str],
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float],
+    directions: int = 4,
+    progress: Progress | bool | None = None,
+) -> AngleBounds:
+    """Return bounds of peaks at directions of the ground motion, and over all angles.
+
+    Arguments and errors are those of `over_angles`, of which this is the computation.
+    """
+    if not isinstance(structure, MatrixStructure) or len(structure.accelerograms) < 2:
+        allowed = "two or three, MatrixStructure(ground=x, components=[(y, north)])"
+        raise RefusedError("ground", "of one component at most", allowed)
+    count = int(checked_number("directions", directions, least=2))
     for name in names:
         structure.require_quantity(name)
     # Without r₀ a turn by π changes the sign of the response alone, so that one half of the circle
     # is enough.
     still = _still(structure)
-    half_circles = 1 if still.is_at_rest and not still.loads else 2
-    angles = np.arange(half_circles * count) * pi / count
-    by_angle: dict[float, Peaks] = {}
-    for k, angle in enumerate(angles):
-        by_angle[float(np.degrees(angle))] = close_peaks(
-            turned(structure, angle),
-            inputs,
-            names,
-            duration=duration,
-            step=step,
-            alpha=alpha,
-            progress=nth_subprogress(progress, k, len(angles)),
-        )
+    circle = pi if still.is_at_rest and not still.loads else 2 * pi
+    angles = np.arange(round(circle / pi) * count) * pi / count
+    n_pieces = len(angles) + len(names)
+    by_angle: dict[float, dict[str, Peak]] = {}
+    motion: dict[str, Any] = {"duration": duration, "step": step}
+
+    def bounded(angle: float, names: Sequence[str], **options: Any) -> dict[str, Peak]:
+        """Bound peaks at an angle in rad, and add them to `by_angle`."""
+        turned_structure = turned(structure, angle)
+        peaks = close_peaks(turned_structure, inputs, names, alpha=alpha, **motion, **options)
+        by_angle.setdefault(float(np.degrees(angle)), {}).update(peaks)
+        return peaks
+
+    def tick(k: int) -> Progress | bool | None:
+        return progress if isinstance(progress, bool) else nth_subprogress(progress, k, n_pieces)
+
+    for k, angle in enumerate(angles.tolist()):
+        bounded(angle, names, error=COARSE_ERROR, progress=tick(k))
     peak: dict[str, Peak] = {}
-    worst: dict[str, WorstCase] = {}
-    for name, largest in largest_peaks(by_angle).items():
-        peak[name] = _over_all(largest, spacing=pi / count)
-        if peak[name].reached_at:
-            observed = structure.with_outputs([name])
-            peak[name], worst[name] = _refined(observed, peak[name], duration, step)
-    return AnglePeaks(
-        encloses=next(iter(peak.values())).encloses,
-        alpha=np.array(alpha, float),
-        by_angle=by_angle,
-        units={name: structure.unit_of(name) for name in names},
-        peak=peak,
-        worst=worst,
-    )
+    for k, name in enumerate(names, start=len(angles)):
+        observed = structure.with_outputs([name])
+        at_angles = {angle: by_angle[float(np.degrees(angle))][name] for angle in angles.tolist()}
+        close: dict[float, Peak] = {}
+        for _ in range(FURTHER + 1):
+            farthest = _over_all(at_angles | close, circle)
+            peak[name] = _refined(observed, farthest.peak, duration, step)
+            largest = max((float(x.proved[0]) for x in close.values()), default=0.0)
+            enough = max((1 + GAP) * float(peak[name].reached[0]), (1 + GAIN) * largest)
+            if peak[name].proved[0] <= enough or not np.isfinite(peak[name].proved[0]):
+                break
+            close[farthest.angle] = bounded(farthest.angle, [name], progress=tick(k))[name]
+    return AngleBounds(by_angle, peak)
 
 
 def turned(structure: MatrixStructure, angle: float) -> MatrixStructure:
@@ -208,6 +281,7 @@ def turned(structure: MatrixStructure, angle: float) -> MatrixStructure:
     (second, influence), *others = structure.components
     first = structure.ground
     assert first is not None
+    assert second is not None
     cosine = cos(angle)
     sine = sin(angle)
     along_first = cosine * first.samples - sine * second.samples
@@ -219,44 +293,89 @@ def turned(structure: MatrixStructure, angle: float) -> MatrixStructure:
     )
 
 
+def angle_response(
+    structure: MatrixStructure,
+    names: Sequence[str],
+    points: Array,
+    *,
+    duration: float,
+    step: float,
+) -> AngleResponse:
+    """Return exact responses to ground motion from any angle, at the time nodes.
+
+    Args:
+        structure: A structure whose ground moves in two components or more, of which the first two
+            are turned.
+        names: Names of its d parameters that are not nominal.
+        points: Their values at S parameter sets in SI units, shape (S, d).
+        duration: Length of the response, in s.
+        step: Distance of the time nodes, in s.
+    """
+
+    def response(at: MatrixStructure) -> Array:
+        return make_flow(at, names, duration, step, "exact").values(points)
+
+    fixed: Array = response(_still(structure))
+    return AngleResponse(
+        fixed=fixed,
+        along_cosine=response(structure) - fixed,
+        along_sine=response(turned(structure, pi / 2)) - fixed,
+    )
+
+
 def _still(structure: MatrixStructure) -> MatrixStructure:
     """Return a structure without its two horizontal components of ground motion."""
     return replace(structure, ground=None, components=structure.components[1:])
 
 
-def _over_all(peak: Peak, *, spacing: float) -> Peak:
+class _Farthest(NamedTuple):
+    """Bounds of a peak over all angles, and the angle in rad at which the bound is largest."""
+
+    peak: Peak
+    angle: float
+
+
+def _over_all(at_angles: Mapping[float, Peak], circle: float) -> _Farthest:
     """Return bounds of the largest magnitude of an output over all angles.
 
     For one set of inputs and one time let |r₀| + A be the largest magnitude of r₀ + A cos(φ − ψ)
-    over φ (see the head of this file), attained at χ. The directions φ_k cover the circle, or half
-    of it if r₀ = 0, so that one is no farther than half their spacing Δ from χ, modulo π if r₀ = 0.
-    There the magnitude is at least
+    over φ (see the head of this file), attained at χ. Let χ lie between the neighbours φ₁ and
+    φ₂ = φ₁ + Δ, at χ = φ₁ + t. With u(φ) the unit vector of direction φ,
 
-        |r(φ_k)| ≥ |r₀| + A cos(Δ/2) ≥ (|r₀| + A) cos(Δ/2).
+        u(χ) = c₁ u(φ₁) + c₂ u(φ₂),    c₁ = sin(Δ − t)/sin Δ ≥ 0,    c₂ = sin t/sin Δ ≥ 0.
 
-    Hence |r₀| + A ≤ max_k |r(φ_k)| / cos(Δ/2).
+    Hence A = Σ c_j A cos(φ_j − χ), and as c₁ + c₂ ≥ 1 (the triangle of the three vectors),
+    |r₀| + A ≤ Σ c_j (|r₀| + A cos(φ_j − χ)) ≤ Σ c_j h_j, where h_j bounds the magnitudes at φ_j.
+    Over t the sum h₁ cos t + (h₂ − h₁ cos Δ)/sin Δ · sin t is largest where its derivative is zero,
+    or at an end of [0, Δ].
 
     Args:
-        peak: Largest peak of the magnitude over the directions φ_k.
-        spacing: Δ, in rad.
+        at_angles: Peak of the magnitude under each of some directions, by their angles in rad. They
+            are less than π apart.
+        circle: 2π; or π if r₀ = 0, where a turn by π changes the sign of the response alone.
     """
+    angles = np.array(sorted(at_angles))
+    largest = largest_peaks({angle: {"": peak} for angle, peak in at_angles.items()})[""]
     # Attained values bound nothing, and stay those of the directions.
-    if peak.nature is Nature.ATTAINED:
-        return peak
-    # The small number is far above the rounding of the cosine and of the products.
-    factor = (1 + 1e-12) / cos(spacing / 2)
+    if largest.nature is Nature.ATTAINED:
+        return _Farthest(largest, 0.0)
     # No peak at a direction lies above `upper` plus the error, which is 0 if it is guaranteed.
-    return replace(
-        peak,
-        upper=factor * peak.upper,
-        error=factor * peak.error,
-        between_nodes=factor * peak.between_nodes,
-    )
+    bounds = np.array([at_angles[angle].proved for angle in angles])  # (directions, levels)
+    spacing = np.append(angles[1:], angles[0] + circle)[:, np.newaxis] - angles[:, np.newaxis]
+    slopes = (np.roll(bounds, -1, axis=0) - bounds * np.cos(spacing)) / np.sin(spacing)
+    turns = np.clip(np.arctan2(slopes, bounds), 0.0, spacing)
+    # The small number is far above the rounding of the products and their sum.
+    farthest = (1 + 1e-12) * (bounds * np.cos(turns) + slopes * np.sin(turns))
+    k = farthest[:, 0].argmax()
+    over_all = farthest.max(axis=0)
+    upper = over_all
+    if largest.nature is not Nature.GUARANTEED:
+        upper = over_all - largest.error
+    peak = replace(largest, upper=upper)
+    return _Farthest(peak, float((angles[k] + turns[k, 0]) % circle))
 
 
-def _refined(
-    structure: MatrixStructure, peak: Peak, duration: float, step: float
-) -> tuple[Peak, WorstCase]:
+def _refined(structure: MatrixStructure, peak: Peak, duration: float, step: float) -> Peak:
     """Return a peak with the value that its inputs attain at the worst angle, and where.
 
     For one set of inputs and one time the largest magnitude over all angles is |r₀| + A, so that no
@@ -264,25 +383,20 @@ def _refined(
 
     Args:
         structure: The structure, of one output.
-        peak: Peak over all angles, whose inputs `reached_at` are known.
+        peak: Peak over all angles. If its inputs `reached_at` are not known, it is returned itself.
         duration: Length of the response, in s.
         step: Distance of the time nodes, in s, at which the response is computed exactly.
     """
-    names = tuple(peak.reached_at)
-    point = np.array([[peak.reached_at[name] for name in names]])
-
-    def response(at: MatrixStructure) -> Array:
-        return make_flow(at, names, duration, step, "exact").values(point)[0, :, 0]
-
-    fixed: Array = response(_still(structure))
-    along_cosine = response(structure) - fixed
-    along_sine = response(turned(structure, pi / 2)) - fixed
-    magnitude = np.abs(fixed) + np.hypot(along_cosine, along_sine)
-    k = int(magnitude.argmax())
-    angle = np.degrees(np.arctan2(along_sine[k], along_cosine[k]))
-    if fixed[k] < 0:
-        angle += 180
+    if not peak.reached_at:
+        return peak
+    point = np.array([list(peak.reached_at.values())])
+    response = angle_response(
+        structure, tuple(peak.reached_at), point, duration=duration, step=step
+    )
+    magnitudes = response.magnitudes[0, :, 0]
+    k = int(magnitudes.argmax())
     # The inputs belong to the lowest level alone.
     reached = peak.reached.copy()
-    reached[0] = max(reached[0], magnitude[k])
-    return replace(peak, reached=reached), WorstCase(float(angle % 360), float(k * step))
+    reached[0] = max(reached[0], magnitudes[k])
+    worst = WorstCase(float(response.angles[0, k, 0]), float(k * step))
+    return replace(peak, reached=reached, worst=worst)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,13 @@ larger one saves time and leaves more limits undecided)."""
 WIDENING = 0.01
 """Fraction of a peak above which it is reported that a smaller step would narrow its bound (tuned:
 a larger one leaves wider bounds without a remark)."""
+
+
+class WorstCase(NamedTuple):
+    """Angle in degrees, from 0 to 360, and time in s at which an attained peak occurs."""
+
+    angle: float
+    time: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +66,8 @@ class Peak:
             level; empty if none is known.
         encloses: Name of the set of inputs, such as "the learned set", that the box of the cuts
             encloses. If it is given, no response is known to belong to the set.
+        worst: Where the peak is one over all angles of the ground motion, the angle and the time of
+            the attained peak on the lowest level; else None.
 
     Attributes:
         proved: Guaranteed bound: the peak of no response of the cut lies farther out; infinite
@@ -77,6 +86,7 @@ class Peak:
     side: Literal["", "max", "min"] = ""
     reached_at: Mapping[str, float] = field(default_factory=dict)
     encloses: str = ""
+    worst: WorstCase | None = None
     proved: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -479,6 +489,36 @@ def with_combined(
     return replace(peak, **changes)
 
 
+def largest_peaks(peaks: Mapping[str, Peaks] | Mapping[float, Peaks]) -> dict[str, Peak]:
+    """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
+
+    The largest peak does not fall if the peak under some record rises. Its bounds are therefore the
+    largest of the bounds under the records, with the weakest of their guarantees. Of the smallest
+    value of an output ("min q3") the smallest one over the records is bounded. Under several
+    records no structure is known to have small peaks, as each record may have its own one.
+
+    Args:
+        peaks: Peaks by the record's name, or by the direction of one record, and by the peak's
+            name; at least one record, and the same peaks and levels for each.
+    """
+    largest: dict[str, Peak] = {}
+    for name, first in next(iter(peaks.values())).items():
+        of_records = [found[name].outwards for found in peaks.values()]
+        farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
+        nature = Nature.weakest(peak.nature for peak in of_records)
+        # Each array is the largest one of all records; the other fields are those of the record
+        # under which the largest peak is attained. Smallest values of q have been turned into
+        # largest values of -q (`outwards`), and are turned back at the end (`mirrored`).
+        found = with_combined(
+            replace(farthest, nature=nature), of_records, np.max,
+            "lower", "upper", "error", "reached", "least_lower",
+        )  # fmt: skip
+        if len(of_records) > 1:
+            found = replace(found, least_upper=np.full_like(found.reached, np.inf))
+        largest[name] = mirrored(found) if first.is_least else found
+    return largest
+
+
 def close_peaks(
     model: StructureModel,
     inputs: Mapping[str, FuzzyNumber],
@@ -487,12 +527,13 @@ def close_peaks(
     duration: float,
     step: float,
     alpha: Sequence[float] = ALPHA,
+    error: float = PEAK_ERROR,
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure, by the method that bounds them most closely.
 
     The method is chosen by the structure and the number of inputs, and guaranteed bounds are
-    preferred. An error of 0.5 % of each peak is aimed at, which need not be reached.
+    preferred.
 
     Args:
         model: The structure; its own outputs are not used.
@@ -502,6 +543,7 @@ def close_peaks(
         duration: Length of the simulation, in s.
         step: Distance of the time nodes, in s.
         alpha: Levels, rising within [0, 1].
+        error: Error that is aimed at, and need not be reached, as a fraction of each peak.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -516,7 +558,7 @@ def close_peaks(
     band = envelope(
         model.with_outputs(outputs),
         inputs,
-        Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes),
+        Auto(error, peaks=True, magnitudes=magnitudes),
         duration=duration,
         step=step,
         alpha=alpha,

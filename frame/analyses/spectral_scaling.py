@@ -126,7 +126,7 @@ def scale_suite(
         >>> round(scaled.factors["record-2001"], 3), len(scaled.suite)
         (1.826, 11)
     """
-    names = record_names(suite)
+    names = record_names([[record] for record in suite])
     require_choice("fit", fit, FITS)
     if isinstance(period, StructureModel):
         period = nominal_mode(period).period

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import ceil, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,14 +20,16 @@ from alphacut.base.number_text import (
     range_text,
 )
 from alphacut.base.progress_bar import Progress, nth_subprogress
+from alphacut.frame.analyses.angles import angle_peaks, angle_response
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
-from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, mirrored, with_combined
+from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import arias_fractions
-from alphacut.frame.spectra.response_spectrum import spectral_acceleration
+from alphacut.frame.spectra.response_spectrum import rotated_spectra, spectral_acceleration
 from alphacut.frame.structures.linear import LinearSystem, has_matrices, nominal_modes
+from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy import FuzzyNumber
@@ -36,8 +38,12 @@ from alphacut.fuzzy.result import Nature
 NODES = 2
 """Time nodes in each step at which peaks are bounded (tuned: the error between the nodes falls with
 the square of this number, and the time rises in proportion to it)."""
-MEASURES = {"PGA": "m/s^2", "Sa(T1)": "m/s^2", "scale": ""}
+ROTATED = {"RotD50": "m/s^2", "RotD100": "m/s^2"}
+"""SI units of the intensity measures of records with two horizontal components alone."""
+MEASURES = {"PGA": "m/s^2", "Sa(T1)": "m/s^2", "scale": ""} | ROTATED
 """SI units of the intensity measures of a record, by their names."""
+GroundMotion = Accelerogram | Sequence[Accelerogram]
+"""A record of one component; or of two horizontal ones, and perhaps the vertical one."""
 
 
 class NominalMode(NamedTuple):
@@ -75,7 +81,8 @@ class RecordPeaks:
         truncated_fraction: Fraction of the Arias intensity of the record that lies after the end of
             the response.
         measures: Intensity measures of the scaled record: "PGA" and "Sa(T1)" in m/s², the latter
-            the pseudo-acceleration with the structure's own damping; and "scale", which is 1.
+            the pseudo-acceleration with the structure's own damping; and "scale", which is 1. Of
+            two horizontal components the larger values, and "RotD50" and "RotD100" of Sa(T1).
         peak: Peaks by name; empty before they are computed.
     """
 
@@ -91,15 +98,22 @@ class ScaledRecord:
 
     Args:
         name: Name of the record.
-        ground: The scaled accelerogram.
+        components: The scaled accelerograms of its components.
         facts: Length of the response and intensity measures, without peaks.
         warnings: Sentences on what is unusual in the record.
+        all_angles: Whether both horizontal components are turned by all angles.
     """
 
     name: str
-    ground: Accelerogram
+    components: tuple[Accelerogram, ...]
     facts: RecordPeaks
     warnings: tuple[str, ...]
+    all_angles: bool = False
+
+    @property
+    def ground(self) -> Accelerogram:
+        """The scaled accelerogram of the first component."""
+        return self.components[0]
 
     @property
     def duration(self) -> float:
@@ -114,27 +128,33 @@ class ScaledRecord:
 
 def scaled_records(
     model: StructureModel,
-    suite: Sequence[Accelerogram],
+    suite: Sequence[GroundMotion],
     *,
     duration: float,
     step: float,
     scale: float = 1.0,
     measure: str = "",
+    all_angles: bool = False,
 ) -> tuple[ScaledRecord, ...]:
     """Scale the records of a suite, and determine lengths of responses, measures and warnings.
 
     The measures of a record are its largest ground acceleration "PGA" and "Sa(T1)", the largest
-    pseudo-acceleration of an oscillator with period and damping of the structure's first mode.
+    pseudo-acceleration of an oscillator with period and damping of the structure's first mode. Of
+    a record with two horizontal components they are the larger ones of both; further measures are
+    then "RotD50" and "RotD100" of Sa(T1), the median and the largest value over all directions.
 
     Args:
         model: The structure; its first mode is that at its own parameters.
-        suite: Records after baseline correction. Those without a name are called "record 1" and so
-            on by their place.
+        suite: Records after baseline correction, each an accelerogram, or a sequence of those of
+            its components at the same times. Those without a name are called "record 1" and so on
+            by their place.
         duration: Longest response, in s; a response ends five natural periods after its record, at
             a whole number of steps.
         step: Distance of the time nodes, in s.
-        scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
-        measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
+        scale: Factor of every record, or the value in m/s² to which `measure` is scaled. All
+            components of a record have the same factor.
+        measure: "PGA", "Sa(T1)", "RotD50" or "RotD100"; empty if `scale` is a factor.
+        all_angles: Whether the horizontal components are to be turned by all angles.
 
     Returns:
         The scaled records in the order of the suite, with the measures after scaling, but without
@@ -145,62 +165,110 @@ def scaled_records(
         RefusedError: `measure` is unknown, `duration` or `step` is not positive, there is no
             record, two have the same name, a record is zero throughout, the structure has no
             matrices of mass, damping and stiffness, it may drift, or its first period is above
-            1000 s.
+            1000 s. Or components do not belong to the same times, or `measure` or `all_angles`
+            needs two components and a record has one.
     """
-    require_choice("measure", measure, ["", "PGA", "Sa(T1)"])
+    require_choice("measure", measure, ["", "PGA", "Sa(T1)", *ROTATED])
     require(duration > 0, "duration", value=f"{duration:g} s", allowed="above 0 s")
     checked_number("step", step, positive=True)
-    names = record_names(suite)
+    records = [(x,) if isinstance(x, Accelerogram) else tuple(x) for x in suite]
+    names = record_names(records)
     mode = nominal_mode(model)
     # Towers have periods of about 10 s. A longer one than 1000 s is a mistake in a unit.
     what = f"a first natural period of {mode.period:.4g} s"
     cure = "are the units of mass and stiffness right, as t and MN/m?"
     require(mode.period <= 1000, "structure", what, "periods up to 1000 s", cure)
     scaled = []
-    for name, record in zip(names, suite, strict=True):
-        # A spectrum is defined for less than critical damping, for which an oscillator oscillates.
-        response = spectral_acceleration(record, mode.period, min(mode.ratio, 0.999))
-        measures = {"PGA": record.extremes[0], "Sa(T1)": response}
+    for name, components in zip(names, records, strict=True):
+        measures = _measures(components, mode)
         is_moving = min(measures.values()) > 0
         allowed = "a record that moves something"
         require(is_moving, f"record {name}", value="zero throughout", allowed=allowed)
+        is_enough = len(components) > 1 or not (all_angles or measure in ROTATED)
+        what = "of one component"
+        asked = measure or "all angles"
+        require(is_enough, f"record {name}", what, f"two or three components, for {asked}")
 
         # The free vibration after the record is included for five natural periods, in which a
         # damping ratio of 5 % reduces it to a fifth. The small number allows for rounding.
-        record_length = (len(record.samples) - 1) * record.step
+        first = components[0]
+        record_length = (len(first.samples) - 1) * first.step
         length = min(duration, record_length + 5 * mode.period)
         # The response ends with a whole step.
         n_steps = max(1, ceil(length / step - 1e-9))
-        truncated_fraction = 0.0
-        if length < record_length:
-            intensity = arias_fractions(record.samples, record.step)
-            truncated_fraction = 1 - float(intensity[int(length / record.step + 1e-9)])
-
-        # Both measures are proportional to the record. Without a measure `scale` is the factor.
+        # Measures are proportional to the record. Without a measure `scale` is the factor.
         factor = scale / measures.get(measure, 1.0)
         scaled_measures = {title: factor * value for title, value in measures.items()}
+        warnings = short_record_warnings(f"record {name}", record_length, mode.period)
+        grounds: list[Accelerogram] = []
+        truncated: list[float] = []
+        for component in components:
+            fraction = 0.0
+            if length < record_length:
+                intensity = arias_fractions(component.samples, component.step)
+                fraction = 1 - float(intensity[int(length / component.step + 1e-9)])
+            truncated.append(fraction)
+            of_component = name
+            if len(components) > 1:
+                of_component = component.name or f"{name}, component {len(grounds) + 1}"
+            samples = factor * component.samples
+            ground = Accelerogram(component.step, samples, name=component.name or name)
+            grounds.append(ground)
+            warnings += _warnings(
+                of_component,
+                component,
+                end=n_steps * step,
+                truncated_fraction=fraction,
+                peak=ground.extremes[0],
+            )
         facts = RecordPeaks(
             duration_s=n_steps * step,
-            truncated_fraction=truncated_fraction,
+            truncated_fraction=max(truncated),
             measures=scaled_measures | {"scale": 1.0},
             peak={},
         )
-        ground = Accelerogram(record.step, factor * record.samples, name=name)
-        warnings = short_record_warnings(f"record {name}", record_length, mode.period)
-        warnings += _warnings(name, record, facts, peak=ground.extremes[0])
-        scaled.append(ScaledRecord(name, ground, facts, tuple(warnings)))
+        scaled.append(ScaledRecord(name, tuple(grounds), facts, tuple(warnings), all_angles))
     return tuple(scaled)
 
 
-def record_names(suite: Sequence[Accelerogram]) -> list[str]:
+def _measures(components: Sequence[Accelerogram], mode: NominalMode) -> dict[str, float]:
+    """Return the intensity measures of a record by name; a third, vertical component counts not.
+
+    Raises:
+        RefusedError: Two components do not belong to the same times.
+    """
+    for other in components[1:]:
+        components[0].require_times_of(other)
+    horizontal = components[:2]
+    # A spectrum is defined for less than critical damping, for which an oscillator oscillates.
+    ratio = min(mode.ratio, 0.999)
+    measures = {
+        "PGA": max(x.extremes[0] for x in horizontal),
+        "Sa(T1)": max(spectral_acceleration(x, mode.period, ratio) for x in horizontal),
+    }
+    if len(horizontal) > 1:
+        rotated = rotated_spectra(horizontal[0], horizontal[1], mode.period, ratio)
+        measures |= {"RotD50": float(rotated.rotd50), "RotD100": float(rotated.rotd100)}
+    return measures
+
+
+def record_names(records: Sequence[Sequence[Accelerogram]]) -> list[str]:
     """Return the names of records, "record 1" and so on of those without one.
+
+    Several components have the name that "+" makes of theirs, as "x+y".
+
+    Args:
+        records: The components of each record.
 
     Raises:
         RefusedError: There is no record, or two have the same name, by which results are told
             apart.
     """
-    require(len(suite) > 0, "suite", value=None, allowed="one record or more")
-    names = [record.name or f"record {number}" for number, record in enumerate(suite, start=1)]
+    require(len(records) > 0, "suite", value=None, allowed="one record or more")
+    names = []
+    for number, components in enumerate(records, start=1):
+        joined = "+".join(component.name for component in components if component.name)
+        names.append(joined or f"record {number}")
     repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
     require(not repeated, "suite", value=repeated, allowed="a name of its own for each record")
     return names
@@ -219,7 +287,7 @@ def short_record_warnings(name: str, length: float, period: float) -> list[str]:
 
 
 def _warnings(
-    name: str, record: Accelerogram, facts: RecordPeaks, *, peak: float
+    name: str, record: Accelerogram, *, end: float, truncated_fraction: float, peak: float
 ) -> tuple[str, ...]:
     """Return sentences on what is unusual in a record; none for an ordinary one.
 
@@ -229,7 +297,8 @@ def _warnings(
     Args:
         name: Name of the record.
         record: The record before scaling; it is not zero throughout.
-        facts: Length of the response, and the fraction of the Arias intensity after its end.
+        end: Length of the response, in s.
+        truncated_fraction: Fraction of the Arias intensity of the record after this end.
         peak: Largest magnitude of the scaled record, in m/s^2.
     """
     warnings = [f"of record {name} {remark}" for remark in record.remarks]
@@ -243,9 +312,9 @@ def _warnings(
     if abs(mean_fraction) > 0.01:
         what = f"the mean of record {name} is {percent_text(mean_fraction)} of its peak"
         warnings.append(f'{what}; records.baseline = "mean" subtracts it')
-    if facts.truncated_fraction > 0:
-        what = f"{facts.truncated_fraction:.1%} of the Arias intensity of record {name}"
-        warnings.append(f"{what} lies after the end of its motion, {facts.duration_s:g} s")
+    if truncated_fraction > 0:
+        what = f"{truncated_fraction:.1%} of the Arias intensity of record {name}"
+        warnings.append(f"{what} lies after the end of its motion, {end:g} s")
     return tuple(warnings)
 
 
@@ -278,15 +347,11 @@ def record_peaks(
         RefusedError: There is no such output, or inputs, levels or the step are not allowed.
         FailedError: No bounds are found, or a time step did not converge.
     """
-    return close_peaks(
-        model.moved_by(record.ground),
-        inputs,
-        names,
-        duration=record.duration,
-        step=step / NODES,
-        alpha=alpha,
-        progress=progress,
-    )
+    motion: dict[str, Any] = {"duration": record.duration, "step": step / NODES, "alpha": alpha}
+    moved = model.moved_by(*record.components)
+    if record.all_angles:
+        return angle_peaks(moved, inputs, names, **motion, progress=progress).peak
+    return close_peaks(moved, inputs, names, **motion, progress=progress)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -336,20 +401,30 @@ class SuitePeaks(Answer):
                 f"at α = {self.alpha[0]:g}": f"{ends} {unit}".strip(),
                 "nature": self.nature_text(peak.nature),
                 "reached": attained_text,
-                "record": self.farthest_record.get(name, ""),
+                "record": self.where(name),
             }
             rows.append(row)
         return table_of(rows)
+
+    def where(self, name: str) -> str:
+        """Return the record under which a peak is attained, with its angle if all are meant."""
+        record = self.farthest_record.get(name, "")
+        worst = self.peak[name].worst
+        if not record or worst is None:
+            return record
+        return f"{record}, {worst.angle:.1f}°"
 
     def records(self) -> list[Record]:
         """Return a row for each record and peak, and then one for each peak and statistic.
 
         The columns are the record, its intensity measures in m/s², name and SI unit of the peak,
         the bound of the farthest peak and the attained value on the lowest level, None if not
-        known, and the guarantee. In the rows of "mean", "median" and "84 %" quantile of the bounds
+        known, and the guarantee; for all angles also that of the attained value in degrees. In the
+        rows of "mean", "median" and "84 %" quantile of the bounds
         over all records, measures, attained values and guarantee are None.
         """
         rows: list[Record] = []
+        has_angles = any(peak.worst is not None for peak in self.peak.values())
         for name, record in self.by_record.items():
             for peak_name, peak in record.peak.items():
                 row: Record = {
@@ -362,6 +437,8 @@ class SuitePeaks(Answer):
                     "peak reached": known(peak.reached[0]),
                     "nature": self.nature_text(peak.nature),
                 }
+                if has_angles:
+                    row["angle [deg]"] = None if peak.worst is None else peak.worst.angle
                 rows.append(row)
         no_values = dict.fromkeys(rows[0])
         for peak_name, statistics in self.statistics.items():
@@ -388,7 +465,7 @@ class SuitePeaks(Answer):
 def over_records(
     model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
-    suite: Sequence[Accelerogram],
+    suite: Sequence[GroundMotion],
     *,
     duration: float,
     step: float,
@@ -396,6 +473,7 @@ def over_records(
     names: Sequence[str] = (),
     scale: float = 1.0,
     measure: str = "",
+    all_angles: bool = False,
     progress: Progress | None = None,
 ) -> SuitePeaks:
     """Return the peaks of a structure under each record of a suite, the largest and the mean.
@@ -403,14 +481,18 @@ def over_records(
     Args:
         model: A linear structure, or a frame that yields. Each record replaces its own record.
         inputs: Fuzzy parameters by name, in SI units.
-        suite: Records, see `read_suite`.
+        suite: Records, see `read_suite`; each an accelerogram, or a sequence of those of its two or
+            three components, one for `ground` and each entry of `components` of the structure.
         duration: Longest response, in s; a response ends five natural periods after its record.
         step: Distance of the time nodes, in s; peaks are bounded at two nodes in each step.
         alpha: Levels, rising within [0, 1].
         names: Names of peaks, such as "drift1" for the magnitude, "max q3" or "min q3"; by default
             the magnitudes of all outputs.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
-        measure: "PGA" or "Sa(T1)"; empty if `scale` is a factor.
+        measure: "PGA" or "Sa(T1)", of two components also "RotD50" or "RotD100" of Sa(T1); empty
+            if `scale` is a factor.
+        all_angles: Whether the two horizontal components come from all directions, turned together
+            by any angle, so that peaks are those of the worst angle; magnitudes alone.
         progress: Called with the completed fraction.
 
     Returns:
@@ -423,7 +505,13 @@ def over_records(
         FailedError: No bounds are found for a record, or a time step did not converge.
     """
     records = scaled_records(
-        model, suite, duration=duration, step=step, scale=scale, measure=measure
+        model,
+        suite,
+        duration=duration,
+        step=step,
+        scale=scale,
+        measure=measure,
+        all_angles=all_angles,
     )
     names = tuple(names) or tuple(map(str, model.outputs))
     found = {}
@@ -491,36 +579,6 @@ def summarised(
     )
 
 
-def largest_peaks(peaks: Mapping[str, Peaks] | Mapping[float, Peaks]) -> dict[str, Peak]:
-    """Return bounds of the largest of a structure's peaks over all records, by the peak's name.
-
-    The largest peak does not fall if the peak under some record rises. Its bounds are therefore the
-    largest of the bounds under the records, with the weakest of their guarantees. Of the smallest
-    value of an output ("min q3") the smallest one over the records is bounded. Under several
-    records no structure is known to have small peaks, as each record may have its own one.
-
-    Args:
-        peaks: Peaks by the record's name, or by the direction of one record, and by the peak's
-            name; at least one record, and the same peaks and levels for each.
-    """
-    largest: dict[str, Peak] = {}
-    for name, first in next(iter(peaks.values())).items():
-        of_records = [found[name].outwards for found in peaks.values()]
-        farthest = max(of_records, key=lambda peak: float(peak.reached[0]))
-        nature = Nature.weakest(peak.nature for peak in of_records)
-        # Each array is the largest one of all records; the other fields are those of the record
-        # under which the largest peak is attained. Smallest values of q have been turned into
-        # largest values of -q (`outwards`), and are turned back at the end (`mirrored`).
-        found = with_combined(
-            replace(farthest, nature=nature), of_records, np.max,
-            "lower", "upper", "error", "reached", "least_lower",
-        )  # fmt: skip
-        if len(of_records) > 1:
-            found = replace(found, least_upper=np.full_like(found.reached, np.inf))
-        largest[name] = mirrored(found) if first.is_least else found
-    return largest
-
-
 def mean_peaks(
     model: LinearSystem,
     inputs: Mapping[str, FuzzyNumber],
@@ -555,11 +613,17 @@ def mean_peaks(
 
     tried_means: Array = np.zeros((len(tried), len(magnitudes)))
     for record in records:
-        moved = model.moved_by(record.ground).with_outputs(magnitudes)
+        moved = model.moved_by(*record.components).with_outputs(magnitudes)
         # Exact responses at the same nodes as the bounds.
-        flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
-        columns = [flow.outputs.index(output) for output in magnitudes]
-        tried_means += np.abs(flow.values(tried)).max(axis=1)[:, columns] / len(records)
+        motion = {"duration": record.duration, "step": step / NODES}
+        if record.all_angles:
+            assert isinstance(moved, MatrixStructure)  # whose peaks have been bounded
+            values = angle_response(moved, cuts.names, tried, **motion).magnitudes
+        else:
+            flow = make_flow(moved, cuts.names, record.duration, step / NODES, "exact")
+            values = np.abs(flow.values(tried))
+        columns = [moved.outputs.index(output) for output in magnitudes]
+        tried_means += values.max(axis=1)[:, columns] / len(records)
 
     found: dict[str, Peak] = {}
     for name, means in zip(magnitudes, tried_means.T, strict=True):

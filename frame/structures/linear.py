@@ -169,8 +169,18 @@ class LinearSystem(StructureModel):
         """Return the structure with its initial stiffness, whose columns do not yield."""
         return self
 
-    def moved_by(self, ground: Accelerogram) -> Self:
-        """Return the structure with another base excitation."""
+    def moved_by(self, ground: Accelerogram, *others: Accelerogram) -> Self:
+        """Return the structure with another base excitation.
+
+        Args:
+            ground: Its accelerogram.
+            others: Further components, which only a `MatrixStructure` may have.
+
+        Raises:
+            RefusedError: There are further components.
+        """
+        what = f"of {len(others) + 1} components"
+        require(not others, "ground", what, "one component, of a frame with one direction")
         moved: Any = replace(cast("Any", self), ground=ground)
         return cast("Self", moved)
 

@@ -69,7 +69,8 @@ class MatrixStructure(LinearSystem):
         loads: Forces on unknowns that have mass. The inertia forces of `components` are added to
             them.
         components: Further components of the ground motion beside `ground`: pairs (accelerogram,
-            influence vector (n,)). All components have the same step and number of samples.
+            influence vector (n,)). All components have the same step and number of samples. An
+            accelerogram may be None, of a structure that records of several components will move.
 
     Raises:
         RefusedError: A name or unit is out of alphabet, a shape is wrong, a number not finite, a
@@ -97,7 +98,7 @@ class MatrixStructure(LinearSystem):
     ratios: Sequence[str | float] = ()
     row_factors: Mapping[str, Factor | str | float] = field(default_factory=dict)
     loads: Sequence[Force] = ()
-    components: Sequence[tuple[Accelerogram, Array]] = ()
+    components: Sequence[tuple[Accelerogram | None, Array]] = ()
 
     def __post_init__(self) -> None:
         """Check all fields, and store arrays as dense, exactly symmetric ones.
@@ -153,15 +154,22 @@ class MatrixStructure(LinearSystem):
         require_sequence("components", self.components, allowed)
         for pair in self.components:
             is_pair = isinstance(pair, Sequence) and len(pair) == 2
-            is_pair = is_pair and isinstance(pair[0], Accelerogram)
+            is_pair = is_pair and isinstance(pair[0], Accelerogram | None)
             require(is_pair, "components", type(pair).__name__, allowed)
-            ground, influence = pair
+            influence = pair[1]
             require_numbers("influence vector", influence)
             shape = np.shape(influence)
             require(
                 shape == (self.size,), "influence vector", f"of shape {shape}", f"({self.size},)"
             )
-            (self.ground or self.components[0][0]).require_times_of(ground)
+        for other in self.accelerograms[1:]:
+            self.accelerograms[0].require_times_of(other)
+
+    @property
+    def accelerograms(self) -> list[Accelerogram]:
+        """Accelerograms of all components of the ground motion, of `ground` first."""
+        grounds = [self.ground, *(ground for ground, _ in self.components)]
+        return [ground for ground in grounds if ground is not None]
 
     def _inertia_forces(self) -> Iterator[Force]:
         """Yield the forces −M(p) ι a(t) = −Σ_i f_i(p) M_i ι a(t) of each component (ι, a).
@@ -169,18 +177,24 @@ class MatrixStructure(LinearSystem):
         There is one force for each term of the mass, whose amplitude is the factor f_i.
         """
         for ground, influence in self.components:
+            if ground is None:
+                continue
             for factor, array in self.mass:
                 yield Force(-array @ influence, factor, ground, is_inertial=True)
 
-    def moved_by(self, ground: Accelerogram) -> Self:
-        """Return the structure with another base excitation, if it has but one component.
+    def moved_by(self, ground: Accelerogram, *others: Accelerogram) -> Self:
+        """Return the structure with another base excitation, an accelerogram for each component.
 
         Raises:
-            RefusedError: The ground moves in several components.
+            RefusedError: There are more or fewer accelerograms than influence vectors.
         """
-        what = f"of {len(self.components) + 1} components"
-        require(not self.components, "ground", what, "one component where a record replaces it")
-        return super().moved_by(ground)
+        count = len(self.components) + 1
+        what = f"of {len(others) + 1} components"
+        allowed = f"{count}, one for each influence vector"
+        require(len(others) + 1 == count, "ground", what, allowed)
+        influences = [influence for _, influence in self.components]
+        components = list(zip(others, influences, strict=True))
+        return replace(self, ground=ground, components=components)
 
     def _require_forces_on_masses(self) -> None:
         """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude."""

@@ -7,8 +7,7 @@ import pytest
 
 from alphacut.frame import Accelerogram, Force, History, MatrixStructure, over_angles
 from alphacut.frame.analyses.angles import turned
-from alphacut.frame.analyses.peaks import Peak, close_peaks
-from alphacut.frame.analyses.suites import largest_peaks
+from alphacut.frame.analyses.peaks import Peak, close_peaks, largest_peaks
 from alphacut.fuzzy import Interval, Nature, RefusedError
 from tests.frame.motions import exact_motions, random_points
 
@@ -71,15 +70,15 @@ def test_no_sampled_angle_exceeds_the_bound_of_random_plans(case):
     found = over_angles(plan, INPUTS, **MOTION, directions=directions)
     peak = found.peak["corner"]
     assert peak.nature is Nature.GUARANTEED
-    assert len(found.by_angle) == directions * (1 + case % 2)
+    n_first = directions * (1 + case % 2)
+    assert len(found.by_angle) >= n_first
     angles = rng.uniform(0, 2 * np.pi, 2000)
     sampled = sampled_peaks(plan, INPUTS, angles, random_points(INPUTS, 2000, rng))
     assert sampled.max() <= peak.proved[0]
-    # The inputs found are the worst of one of the directions, 60° apart.
-    assert peak.reached[0] > 0.98 * np.cos(np.pi / 6) * sampled.max()
+    assert peak.reached[0] > 0.99 * sampled.max()
     # What is attained is attained at the named inputs, angle and time.
     point = np.array([[peak.reached_at["k"]]])
-    worst = found.worst["corner"]
+    worst = peak.worst
     there = exact_motions(turned(plan, np.radians(worst.angle)), point, INPUTS, DURATION, STEP)
     assert np.abs(there[0, round(worst.time / STEP), 0]) == pytest.approx(peak.reached[0])
     assert sampled_peaks(plan, INPUTS, np.radians([worst.angle]), point) == pytest.approx(
@@ -106,8 +105,8 @@ def test_every_angle_of_a_symmetric_plan_is_alike():
     alone = close_peaks(replace(plan, components=()), INPUTS, ["east"], **MOTION)["east"]
     for name, angle in (("east", 0), ("oblique", 60)):
         assert found.peak[name].reached[0] == pytest.approx(alone.reached[0], rel=1e-3)
-        assert alone.proved[0] <= found.peak[name].proved[0] <= 1.02 * alone.proved[0]
-        assert found.worst[name].angle % 180 == pytest.approx(angle, abs=1e-6)
+        assert alone.reached[0] <= found.peak[name].proved[0] <= 1.02 * alone.proved[0]
+        assert found.peak[name].worst.angle % 180 == pytest.approx(angle, abs=1e-6)
     table = str(found)
     assert "guaranteed" in table
     assert "°, " in table

@@ -76,6 +76,6 @@ def test_what_is_no_component_is_one_line(components, message):
         replace(PLAN, components=components)
 
 
-def test_a_suite_of_single_records_replaces_no_component():
-    with pytest.raises(RefusedError, match="ground is of 2 components"):
+def test_a_suite_of_single_records_lacks_a_component():
+    with pytest.raises(RefusedError, match="ground is of 1 components; allowed: 2, one"):
         over_records(PLAN, INPUTS, [OTHER], duration=1.0, step=0.05)
