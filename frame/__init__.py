@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from alphacut.frame.dynamics.flow import LinearFlow
     from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint
     from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+    from alphacut.frame.identification.cover import learned_envelope
     from alphacut.frame.identification.identify import Identified, RefutedError, identify
     from alphacut.frame.identification.learned import LearnedInputs, Prediction, Predictions
     from alphacut.frame.identification.modes import MeasuredMode, measured_mode
@@ -68,11 +69,11 @@ __all__ = [
     "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumResponse", "StoreyFrame",
     "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "affine_terms",
     "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
-    "eurocode8_spectrum", "fragility", "identify", "incremental", "measured_mode", "over_angles",
-    "over_records", "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record",
-    "read_spectrum", "read_suite", "read_unknowns", "require_envelope", "response_spectrum",
-    "rotated_spectra", "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_response",
-    "tolerances",
+    "eurocode8_spectrum", "fragility", "identify", "incremental", "learned_envelope",
+    "measured_mode", "over_angles", "over_records", "peaks", "pendulum", "probability",
+    "read_matrix", "read_modes", "read_record", "read_spectrum", "read_suite", "read_unknowns",
+    "require_envelope", "response_spectrum", "rotated_spectra", "scale_suite", "sensitivity",
+    "spectral_acceleration", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -127,6 +128,7 @@ AT_FIRST_USE = {
     "fragility": "analyses.fragility",
     "identify": "identification.identify",
     "incremental": "analyses.incremental",
+    "learned_envelope": "identification.cover",
     "measured_mode": "identification.modes",
     "over_angles": "analyses.angles",
     "over_records": "analyses.suites",

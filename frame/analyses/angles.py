@@ -252,12 +252,14 @@ def angle_peaks(
     def tick(k: int) -> Progress | bool | None:
         return progress if isinstance(progress, bool) else nth_subprogress(progress, k, n_pieces)
 
-    for k, angle in enumerate(angles.tolist()):
+    for k, angle in enumerate(map(float, angles)):
         bounded(angle, names, error=COARSE_ERROR, progress=tick(k))
     peak: dict[str, Peak] = {}
     for k, name in enumerate(names, start=len(angles)):
         observed = structure.with_outputs([name])
-        at_angles = {angle: by_angle[float(np.degrees(angle))][name] for angle in angles.tolist()}
+        at_angles = {
+            angle: by_angle[float(np.degrees(angle))][name] for angle in map(float, angles)
+        }
         close: dict[float, Peak] = {}
         for _ in range(FURTHER + 1):
             farthest = _over_all(at_angles | close, circle)

@@ -214,7 +214,9 @@ class CriticalMeasures:
             of_records.append(ends)
         # All records are tried up to the same measure.
         ends_of_records = np.moveaxis(np.array(of_records), 0, -1)  # (ends, levels, records)
-        return cls(*ends_of_records, largest=float(records[0].measure[-1]))
+        low, low_reached, high_reached, high, crossed = ends_of_records
+        largest = float(records[0].measure[-1])
+        return cls(low, low_reached, high_reached, high, crossed, largest=largest)
 
     @classmethod
     def of_any(cls, limits: Sequence[CriticalMeasures]) -> CriticalMeasures:

@@ -382,7 +382,7 @@ def lattice_of(xy: Array) -> Lattice:
     found = np.vstack([half_vectors, centre])
     if abs(found - [[1, 0], [0, 1], [0, 0]]).max() <= SAME_PLACE:
         return SQUARE
-    first, second, middle = map(tuple, found.tolist())
+    first, second, middle = [(float(x), float(y)) for x, y in found]
     return Lattice((first, second), middle)
 
 
