@@ -26,6 +26,12 @@ if TYPE_CHECKING:
         fuzzy_image_stiffness,
         read_image,
     )
+    from alphacut.rve.image.thermal_expansion import (
+        ThermalBounds,
+        declared_bounds,
+        fuzzy_thermal_bounds,
+        thermal_bounds,
+    )
     from alphacut.rve.image.vti import ImageFields, image_fields
     from alphacut.rve.prism.cell_fields import CellFields
     from alphacut.rve.prism.model import PrismModel
@@ -43,10 +49,11 @@ __all__ = [
     "LOADS", "STRAIN", "Cell", "CellFields", "Ellipse", "FuzzyImageConductivity",
     "FuzzyImageStiffness", "FuzzyStiffness", "GreyImage", "HomogenisedStiffness", "ImageFields",
     "LevelSetModel", "MeshModel", "Phase", "PrismModel", "ProductSpace", "ReferenceBounds",
-    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "VoigtPhase", "constants",
-    "effective_modulus", "fibre_conductivity", "fuzzy_image_conductivity", "fuzzy_image_stiffness",
-    "fuzzy_stiffness", "image_fields", "loss_factors", "read_image", "reference_bounds",
-    "solve_conduction", "solve_image", "sphere_conductivity",
+    "SeriesModel", "SlicesModel", "SpheresModel", "StressCurve", "ThermalBounds", "VoigtPhase",
+    "constants", "declared_bounds", "effective_modulus", "fibre_conductivity",
+    "fuzzy_image_conductivity", "fuzzy_image_stiffness", "fuzzy_stiffness", "fuzzy_thermal_bounds",
+    "image_fields", "loss_factors", "read_image", "reference_bounds", "solve_conduction",
+    "solve_image", "sphere_conductivity", "thermal_bounds",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "CellFields": "prism.cell_fields",
@@ -63,11 +70,14 @@ AT_FIRST_USE = {
     "SeriesModel": "series.model",
     "SlicesModel": "slices.model",
     "SpheresModel": "spheres.model",
+    "ThermalBounds": "image.thermal_expansion",
     "constants": "engineering",
+    "declared_bounds": "image.thermal_expansion",
     "fibre_conductivity": "series.fibre_constants",
     "fuzzy_image_conductivity": "image.conductivity",
     "fuzzy_image_stiffness": "image.study",
     "fuzzy_stiffness": "fuzzy_cell",
+    "fuzzy_thermal_bounds": "image.thermal_expansion",
     "image_fields": "image.vti",
     "loss_factors": "result.loss_factors",
     "read_image": "image.study",
@@ -75,6 +85,7 @@ AT_FIRST_USE = {
     "solve_conduction": "image.model",
     "solve_image": "image.model",
     "sphere_conductivity": "spheres.conduction",
+    "thermal_bounds": "image.thermal_expansion",
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""
 
