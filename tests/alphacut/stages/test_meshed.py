@@ -115,7 +115,7 @@ def test_an_exported_cell_taken_as_the_mesh_has_the_same_modulus(tmp_path):
     [
         ("particles =", "stones =", "phase is 'stones'"),
         ("particles =", 'glue = {modulus = "1 GPa", poisson = 0.3}\nparticles =', "phase is 'glue'"),
-        ("two-particles", "unlike-sides", "a node of the sides x1 = ±1"),
+        ("two-particles", "unlike-sides", "has no partner on the opposite side"),
         ("two-particles", "absent", "mesh.file is"),
         ("two-particles.msh", "README.md", "without $MeshFormat at its start"),
         ("[modulus]", "[radius]\ntheta = [-2, 3]\n[modulus]", "law of θ is on -2 … 3"),

@@ -132,9 +132,8 @@ def test_storeys_that_yield_from_the_start_have_tangent_stiffness_and_damping(rn
 def test_events_and_not_steps_decide_and_energy_is_balanced(rng, monkeypatch):
     monkeypatch.setattr(yielding, "MAX_IMBALANCE", 1e-11)  # motions that exceed it are refused
     for storeys in (1, 2, 4):
-        frame = random_frame(rng, storeys)
-        found = motion(frame, 6.0, 0.02)
-        assert found[-1, -1] > 0  # it yields
+        frames = (random_frame(rng, storeys) for _ in range(20))
+        frame, found = next((x, y) for x in frames if (y := motion(x, 6.0, 0.02))[-1, -1] > 0)
         for parts in (2, 5, 10):
             finer = motion(frame, 6.0, 0.02 / parts)[::parts]
             assert (np.abs(finer - found).max(0) <= 1e-9 * np.abs(found).max(0)).all()
