@@ -127,13 +127,13 @@ def thermal_bounds(
     for values, expansion in zip(phases, expansions, strict=True):
         phase = ImagePhase.of(values)
         moduli.append(phase.interval(level, n).moduli)
-        factors = np.zeros(2)
+        factors: Array = np.zeros(2)
         if n == 2:
             factors = np.array(phase.poisson.cut(level))
         corners = np.outer(1 + factors, as_fuzzy("expansion", expansion).cut(level))
         strains.append([corners.min(), corners.max()])
     # The intervals are widened by the rounding of their ends, and of what is made of these.
-    c, shear = np.moveaxis(moduli, -1, 0) * [1 - ROUNDING, 1 + ROUNDING]
+    c, shear = np.moveaxis(np.array(moduli), -1, 0) * [1 - ROUNDING, 1 + ROUNDING]
     c = n * c
     free = np.array(strains)
     free += ROUNDING * abs(free) * [-1, 1]
@@ -151,7 +151,7 @@ def thermal_bounds(
         for corner in product(*free):
             a = np.repeat(corner, 2).reshape(c.shape)
             found.append([stiff.response(c * a), soft.response(a)])
-    lower, upper = np.moveaxis(found, -1, 0)
+    lower, upper = np.moveaxis(np.array(found), -1, 0)
     ends = np.stack([lower.min(axis=0), upper.max(axis=0)], axis=-1)
     if is_solid.sum() == 1 < len(phases):
         # The only solid phase expands freely, by a uniform strain.
@@ -291,7 +291,7 @@ class _Tensor:
             total = (1 + ROUNDING) * (abs(slope) * radius + remainder)
             ends = np.outer(trace, constant) + np.stack([-total, total], axis=-1)
             found.append((slope * middle)[:, np.newaxis] + ends)
-        lower, upper = np.moveaxis(found, -1, 0)
+        lower, upper = np.moveaxis(np.array(found), -1, 0)
         return np.stack([lower.max(axis=0), upper.min(axis=0)], axis=-1)
 
     def _mean(self, ends: Array) -> float:
