@@ -15,7 +15,14 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.case.types import Modulus, NotEmpty, OneOrMany, Quantity, Section, case_file, text
-from alphacut.frame import Accelerogram, StoreyFrame, damping_from_loss, pendulum, read_record
+from alphacut.frame import (
+    Accelerogram,
+    Identified,
+    StoreyFrame,
+    damping_from_loss,
+    pendulum,
+    read_record,
+)
 from alphacut.frame.structures.linear import LinearSystem, has_matrices
 from alphacut.frame.structures.model import StructureModel
 from alphacut.frame.structures.storey import SYMBOLS
@@ -108,12 +115,14 @@ class Structure:
         numbers: Every parameter by name, crisp or fuzzy, in SI units.
         heights: Heights of storeys in m by the names of their drifts and residual drifts.
         force_units: SI units of the amplitudes of forces by parameter, empty of factors.
+        learned: Set of parameters that measured modes left; None if none were learned.
     """
 
     model: StructureModel
     numbers: Mapping[str, FuzzyNumber]
     heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
     force_units: Mapping[str, str] = field(default_factory=dict)
+    learned: Identified | None = None
 
     @property
     def floor_masses(self) -> tuple[FuzzyNumber, ...]:

@@ -58,11 +58,16 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
         if "motion_inputs" in data:
             points, motions = stored_motions(data)
             lower, upper = np.moveaxis(data["cut"].values, -1, 0)  # of shape (levels, inputs)
-            Trial(envelope_of(data), lower, upper).require_agreement(points, motions)
+            highest = None  # results of former versions do not have it
+            if "motion_highest" in data:
+                highest = data["motion_highest"].values
+            Trial(envelope_of(data), lower, upper).require_agreement(points, motions, highest)
             n_motions = len(points)
             verdict = f"{n_motions} exact motions {agreement(nature == Nature.GUARANTEED)}"
         elif any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
             verdict = "its guaranteed peaks were tested by the run, nothing else in it is proved"
+        elif nature == Nature.GUARANTEED:
+            verdict = "it has no exact motions"
         else:
             verdict = "nothing in it is proved"
         document[name] = {"nature": nature, "motions_tested": n_motions}

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import xarray
 
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
+PROOFS = ("auto", "proof", "dual")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -135,8 +136,7 @@ class EnvelopeTask:
         end = 1.0
         if self.limited:
             end = 0.5
-        arguments = self.arguments(structure) | {"progress": subprogress(context.tick, 0.0, end)}
-        result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
+        result = self._envelope(structure, subprogress(context.tick, 0.0, end))
         peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
         # α-cuts are nested: the lowest level contains all others, so that its extremes and its
         # largest error are those of the whole envelope.
@@ -163,6 +163,28 @@ class EnvelopeTask:
             units={x: structure.unit(x) for x in (*names, *outputs_of([*peak_bounds]))},
         )
         return StageResult(numbers, data)
+
+    def _envelope(self, structure: Structure, progress: Progress) -> frame.Envelope:
+        """Return the envelope: of the learned set if the inputs are its parameters, else of a box.
+
+        Args:
+            structure: The structure with its fuzzy parameters.
+            progress: Called with the completed fraction of the envelope of a box.
+        """
+        arguments = self.arguments(structure)
+        learned = structure.learned
+        linear = structure.linear
+        is_proof = self.section.method in PROOFS
+        if learned and linear and is_proof and set(arguments["inputs"]) == set(learned.names):
+            return frame.learned_envelope(
+                linear,
+                learned,
+                self.section.method,
+                duration=self.duration,
+                step=self.section.step,
+            )
+        is_relative = not self.tolerance(structure).unit
+        return frame.envelope(**arguments, relative=is_relative, progress=progress)
 
     def _peaks(
         self, structure: Structure, envelope: frame.Envelope, progress: Progress
@@ -299,7 +321,7 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage[EnvelopeResult]:
     """Return the stage of one study."""
     # The outputs that are drawn and the name are left out: neither changes a bound.
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
-    inputs += [task.limited]
+    inputs += [task.limited, structure.learned]
     compute = partial(task.compute, structure)
     return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), EnvelopeResult, compute)
 

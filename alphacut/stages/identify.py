@@ -23,9 +23,9 @@ def identify_inputs(
         alpha: Rising α-levels above 0 of the learned inputs.
 
     Returns:
-        The answer, and the structure with the learned fuzzy numbers in place of the former ones. If
-        no inputs within the supports agree with the measurement, the answer says that the structure
-        is refuted, and the structure is returned as it was.
+        The answer, and the structure with the learned set, and its fuzzy numbers in place of the
+        former ones. If no inputs within the supports agree with the measurement, the answer says
+        that the structure is refuted, and the structure is returned as it was.
 
     Raises:
         RefusedError: α = 0 is among the levels, the file is not read, an input is unknown or crisp,
@@ -35,7 +35,7 @@ def identify_inputs(
     if learned.is_refuted:
         return learned.answer, structure
     numbers = {**structure.numbers, **learned.inputs}
-    return learned.answer, replace(structure, numbers=numbers)
+    return learned.answer, replace(structure, numbers=numbers, learned=learned)
 
 
 def require_learnable(section: Identify, structure: Structure, alpha: tuple[float, ...]) -> None:

@@ -18,11 +18,12 @@ from alphacut.base.errors import require
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.identification.enclosure import enclosure
-from alphacut.frame.identification.identify import Evidence, Identified
+from alphacut.frame.identification.identify import Evidence, Identified, RefutedError
 from alphacut.frame.identification.modes import chain_modes
 from alphacut.frame.propagation import Method, envelope
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.claimed import ClaimedNumber
@@ -151,18 +152,25 @@ def learned_envelope(
     upper = whole.upper.copy()
     found: Array = np.empty((0, len(numbers)))
     between = whole.between
+    bounded_at = learned.alpha.copy()
     for level in range(len(learned.alpha)):
+        covering = cover(learned, level, boxes)
+        if not len(covering):
+            if level == 0:
+                raise RefutedError(replace(learned, empty=float(learned.alpha[0])).refutation)
+            # The set is empty, and the bounds of the level before are kept for all that remain.
+            lower[level:] = lower[level - 1]
+            upper[level:] = upper[level - 1]
+            bounded_at[level:] = learned.alpha[level - 1]
+            break
         # The set of a level lies in that of the level before.
         if level:
             lower[level] = np.maximum(lower[level], lower[level - 1])
             upper[level] = np.minimum(upper[level], upper[level - 1])
-        covering = cover(learned, level, boxes)
         parts = []
         for low, high in covering:
             sides = zip(numbers, map(Interval, low, high), strict=True)
             parts.append(bounded(dict(sides), [0.0]))
-        if not parts:  # the set is empty; the bounds of the level before hold
-            continue
         # Each structure of the set lies in a box of the cover.
         lower[level] = np.maximum(lower[level], np.min([x.lower[0] for x in parts], axis=0))
         upper[level] = np.minimum(upper[level], np.max([x.upper[0] for x in parts], axis=0))
@@ -181,9 +189,10 @@ def learned_envelope(
         least_peaks=None,
         searched_peaks=None,
         outer=None,
+        tested_structures={},
         notes=(*whole.notes, f"over a cover of the learned set by {boxes} boxes"),
     )
-    return _with_members(bounds, learned, model, found)
+    return _with_members(bounds, learned, model, found, bounded_at)
 
 
 def _without_box(number: FuzzyNumber) -> FuzzyNumber:
@@ -195,15 +204,18 @@ def _without_box(number: FuzzyNumber) -> FuzzyNumber:
 
 
 def _with_members(
-    bounds: Envelope, learned: Identified, model: LinearSystem, points: Array
+    bounds: Envelope, learned: Identified, model: LinearSystem, points: Array, bounded_at: Array
 ) -> Envelope:
     """Add the responses of members of the learned sets as attained values, and their inputs.
+
+    Some of them are compared with the bounds as exact responses by another algorithm.
 
     Args:
         bounds: Guaranteed bounds of the sets.
         learned: The identification.
         model: The structure.
         points: Members of the set of the lowest level, shape (members, parameters).
+        bounded_at: For each level that whose set its bounds hold for: itself, or one before.
     """
     assert bounds.time is not None
     step = float(bounds.time[1] - bounds.time[0])
@@ -211,8 +223,11 @@ def _with_members(
     inner = Ends(np.full_like(bounds.lower, np.nan), np.full_like(bounds.lower, np.nan))
     at = Ends(np.full_like(bounds.lower_at, np.nan), np.full_like(bounds.lower_at, np.nan))
     responses = flow.values(points) if len(points) else np.empty((0, *bounds.lower.shape[1:]))
+    highest = np.full(len(points), -1)
     for level, alpha in enumerate(learned.alpha):
         is_member = contains(learned.evidence, points, float(alpha))
+        has_bounds = contains(learned.evidence, points, float(bounded_at[level]))
+        highest[has_bounds] = level
         if is_member.any():
             of_level = responses[is_member]
             inner.lower[level] = of_level.min(axis=0)
@@ -220,6 +235,7 @@ def _with_members(
             at.lower[level] = points[is_member][of_level.argmin(axis=0)]
             at.upper[level] = points[is_member][of_level.argmax(axis=0)]
     gap = np.fmax(inner.lower - bounds.lower, bounds.upper - inner.upper)
-    return replace(
+    found = replace(
         bounds, inner=inner, lower_at=at.lower, upper_at=at.upper, error=np.maximum(gap, 0.0)
     )
+    return with_motions_tested(found, model, (points, highest))

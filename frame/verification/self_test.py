@@ -53,10 +53,18 @@ class ContradictionError(FailedError):
     """An exact response contradicts a guaranteed envelope."""
 
 
-def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
+def with_motions_tested(
+    envelope: Envelope, system: LinearSystem, members: tuple[Array, Array] | None = None
+) -> Envelope:
     """Return a guaranteed envelope after comparing it with exact responses, which must agree.
 
     Their number is added as the fact `motions_tested`, and their structures are stored with it.
+
+    Args:
+        envelope: The envelope.
+        system: The structure.
+        members: If the bounds hold for a part of the cuts alone: inputs in it, shape (S, n), of
+            which the first are tested, and for each the highest level whose bounds hold for it.
 
     Raises:
         ContradictionError: An exact response leaves guaranteed bounds, is farther from a straight
@@ -69,11 +77,17 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
     # node and output have two, and a response 15 (the terms of its series) for each node, output,
     # state and time of a step. From 24 to 240 responses are tested; more find little.
     count = int(np.clip(len(cuts.alpha) * 67.0 / states, 24, 240))
-    points = motion_inputs(envelope, cuts, count)
-    motions = structures_at(system, envelope, points)
-    Trial(envelope, cuts.lower, cuts.upper).require_agreement(points, motions)
+    if members is None:
+        points = motion_inputs(envelope, cuts, count)
+        highest = np.full(len(points), len(cuts.alpha) - 1)
+    else:
+        points, highest = members[0][:count], members[1][:count]
     facts = {**envelope.facts, "motions_tested": len(points)}
-    return replace(envelope, facts=facts, tested_structures=variables(points, motions))
+    if not len(points):
+        return replace(envelope, facts=facts)
+    motions = structures_at(system, envelope, points)
+    Trial(envelope, cuts.lower, cuts.upper).require_agreement(points, motions, highest)
+    return replace(envelope, facts=facts, tested_structures=variables(points, motions, highest))
 
 
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
@@ -256,7 +270,9 @@ class Trial:
         if envelope.attained_error is not None:
             self.slack = self.tolerance + envelope.attained_error
 
-    def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
+    def require_agreement(
+        self, points: Array, motions: Sequence[LinearMotion], highest: Array | None = None
+    ) -> None:
         """Check that exact responses do not contradict the envelope, at nodes or between them.
 
         A response is compared with the bounds of all levels whose cut contains its inputs, but for
@@ -265,6 +281,7 @@ class Trial:
         Args:
             points: Inputs of S structures, shape (S, n), in SI units.
             motions: The structures at these inputs.
+            highest: Highest level whose bounds hold for each of them, shape (S,); all unless given.
 
         Raises:
             ContradictionError: A response leaves guaranteed bounds, is farther from a straight line
@@ -278,7 +295,9 @@ class Trial:
             tested = _TestedMotion(point, outputs.values, outputs.rounding, jumps)
             near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
             is_inside = (self.lower <= point + near) & (point - near <= self.upper)
-            for level in map(int, np.flatnonzero(is_inside.all(axis=1))):
+            last = len(is_inside) if highest is None else highest[k]
+            is_bounded = is_inside.all(axis=1) & (np.arange(len(is_inside)) <= last)
+            for level in map(int, np.flatnonzero(is_bounded)):
                 self.require_inside(level, tested)
                 self.require_attained(level, tested)
             self.require_interpolation_error(tested)
@@ -402,7 +421,7 @@ def _bounds_at_times(upper: Array, between: Array) -> Array:
 
 
 def variables(
-    points: Array, motions: Sequence[LinearMotion]
+    points: Array, motions: Sequence[LinearMotion], highest: Array
 ) -> dict[str, tuple[tuple[str, ...], Array]]:
     """Return dataset variables of tested structures: axes and values by name.
 
@@ -410,6 +429,7 @@ def variables(
         points: Inputs of S structures, shape (S, n).
         motions: The structures. The first ones are stored, as many as have a million numbers in
             three matrices each, 8 MB; the first is always stored.
+        highest: Highest level whose bounds hold for each of them, shape (S,).
     """
     count = max(1, min(len(motions), 1_000_000 // (3 * motions[0].mass.size)))
     first = motions[0]
@@ -417,7 +437,8 @@ def variables(
     numbers = np.array([[len(x.samples), *x[1:]] for x in first.histories], float)
     samples = np.concatenate([np.zeros(0), *(x.samples for x in first.histories)])
     found: dict[str, tuple[tuple[str, ...], Array]] = {
-        "motion_inputs": (("motion", "parameter"), points[:count])
+        "motion_inputs": (("motion", "parameter"), points[:count]),
+        "motion_highest": (("motion",), highest[:count]),
     }
     for name, axes in AXES.items():
         found[f"motion_{name}"] = axes, np.stack([getattr(x, name) for x in motions[:count]])

@@ -75,3 +75,22 @@ def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp
     assert not any("attained" in title for title in over_time)
     assert sum(BOX in title for title in over_time) == 4
     assert page.count(BOX) >= 6
+
+
+def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_path, capfd):
+    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]')
+    text = text.replace("[4, 5, 6] %", "5 %")
+    summary, told, _, tables = run_with(tmp_path, text, capfd)
+    peak = summary["envelopes"]["all"]["peak"]["drift1"]
+    assert peak["nature"] == "guaranteed"
+    assert BOX not in told
+    assert peak["reached"][0] <= peak["upper"][0]
+    assert not any(BOX in title for title in tables["envelope_all-drift1"])
+    assert main(["verify", str(tmp_path / "out")]) == 0
+    assert "exact motions agree with what is guaranteed" in capfd.readouterr().out
+    (tmp_path / "box").mkdir()
+    with_damping = text.replace("5 %", "[5, 5.0001] %").replace(
+        '["k"]\nalpha', '["k", "zeta"]\nalpha'
+    )
+    box, *_ = run_with(tmp_path / "box", with_damping, capfd)
+    assert peak["upper"][0] < 0.99 * box["envelopes"]["all"]["peak"]["drift1"]["upper"][0]
