@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, model_validator
@@ -23,7 +23,16 @@ from alphacut.case.structure import (
     damping_ratios_by_name,
     read_accelerogram,
 )
-from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
+from alphacut.case.types import (
+    Length,
+    NotEmpty,
+    Section,
+    after,
+    case_file,
+    distinct,
+    require_alone,
+    text,
+)
 from alphacut.frame import (
     Accelerogram,
     MatrixStructure,
@@ -195,13 +204,59 @@ def _si_unit(value: object, _: ValidationInfo) -> str:
 
 
 class ObservedRow(Section):
-    """One output of a structure from matrices: a row that acts on the unknowns."""
+    """One output of a structure from matrices: a row on the unknowns, or a drift of two of them.
 
-    unit: Annotated[str, text(_si_unit)] = "m"
-    """SI unit of the output, as m, N or N*m"""
-    row: dict[str, float] = Field(description='entries of the row by unknown, as {"5.x" = 1}')
+    An acceleration is the absolute one, relative to the ground plus that of the ground;
+    displacements, velocities and drifts are relative to the ground.
+    """
+
+    of: Literal["displacement", "velocity", "acceleration"] = "displacement"
+    """what of the unknowns the row takes"""
+    unit: Annotated[str | None, text(_si_unit)] = None
+    """SI unit of the output, as N or N*m; m, m/s or m/s^2 unless given, none of a drift ratio"""
+    row: dict[str, float] = Field(
+        default_factory=dict, description='entries of the row by unknown, as {"5.x" = 1}'
+    )
+    upper: str = ""
+    """in place of the row: the unknown above, as "5.x", of a drift of the storey between two"""
+    lower: str = ""
+    """the unknown below; the ground unless given"""
+    height: Length | None = None
+    """height of the storey, by which the drift is divided to a drift ratio"""
     factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Monomial(1.0, ())
     """factor of the row, as "E*I*l^-2", 1 unless given"""
+
+    def require_complete(self, key: str) -> None:
+        """Refuse an output that is neither a row nor a drift, or both; `key` is its own."""
+        if self.upper:
+            require_alone(f"{key}.row", bool(self.row), "upper")
+            require(self.upper != self.lower, f"{key}.lower", self.lower, "another than upper")
+            return
+        allowed = 'entries of the row by unknown, as {"5.x" = 1}, or upper and lower of a drift'
+        require(bool(self.row), f"{key}.row", None, allowed)
+        for name in ("lower", "height"):
+            allowed = 'upper beside it, the unknown above, as "5.x"'
+            require(not getattr(self, name), f"{key}.{name}", "without upper", allowed)
+
+    @property
+    def si_unit(self) -> str:
+        """SI unit of the output."""
+        units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+        unit = units[self.of]
+        if self.height is not None:
+            unit = {"m": "", "m/s": "1/s", "m/s^2": "1/s^2"}[unit]
+        return unit if self.unit is None else self.unit
+
+    @property
+    def entries(self) -> dict[str, float]:
+        """Entries of the row by unknown."""
+        if self.row:
+            return self.row
+        entry = 1.0 / (self.height or 1.0)
+        entries = {self.upper: entry}
+        if self.lower:
+            entries[self.lower] = -entry
+        return entries
 
 
 class MatricesSection(StructureSection):
@@ -272,8 +327,11 @@ class MatricesSection(StructureSection):
             numbers["E"] = modulus
         rows: dict[str, Array] = {}
         for name, output in self.outputs.items():
-            row = self._vector_over_unknowns(f"outputs.{name}.row", output.row)
-            rows[Output(name, output.unit)] = row
+            key = "row" if output.row else "upper, lower"
+            row = self._vector_over_unknowns(f"outputs.{name}.{key}", output.entries)
+            # A row of 3n entries is on displacements, velocities and accelerations, in this order.
+            place = ("displacement", "velocity", "acceleration").index(output.of)
+            rows[Output(name, output.si_unit)] = np.append(np.zeros(place * len(row)), row)
         try:
             model = MatrixStructure(
                 {name: number.nominal for name, number in numbers.items()},
@@ -372,8 +430,10 @@ class MatricesSection(StructureSection):
         """
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         require_names("matrices.parameters", self.parameters)
-        outputs = [Output(name, output.unit) for name, output in self.outputs.items()]
+        outputs = [Output(name, output.si_unit) for name, output in self.outputs.items()]
         require_names("matrices.outputs", outputs)
+        for name, output in self.outputs.items():
+            output.require_complete(f"matrices.outputs.{name}")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
         _ = self.nominal  # refuses matrices that do not fit together

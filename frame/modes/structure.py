@@ -190,12 +190,15 @@ def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
 
     Raises:
         UnprovedError: Rows depend on inputs, as only those of a frame's overturning moment do, or
-            an output takes displacements and velocities.
+            an output takes two of displacements, velocities and accelerations.
     """
     if not isinstance(assembly.rows, np.ndarray):
         cure = "take the method proof with few inputs, or leave the overturning moment out"
         raise UnprovedError("the overturning moment adds storeys by factors of inputs", cure)
     displacements, velocities = np.split(assembly.rows, 2, axis=1)
-    if (displacements.any(axis=1) & velocities.any(axis=1)).any():
-        raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
+    derivatives = [displacements, velocities, assembly.accelerated]
+    taken = np.count_nonzero([rows.any(axis=1) for rows in derivatives], axis=0)
+    if (taken > 1).any():
+        what = "an output mixes displacements, velocities or accelerations"
+        raise UnprovedError(what, "observe them apart")
     return displacements, velocities

@@ -55,7 +55,9 @@ class MatrixStructure(LinearSystem):
             `scipy.io.mmread` reads.
         stiffness: The same, in N/m.
         observed: Rows by output name (an `Output` gives its unit), each (n,) acting on
-            displacements or (2n,) acting on displacements and velocities.
+            displacements, (2n,) on displacements and velocities, or (3n,) on these and absolute
+            accelerations q̈ + ι a, those of the ground included. What is taken of accelerations
+            has no row factor, is of unknowns with mass, and of one component of ground motion.
         damping: The same, in N s/m.
         q0: Initial displacements, shape (n,), in m; zero when None.
         v0: Initial velocities, shape (n,), in m/s; zero when None.
@@ -76,7 +78,8 @@ class MatrixStructure(LinearSystem):
         RefusedError: A name or unit is out of alphabet, a shape is wrong, a number not finite, a
             factor names no parameter, an array is not symmetric, the mass of unknowns that have
             mass is not positive definite, one without mass has a damper, a force or no stiffness,
-            or a ratio is outside [0, 1).
+            or a ratio is outside [0, 1); or an output takes accelerations of unknowns
+            without mass, under several components, or has a factor of them.
 
     Example:
         >>> import numpy as np
@@ -140,6 +143,7 @@ class MatrixStructure(LinearSystem):
         for name, factor in self.row_factors.items():
             require_choice("row_factors", name, self.observed)
             self._require_factor(f"observed: {name}", factor)
+        self._require_accelerations()
         self._require_forces_on_masses()
         self._require_ratios()
 
@@ -195,6 +199,36 @@ class MatrixStructure(LinearSystem):
         influences = [influence for _, influence in self.components]
         components = list(zip(others, influences, strict=True))
         return replace(self, ground=ground, components=components)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """Rows of m outputs on displacements, velocities and accelerations, shape (m, 3n)."""
+        rows = np.zeros((len(self.observed), 3 * self.size))
+        for row, observed in zip(rows, self.observed.values(), strict=True):
+            row[: len(observed)] = observed  # a shorter row acts on the first of them alone
+        return rows
+
+    def _require_accelerations(self) -> None:
+        """Raise RefusedError if an output takes accelerations that the structure cannot give.
+
+        Unknowns without mass follow the others, so that their acceleration depends on that of the
+        ground at once. Inertia forces of further components give accelerations relative to them. A
+        factor would be one of what forces add to accelerations at once as well.
+        """
+        for name, row in zip(self.observed, self._rows[:, 2 * self.size :], strict=True):
+            if not row.any():
+                continue
+            key = f"observed: {name}"
+            missing = self.massless[np.flatnonzero(row[self.massless])]
+            value = f"accelerations of unknowns {missing}"
+            require(not len(missing), key, value, "accelerations of unknowns that have mass")
+            value = f"accelerations under {len(self.components) + 1} components"
+            require(not self.components, key, value, "accelerations under one component")
+            factor = self.row_factors.get(name, 1.0)
+            if isinstance(factor, Monomial):
+                factor = factor.simplest
+            value = "accelerations times a factor"
+            require(factor == 1, key, value, "accelerations as they are", "scale the row")
 
     def _require_forces_on_masses(self) -> None:
         """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude."""
@@ -476,7 +510,7 @@ class MatrixStructure(LinearSystem):
         """Check initial values, pattern, rows of outputs and forces, vectors over the n unknowns.
 
         Initial values and the pattern may be None. Each vector has n finite numbers; the row of an
-        output may have 2n, for displacements and velocities.
+        output may have 2n, for displacements and velocities, or 3n, for accelerations as well.
 
         Raises:
             RefusedError: A vector has another shape, or an entry that is no finite number.
@@ -492,7 +526,7 @@ class MatrixStructure(LinearSystem):
             require_numbers(name, value)
             shapes = [(n,)]
             if name.startswith("observed"):
-                shapes.append((2 * n,))
+                shapes += [(2 * n,), (3 * n,)]
             shape = np.shape(value)
             allowed = " or ".join(map(str, shapes))
             require(shape in shapes, name, f"of shape {shape}", allowed)
@@ -507,10 +541,10 @@ class MatrixStructure(LinearSystem):
         Returns:
             Assembly of numbers of the type of `p`: mass, stiffness of the springs and damping
             matrix, shape (…, n, n); initial displacements and velocities, shape (…, n); constant
-            rows of the m outputs on [q; v], shape (m, 2n), and their factors, shape (…, m); the
-            force vector of each load at its amplitude, shape (…, n, loads), None without loads.
-            Here … stands for S with jets and for nothing with Taylor models. There is no Rayleigh
-            damping, no P-Delta, and no output on accelerations.
+            rows of the m outputs on [q; v], shape (m, 2n), and on absolute accelerations, shape
+            (m, n), and their factors, shape (…, m); the force vector of each load at its amplitude,
+            shape (…, n, loads), None without loads. Here … stands for S with jets and for nothing
+            with Taylor models. There is no Rayleigh damping, and no P-Delta.
         """
         n = self.size
         zero: Number = lifted(0.0, p)
@@ -519,10 +553,6 @@ class MatrixStructure(LinearSystem):
             kind: values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
             for kind, arrays in self._arrays.items()
         }
-        # A row of n entries acts on displacements alone; its other half stays zero.
-        rows = np.zeros((len(self.observed), 2 * n))
-        for row, observed in zip(rows, self.observed.values(), strict=True):
-            row[: len(observed)] = observed
         columns: Number | None = None
         if self.loads:
             amplitudes = values_of([force.amplitude for force in self.loads], p)
@@ -538,8 +568,8 @@ class MatrixStructure(LinearSystem):
             q0=self._start(self.q0, zero),
             v0=self._start(self.v0, zero),
             row_factors=values_of([self.row_factors.get(x, 1.0) for x in self.observed], p),
-            rows=rows,
-            accelerated=np.zeros((len(self.observed), n)),
+            rows=self._rows[:, : 2 * n],
+            accelerated=self._rows[:, 2 * n :],
             pattern=np.ones(n) if self.pattern is None else np.asarray(self.pattern, float),
             massive=self.massive,
             loads=self.loads,

@@ -39,8 +39,8 @@ class Output(str):
 
     Args:
         name: As ``q3``, or any word.
-        unit: SI unit, as ``m/s``. Where none is given, that of the storey frame's output of this
-            kind; "SI" of names that are none.
+        unit: SI unit, as ``m/s``; empty of a ratio. Where None, that of the storey frame's output
+            of this kind; "SI" of names that are none.
 
     Example:
         >>> Output("v1").unit, Output("moment", "N m").unit
@@ -49,12 +49,14 @@ class Output(str):
 
     unit: str
 
-    def __new__(cls, name: str, unit: str = "") -> Output:
+    def __new__(cls, name: str, unit: str | None = None) -> Output:
         """Return the name with a unit; without one, that of its kind, such as "m" of "q3"."""
         # a text, so that names of outputs are used and stored as any other names
         output = super().__new__(cls, name)
         of_kind, _ = OUTPUTS.get(output._parts[0], ("SI", ""))
-        output.unit = unit or (name.unit if isinstance(name, Output) else of_kind)
+        if unit is None:
+            unit = name.unit if isinstance(name, Output) else of_kind
+        output.unit = unit
         return output
 
     def __reduce__(self) -> tuple[type[Output], tuple[str, str]]:

@@ -332,6 +332,7 @@ def loaded(folder, old="", new=""):
     return load(changed(folder, old, new)).content
 
 
+ROOF = '{ row = { "2.x" = 1.0 } }'
 MODULI = np.linspace(28.5e9, 31.5e9, 5)[:, None]
 
 
@@ -352,6 +353,29 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
     assert (abs(by_matrices - by_storeys).max((0, 1)) < 1e-9 * size).all()
     assert size[1] > 1e3
     assert structure.inputs(["E"])["E"].support == (28.5e9, 31.5e9)
+
+
+def test_accelerations_velocities_and_drifts_are_those_of_the_storey_frame(folder):
+    """The acceleration is absolute; a drift over the height of its storey is a ratio."""
+    outputs = """{ row = { "2.x" = 1.0 }, of = "acceleration" }
+speed = { row = { "2.x" = 1.0 }, of = "velocity" }
+first = { upper = "1.x" }
+second = { upper = "2.x", lower = "1.x", height = "2.5 m" }"""
+    model = loaded(folder, ROOF, outputs).structure.model
+    assert [model.unit_of(name) for name in model.outputs[:4]] == ["m/s^2", "m/s", "m", ""]
+    frame = StoreyFrame(
+        masses=[20e3, 10e3],
+        stiffness=[12 * 30e9 * 2e-4 / 27, 20e6],
+        damping_ratio=0.02,
+        ground=model.ground,
+        outputs=("a2", "v2", "drift1", "drift2"),
+    )
+    found, exact = (
+        LinearFlow(x, (), 1.0, 0.02, Exact()).values(np.zeros((1, 0)))[0] for x in (model, frame)
+    )
+    difference = np.abs(found[:, :4] - exact / [1, 1, 1, 2.5]).max(axis=0)
+    assert (difference < 1e-9 * np.abs(exact).max(axis=0)).all()
+    assert np.abs(exact[:, 0]).max() > 1
 
 
 @pytest.mark.parametrize(
@@ -382,7 +406,19 @@ def test_matrices_and_the_storey_frame_move_alike(folder):
         ('m = "20 t"', 'm = "20 t"\n"k 3" = 1', "matrices.parameters is 'k 3'"),
         ('unit = "N"', 'unit = "N\\u001b[2J"', "unit of shear is 'N\\x1b[2J'"),
         ('unit = "N"', 'unit = "kN"', "unit is kN; allowed: SI units, as m, N or N*m; write N;"),
-        ('{ row = { "2.x" = 1.0 } }', "{ }", "matrices.outputs.roof.row is missing"),
+        (ROOF, "{ }", "matrices.outputs.roof.row is missing"),
+        (ROOF, '{ lower = "1.x" }', "matrices.outputs.roof.row is missing; allowed: entries of"),
+        (ROOF, ROOF[:-1] + ', upper = "2.x" }', "matrices.outputs.roof.row is beside upper"),
+        (ROOF, ROOF[:-1] + ', height = "3 m" }', "matrices.outputs.roof.height is without upper"),
+        (ROOF, '{ upper = "2.x", lower = "2.x" }', "matrices.outputs.roof.lower is 2.x; allowed"),
+        (ROOF, '{ upper = "2.x", lower = "3.x" }', "roof.upper, lower is 3.x; allowed: unknowns"),
+        (ROOF, '{ upper = "2.x", height = "0 m" }', "roof.height is 0 m; allowed: length above 0"),
+        (ROOF, ROOF[:-1] + ', of = "jerk" }', 'matrices.outputs.roof.of is "jerk"; allowed: '),
+        (
+            'unit = "N", factor',
+            'of = "acceleration", factor',
+            "matrices: observed: shear is accelerations times a factor; allowed: accelerations",
+        ),
     ],
 )
 def test_what_makes_no_structure_is_one_line(folder, old, new, message):

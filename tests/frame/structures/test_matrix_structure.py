@@ -24,7 +24,7 @@ from alphacut.fuzzy import Interval, RefusedError
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
 HISTORIES = (History(0.3, [1.0, 1.6, 0.4], is_static=True), History.harmonic(1.3, 0.4, 0.35), None)
 STOREY = StoreyFrame(
-    (3.0, 2.0), (1.0, 1.2), 5.0, 1.0, **MOTION, outputs=("q2", "v1"),
+    (3.0, 2.0), (1.0, 1.2), 5.0, 1.0, **MOTION, outputs=("q2", "v1", "a2"),
     loads=[Force(2, 0.7, HISTORIES[0]), Force(1, 0.6, HISTORIES[1]), Force(2, 0.2, HISTORIES[2])],
 )  # fmt: skip
 TOP = 1.2**-3 * np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -32,7 +32,11 @@ MATRIX = MatrixStructure(
     {"E": 5.0, "m1": 3.0, "F2": 0.7},
     mass=[("m1", np.diag([1.0, 0.0])), (2.0, np.diag([0.0, 1.0]))],
     stiffness=[(lambda p: 24 * p["E"], coo_array(np.diag([1.0, 0.0]) + TOP))],
-    observed={"q2": np.array([0.0, 1.0]), "v1": np.array([0.0, 0.0, 1.0, 0.0])},
+    observed={
+        "q2": np.array([0.0, 1.0]),
+        "v1": np.array([0.0, 0.0, 1.0, 0.0]),
+        "a2": np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+    },
     damping=[(1.0, np.array([[0.3, -0.2], [-0.2, 0.2]]))],
     q0=np.array([0.1, 0.0]),
     v0=np.array([0.0, 0.4]),

@@ -90,6 +90,18 @@ MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q
         ({"mass": [("m", [[1.0, 0.0], [1.0]])]}, "array of mass is of uneven rows"),
         ({"parameters": {"m": "1 kg", "k": 2.0}}, "parameter m is '1 kg'"),
         ({"parameters": {"m": 1.0, "k": 2.0, "k 3": 1.0}}, "name of a parameter is 'k 3'"),
+        (
+            {"observed": {"a": np.eye(6)[4]}, "row_factors": {"a": "m"}},
+            "observed: a is accelerations times a factor; allowed: accelerations as they are",
+        ),
+        (
+            {"observed": {"a": np.eye(6)[4]}, "components": [(None, EYE[0])]},
+            "observed: a is accelerations under 2 components; allowed: accelerations under one",
+        ),
+        (
+            {"observed": {"a": np.eye(6)[5]}, "mass": [("m", np.diag([1.0, 0.0]))]},
+            r"observed: a is accelerations of unknowns \[1\]; allowed: .* that have mass",
+        ),
         ({"observed": {"roof drift": EYE[0]}}, "name of an output is 'roof drift'; allowed: names"),
         ({"observed": {"=q": EYE[0]}}, "name of an output is '=q'"),
         (
