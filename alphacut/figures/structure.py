@@ -131,7 +131,7 @@ def loops(frame: StoreyFrame, peaks: Mapping[str, Peak], *, duration: float, ste
         axes.axhline(0.0, color=GREY, lw=0.5)
         axes.axvline(0.0, color=GREY, lw=0.5)
         axes.locator_params(axis="x", nbins=4)
-        style.prefix_axis(axes, f"drift of storey {storey}", "m", across=True)
+        style.prefix_axis(axes, f"drift {storey}", "m", across=True)
     style.prefix_axis(panels[0, 0], "shear", "N")
     panels[0, -1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
@@ -141,7 +141,7 @@ def sketch(frame: StoreyFrame) -> Figure:
     """Draw the frame: floors with their weights, storeys with their stiffness and height."""
     heights = np.array(frame.lengths or (1.0,) * frame.floors)
     levels = np.concatenate([[0.0], np.cumsum(heights)])
-    figure, axes = plt.subplots(figsize=(WIDTH / 2, PANEL_HEIGHT))
+    figure, axes = plt.subplots(figsize=(WIDTH, PANEL_HEIGHT))
     axes.fill_between([-0.3, 1.3], -0.04 * levels[-1], 0.0, color=GREY, alpha=0.4, lw=0)
     table = storey_table(frame)
     rows = [dict(zip(table.head, row, strict=True)) for row in reversed(table.rows)]
@@ -158,5 +158,5 @@ def sketch(frame: StoreyFrame) -> Figure:
         if "height" in row:
             axes.text(-0.05, middle, row["height"], ha="right", va="center", fontsize=8)
     axes.set_axis_off()
-    axes.set_xlim(-0.45, 1.6)
+    axes.set_xlim(-0.6, 3.4)  # pages show figures in one width: this one needs half of it
     return figure
