@@ -199,9 +199,10 @@ class Content(CellContent):
     def _require_records_alone(self, records: RecordsSection) -> None:
         """Refuse what cannot stand beside a suite of ground motion records, [records].
 
-        Refused are an accelerogram of the structure, a structure that no ground motion moves, and
-        the sections [probability], [tolerances], [identify] and [[study]]. They ask about one
-        response, while a suite has one for each record.
+        Refused are an accelerogram of the structure, a structure that no ground motion moves,
+        components that are not those of the structure, and the sections [probability],
+        [tolerances], [identify] and [[study]]. They ask about one response, while a suite has one
+        for each record.
 
         Args:
             records: The section; the case has it.
@@ -214,10 +215,37 @@ class Content(CellContent):
             has_ground = section.nominal.model.ground is not None
             require_alone("records", has_ground, "an accelerogram")
             section.require_pattern()
+            self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
         for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
+
+    def _require_directions(self, records: RecordsSection, section: StructureSection) -> None:
+        """Refuse records whose components are not those of the structure, and what needs two.
+
+        Args:
+            records: The section.
+            section: The structure.
+
+        Raises:
+            RefusedError: The ground moves in another number of directions; one side of an output is
+                limited over all angles of incidence, where only magnitudes are bounded; or
+                fragility is over a measure of two components and records have one.
+        """
+        count = records.component_count
+        expected = section.direction_count
+        allowed = f"{expected} a record, one for each direction of the ground"
+        cure = 'name the directions in [matrices], as directions = ["x", "y"]'
+        require(count == expected, "records.files", f"{count} files a record", allowed, cure)
+        for key, question in self.questions.items():
+            sides = [limit.text for limit in question.limits if limit.side in ("max", "min")]
+            is_bounded = not (sides and records.has_all_angles)
+            allowed = "magnitudes over all angles, as roof <= 40 mm"
+            require(is_bounded, f"{key}.limits", ", ".join(sides), allowed)
+        measure = "" if self.fragility is None else self.fragility.measure
+        is_measured = count > 1 or not measure.startswith("RotD")
+        require(is_measured, "fragility.measure", measure, "beside records of two components")
 
     def _one_structure(self) -> Structure:
         """Return the structure of the case, without what later stages compute.

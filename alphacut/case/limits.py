@@ -346,9 +346,10 @@ class FragilitySection(QuestionSection):
     states: dict[str, Limits] = Field(default_factory=dict)
     """in place of limits: those of damage states by name, from the slightest on, as
     'slight = ["drift <= 0.5 %"]'; a state begins with the first of its limits in any storey"""
-    measure: Literal["Sa(T1)", "PGA", "scale"] = "Sa(T1)"
+    measure: Literal["Sa(T1)", "PGA", "scale", "RotD50(T1)", "RotD100(T1)"] = "Sa(T1)"
     """measure of a record; Sa(T1) is the pseudo-acceleration `ω² max |u|` at the nominal
-    structure's first period, with its own damping ratio (not 5 %)"""
+    structure's first period, with its own damping ratio (not 5 %); of two components RotD50(T1) is
+    its median over all directions, and RotD100(T1) the largest one"""
     independent: bool = False
     """whether records count as independent draws: 95 % limits"""
     most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf, radians
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo
 
-from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.base.errors import RefusedError, is_number, require, require_choice
 from alphacut.case.structure import Structure
 from alphacut.case.types import (
     AtFirstUse,
@@ -197,17 +198,45 @@ def with_forces(
     return replace(structure, model=model, numbers=numbers, force_units=force_units)
 
 
+SCALED_MEASURES = ("PGA", "Sa(T1)", "RotD50(T1)", "RotD100(T1)")
+"""Intensity measures to which records may be scaled; the last two of two components alone."""
+
+
 @dataclass(frozen=True)
 class Scale:
     """Scale of every record.
 
     Args:
         value: A factor or, with a measure, the value in m/s² that each record is scaled to.
-        measure: Intensity measure, "PGA" or "Sa(T1)"; empty for a factor.
+        measure: Intensity measure, as "PGA" or "RotD50(T1)"; empty for a factor.
     """
 
     value: float = 1.0
     measure: str = ""
+
+
+def _read_suite(value: object, info: ValidationInfo) -> tuple[tuple[Recording, ...], ...]:
+    """Return the components of each record that an entry of `files` states.
+
+    Args:
+        value: A text such as "records/*.AT2" or "a.v2#1", whose files are records of one component
+            each; or a list of two or three of them, one for each component. Of patterns the first
+            file of each makes the first record, and so on.
+        info: As of `_read_recordings`.
+
+    Raises:
+        RefusedError: A text is no such pattern, a file holds no record, there are not two or three
+            components, or their patterns match different numbers of files.
+    """
+    if not isinstance(value, list):
+        return tuple((recording,) for recording in _read_recordings(value, info))
+    allowed = 'two or three files, as ["x.AT2", "y.AT2"]: horizontal ones, then the vertical one'
+    require(len(value) in (2, 3), "", value, allowed)
+    components = [_read_recordings(pattern, info) for pattern in value]
+    counts = [len(recordings) for recordings in components]
+    what = " and ".join(map(str, counts)) + " files"
+    require(len(set(counts)) == 1, "", what, "as many files for each component")
+    return tuple(zip(*components, strict=True))
 
 
 def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ...]:
@@ -262,8 +291,9 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     """Return the scale of all records that a factor such as 1.2 or "PGA = 0.3 g" states.
 
     Args:
-        value: A number, by which records are multiplied; or "PGA = VALUE" or "Sa(T1) = VALUE", the
-            intensity measure to which each record is scaled, an acceleration.
+        value: A number, by which records are multiplied; or "PGA = VALUE", and so on with "Sa(T1)",
+            "RotD50(T1)" and "RotD100(T1)", the intensity measure to which each record is scaled, an
+            acceleration.
         _: Context of the validation, which is not used.
 
     Returns:
@@ -273,6 +303,7 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
         RefusedError: The value is not positive, no such quantity, or of another measure.
     """
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
+    allowed += ', of two components "RotD50(T1) = 0.5 g"'
     measure, equals, size = [part.strip() for part in str(value).partition("=")]
     try:
         if equals:
@@ -282,12 +313,24 @@ def _parse_scale(value: object, _: ValidationInfo) -> Scale:
             measure = ""
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    is_known = measure in ("PGA", "Sa(T1)") or not equals
+    is_known = measure in SCALED_MEASURES or not equals
     require(number > 0 and is_known, "", value, allowed)
     return Scale(number, measure)
 
 
-Files = Annotated[tuple[Recording, ...], text(_read_recordings)]
+def _parse_angle(value: object, _: ValidationInfo) -> float:
+    """Return an angle in rad, or infinity for all angles, from 30, "30 deg" or "all"."""
+    if value == "all":
+        return inf
+    if is_number(value):
+        return radians(float(str(value)))
+    try:
+        return quantity.parse_number(value, "rad")
+    except ValueError as error:
+        raise RefusedError("", value, '"all", or degrees, as 30', str(error)) from None
+
+
+Files = Annotated[tuple[tuple[Recording, ...], ...], text(_read_suite)]
 
 
 def _read_spectrum(value: object, info: ValidationInfo) -> TargetSpectrum:
@@ -345,6 +388,21 @@ class SpectrumSection(Section):
         _ = self.target
 
 
+def _require_one_ground(first: Recording, other: Recording) -> None:
+    """Refuse two components of one record with other times, or with the same samples.
+
+    Raises:
+        RefusedError: Their steps or their numbers of samples differ, or all samples agree.
+    """
+    ends = [f"{x.name} of {len(x.samples)} samples every {x.step:g} s" for x in (first, other)]
+    has_same_times = len(first.samples) == len(other.samples) and first.step == other.step
+    allowed = "components of one length and step"
+    cure = "cut the longer file, or bring both to one step"
+    require(has_same_times, "records.files", " and ".join(ends), allowed, cure)
+    is_other = not np.array_equal(first.samples, other.samples)
+    require(is_other, "records.files", f"{first.name} twice", "a file for each component")
+
+
 class RecordsSection(Section):
     """Suite of records of the ground's acceleration: each moves the structure by itself.
 
@@ -357,20 +415,56 @@ class RecordsSection(Section):
     unit: Annotated[str, text(_parse_unit)] | None = None
     """unit of files that have none: columns without a head, waveforms"""
     files: Annotated[OneOrMany[Files], NotEmpty]
-    """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"""
+    """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several. A record of two or three
+    components is a list, as ["x.AT2", "y.AT2"]: two horizontal ones, then the vertical one"""
+    angle: Annotated[float, text(_parse_angle)] = 0.0
+    """degrees by which both horizontal components are turned together, from the first one of
+    matrices.directions towards the second; "all" bounds peaks over all angles of incidence"""
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
     scale: Annotated[Scale, text(_parse_scale)] = Scale()
     """factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g", of every record; Sa(T1) is the pseudo-acceleration
-    `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %)"""
+    `ω² max |u|` at the nominal structure's first period, with its own damping ratio (not 5 %). Of
+    two components it is the larger one, "RotD50(T1) = 0.5 g" the median over all directions, and
+    RotD100(T1) the largest one"""
     spectrum: AtFirstUse[SpectrumSection] | None = None
 
     @property
-    def recordings(self) -> tuple[Recording, ...]:
-        """The recordings of all files."""
-        return tuple(recording for group in self.files for recording in group)
+    def suite(self) -> tuple[tuple[Recording, ...], ...]:
+        """The recordings of all components of each record."""
+        return tuple(components for group in self.files for components in group)
+
+    @property
+    def component_count(self) -> int:
+        """Number of components of each record, from 1 to 3."""
+        return len(self.suite[0])
+
+    @property
+    def has_all_angles(self) -> bool:
+        """Whether peaks are those over all angles of incidence."""
+        return self.angle == inf
 
     def require_consistent(self) -> None:
-        """Refuse a scale beside a spectrum, and two files of the same name, that of results."""
+        """Refuse a scale beside a spectrum, records of one name, and components that do not fit."""
         is_scaled = self.spectrum is not None and self.has_key("scale")
         require_alone("records.scale", is_scaled, "[records.spectrum]")
-        require_distinct("records.files", self.recordings)
+        names = ["+".join(x.name for x in components) for components in self.suite]
+        require_distinct("records.files", names)
+        if self.suite:  # empty where a step or a unit was refused
+            self._require_components()
+
+    def _require_components(self) -> None:
+        """Refuse components that are no motions of one ground, and what needs two components."""
+        key = "records.files"
+        count = self.component_count
+        for components in self.suite:
+            what = f"{count} and {len(components)} files a record"
+            require(len(components) == count, key, what, "as many components of each record")
+            for other in components[1:]:
+                _require_one_ground(components[0], other)
+        allowed = 'beside records of two components, as files = [["x.AT2", "y.AT2"]]'
+        require(count > 1 or self.angle == 0, "records.angle", "with one component", allowed)
+        is_rotated = self.scale.measure.startswith("RotD")
+        require(count > 1 or not is_rotated, "records.scale", self.scale.measure, allowed)
+        allowed = 'scale, as "RotD50(T1) = 0.5 g"'
+        is_single = count == 1 or self.spectrum is None
+        require(is_single, "records.spectrum", "beside records of several components", allowed)

@@ -170,6 +170,7 @@ def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
 
 
 def _one_direction(value: object) -> object:
+    """Refuse what is neither a direction of the unknowns nor a table by unknown."""
     allowed = 'a direction of the unknowns, as "x", or a table by unknown'
     cure = 'of a list make a table: {"5.x" = 1, "5.y" = 0.3} has the ground move along both'
     require(isinstance(value, str | dict), "", value, allowed, cure)
@@ -181,6 +182,8 @@ Terms = Annotated[
     BeforeValidator(_terms_of_exports),
 ]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
+Direction = Annotated[str | dict[str, float], BeforeValidator(_one_direction)]
+"""Direction of the ground: that of unknowns NODE.DIRECTION, or the influence vector by unknown."""
 
 
 def _si_unit(value: object, _: ValidationInfo) -> str:
@@ -275,9 +278,12 @@ class MatricesSection(StructureSection):
     values of the parameters, of which K is a sum of terms with one parameter each"""
     damping: Terms = Field(default=(), description="pairs [factor, file] of D, or exports")
     damping_ratio: DampingRatios = Field(default=(), description=RATIO_WORDS)
-    direction: Annotated[str | dict[str, float], BeforeValidator(_one_direction)] = ""
+    direction: Direction = ""
     """direction of the ground: it moves all unknowns NODE.DIRECTION; or how it moves each, by
     unknown"""
+    directions: tuple[Direction, ...] = ()
+    """in place of it, the directions of the components of each record: two horizontal ones, and
+    perhaps the vertical one, as ["x", "y"]"""
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = None
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
@@ -332,6 +338,7 @@ class MatricesSection(StructureSection):
             # A row of 3n entries is on displacements, velocities and accelerations, in this order.
             place = ("displacement", "velocity", "acceleration").index(output.of)
             rows[Output(name, output.si_unit)] = np.append(np.zeros(place * len(row)), row)
+        patterns = self._ground_patterns()
         try:
             model = MatrixStructure(
                 {name: number.nominal for name, number in numbers.items()},
@@ -340,7 +347,8 @@ class MatricesSection(StructureSection):
                 damping=self.damping,
                 observed=rows,
                 ground=self.accelerogram,
-                pattern=self._ground_pattern(),
+                pattern=patterns[0],
+                components=[(None, pattern) for pattern in patterns[1:]],
                 ratios=tuple(ratios),
                 row_factors={name: output.factor for name, output in self.outputs.items()},
             )
@@ -413,20 +421,40 @@ class MatricesSection(StructureSection):
             require(name in self.unknowns, f"matrices.{key}", name, allowed)
         return np.array([entries.get(name, 0.0) for name in self.unknowns])
 
-    def _ground_pattern(self) -> Array:
-        """Return how each unknown moves rigidly with the ground, shape (unknowns,)."""
-        if isinstance(self.direction, dict):
-            return self._vector_over_unknowns("direction", self.direction)
-        # Rotations move with the ground only where a table says so: their direction is their own.
-        directions = [name.rpartition(".")[2] for name in self.unknowns]
-        return np.array([float(direction == self.direction) for direction in directions])
+    def _ground_patterns(self) -> list[Array]:
+        """Return how each unknown moves rigidly with the ground, shape (unknowns,), by direction.
+
+        Raises:
+            RefusedError: A table names another unknown.
+        """
+        patterns: list[Array] = []
+        for direction in self.directions or (self.direction,):
+            if isinstance(direction, dict):
+                patterns.append(self._vector_over_unknowns(self._direction_key, direction))
+                continue
+            # Rotations move with the ground only where a table says so: their direction is their
+            # own.
+            of_unknowns = [name.rpartition(".")[2] for name in self.unknowns]
+            patterns.append(np.array([float(name == direction) for name in of_unknowns]))
+        return patterns
+
+    @property
+    def direction_count(self) -> int:
+        """Number of directions in which the ground moves, one for each component of a record."""
+        return len(self.directions) or 1
+
+    @property
+    def _direction_key(self) -> str:
+        """Name of the key that has the directions of the ground."""
+        return "directions" if self.directions else "direction"
 
     def require_consistent(self) -> None:
         """Refuse outputs and parameters without usable names, and a record without a direction.
 
         Raises:
             RefusedError: There is no output; a name is not of letters, digits and underscores; the
-                motion of the ground moves no unknown; or the matrices make no structure.
+                motion of the ground moves no unknown, or its directions are not two or three, or
+                stand beside a single one; or the matrices make no structure.
         """
         require(bool(self.outputs), "matrices.outputs", None, "one output or more")
         require_names("matrices.parameters", self.parameters)
@@ -434,7 +462,15 @@ class MatricesSection(StructureSection):
         require_names("matrices.outputs", outputs)
         for name, output in self.outputs.items():
             output.require_complete(f"matrices.outputs.{name}")
-        if self.accelerogram is not None or self.direction:
+        if self.has_key("directions"):
+            require_alone("matrices.directions", self.has_key("direction"), "direction")
+            allowed = 'two horizontal ones, and perhaps the vertical one, as ["x", "y"]'
+            count = len(self.directions)
+            require(count in (2, 3), "matrices.directions", f"{count} directions", allowed)
+            cure = 'give each component a file, as records.files = [["x.AT2", "y.AT2"]]'
+            is_single = self.accelerogram is None
+            require(is_single, "matrices.accelerogram", "beside directions", "[records]", cure)
+        if self.accelerogram is not None or self.direction or self.directions:
             self.require_pattern()
         _ = self.nominal  # refuses matrices that do not fit together
 
@@ -446,12 +482,16 @@ class MatricesSection(StructureSection):
         displacement of the ground.
 
         Raises:
-            RefusedError: The direction is missing, or no unknown moves.
+            RefusedError: A direction is missing, no unknown moves in it, or two directions are one.
         """
-        directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
-        allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
-        is_moved = bool(self._ground_pattern().any())
+        key = f"matrices.{self._direction_key}"
+        names = sorted({name.rpartition(".")[2] for name in self.unknowns})
+        allowed = f"one of {', '.join(names[:8])}, or a table by unknown"
         cure = ""
         if not any("." in name for name in self.unknowns):
             cure = "name the unknowns NODE.DIRECTION, as 1.x, or write a table as { NAME = 1.0 }"
-        require(is_moved, "matrices.direction", self.direction or None, allowed, cure)
+        patterns = self._ground_patterns()
+        for direction, pattern in zip(self.directions or (self.direction,), patterns, strict=True):
+            require(bool(pattern.any()), key, direction or None, allowed, cure)
+        is_independent = np.linalg.matrix_rank(patterns) == len(patterns)
+        require(is_independent, key, self.directions, "directions that differ")

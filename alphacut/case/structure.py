@@ -281,6 +281,11 @@ class StructureSection(Section):
         """Names of the degrees of freedom that forces act on: floors, or unknowns of matrices."""
         return tuple(str(floor + 1) for floor in range(self.nominal.model.floors))
 
+    @property
+    def direction_count(self) -> int:
+        """Number of directions in which the ground moves, one for each component of a record."""
+        return 1
+
     def require_pattern(self) -> None:
         """Refuse a structure that records of the ground do not move."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import pi
+from math import degrees, pi
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from alphacut.case.content import Content
 from alphacut.case.loads import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Exact, LinearFlow, MatrixStructure
+from alphacut.frame.analyses.angles import TURN
 from alphacut.frame.analyses.peaks import WIDENING
 from alphacut.frame.analyses.suites import (
+    ROTATED,
     NominalMode,
     ScaledRecord,
     nominal_mode,
@@ -226,9 +228,9 @@ def records_text(
 ) -> str:
     """Return a table of the ground motion records of a suite, and their warnings.
 
-    The columns "PGA used", "Sa(T1) used" and "motion" describe each record as it moves the
-    structure, after correction and scaling; the columns before them as its file holds it.
-    Accelerations are in g.
+    Each component has a row. The columns "PGA used", "Sa(T1) used" and so on, and "motion" describe
+    each record as it moves the structure, after correction and scaling; the columns before them as
+    its file holds it. Accelerations are in g.
 
     Args:
         section: The records of the case, as their files hold them.
@@ -238,27 +240,29 @@ def records_text(
     Returns:
         Lines that end with a newline, with "warning: …" lines at the end.
     """
-    rows = []
-    for raw, record in zip(section.recordings, records, strict=True):
-        rows.append(
-            (
-                raw.name,
-                raw.file_format,
-                raw.unit,
-                f"{raw.step:g} s",
-                f"{len(raw.samples)}",
-                percent_text(raw.mean_to_peak_ratio, 2),
-                _in_g(raw.peak),
-                _in_g(record.measures["PGA"]),
-                _in_g(record.measures["Sa(T1)"]),
-                f"{record.duration:.4g} s",
-            )
-        )
+    measures = ["PGA", "Sa(T1)"]
+    if section.component_count > 1:
+        measures += ROTATED
+    rows: list[list[str]] = []
+    for components, record in zip(section.suite, records, strict=True):
+        of_record = [_in_g(record.measures[name]) for name in measures]
+        of_record.append(f"{record.duration:.4g} s")
+        for raw in components:
+            row = [raw.name, raw.file_format, raw.unit, f"{raw.step:g} s", f"{len(raw.samples)}"]
+            row += [percent_text(raw.mean_to_peak_ratio, 2), _in_g(raw.peak)]
+            rows.append(row + of_record)
+            # What is said of a record stands beside its first component.
+            of_record = [""] * len(of_record)
     head = ["record", "format", "unit", "step", "samples", "mean/peak", "peak"]
-    head += ["PGA used", "Sa(T1) used", "motion"]
+    head += [f"{name} used" for name in measures] + ["motion"]
     text = text_table(head, rows)
     of_mode = f"T1 = {mode.period:.4g} s with the structure's own damping ratio"
     text += f"Sa(T1): pseudo-acceleration ω² max |u| at {of_mode}, {percent_text(mode.ratio)}\n"
+    if section.component_count > 1:
+        angle = "all angles of incidence"
+        if not section.has_all_angles:
+            angle = f"turned by {degrees(section.angle):.4g}°"
+        text += f"{section.component_count} components a record, {angle}. {TURN}\n"
     return text + "".join(f"warning: {x}\n" for record in records for x in record.warnings)
 
 

@@ -58,7 +58,7 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     if content.identify is not None:
         yield Foreseen("identify", 1, "campaigns")
     if content.records is not None:
-        count = len(content.records.recordings)
+        count = len(content.records.suite)
         yield Foreseen("records", count, "records")
         if content.incremental_question is not None:
             yield Foreseen("fragility", count, "records")

@@ -169,7 +169,7 @@ class Pipeline:
             of_record = ["record"]
             if content.incremental_question is not None:
                 of_record.append("incremental")
-            kinds += of_record * len(content.records.recordings)
+            kinds += of_record * len(content.records.suite)
         elif "envelope" in content.stages:
             kinds += ["envelope"] * max(1, len(content.study))
         kinds += content.questions

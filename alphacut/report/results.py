@@ -325,9 +325,9 @@ def peak_table(parts: Parts) -> Table:
         Each peak has a row for each unit in which it is shown, with its first limit, and below it a
         row for each further limit. Columns are the cuts on the highest and the lowest level, and on
         a middle one if no peak is guaranteed; the error; of guaranteed peaks the attained value and
-        the gap; the record under which a structure moves farthest; the limit; and whether it is
-        exceeded. Empty columns are left out. Peaks over a suite come last. Without peaks the table
-        is empty.
+        the gap; the record under which a structure moves farthest, with the angle if all angles are
+        meant; the limit; and whether it is exceeded. Empty columns are left out. Peaks over a suite
+        come last. Without peaks the table is empty.
     """
     studies: dict[str, EnvelopeResult | SuitePeaks] = dict(parts.envelopes)
     if parts.records is not None:
@@ -346,7 +346,7 @@ def peak_table(parts: Parts) -> Table:
             suffix = f" ({name})"
         farthest: dict[str, str] = {}
         if isinstance(study, SuitePeaks):
-            farthest = study.farthest_record
+            farthest = {peak_name: study.where(peak_name) for peak_name in study.peak}
         for peak_name, peak in shown_peaks(study).items():
             unit = parts.shown_units[output_of(peak_name)]
             is_force = study.units[output_of(peak_name)] == "N"

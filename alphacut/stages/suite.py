@@ -11,6 +11,7 @@ from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram, Peak, ScaledSuite, SuitePeaks, scale_suite
+from alphacut.frame.analyses.angles import turned_components
 from alphacut.frame.analyses.fragility import incremental_analyses, increments_of
 from alphacut.frame.analyses.incremental import IncrementalAnalysis, Increments
 from alphacut.frame.analyses.limits import limits_by_name
@@ -25,17 +26,21 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
+VERTICAL = 2
+"""Index of the vertical component of a record."""
+
 
 def suite_records(
     section: RecordsSection, envelope: EnvelopeSection, structure: Structure
 ) -> tuple[ScaledRecord, ...]:
     """Return the records of a suite as they move the structure, in the order of the case.
 
-    Each is corrected by a baseline and scaled. Its response ends five natural periods after the
-    record, but not later than the longest duration.
+    Each is corrected by a baseline, scaled and turned. Its response ends five natural periods after
+    the record, but not later than the longest duration.
 
     Args:
-        section: Recordings, baseline correction, and the scale or the intensity to be reached.
+        section: Recordings, baseline correction, the scale or the intensity to be reached, and the
+            angle.
         envelope: Longest duration and the time step in s.
         structure: The structure, whose first mode determines "Sa(T1)".
 
@@ -51,7 +56,11 @@ def suite_records(
         step=envelope.step,
         scale=section.scale.value,
         measure=section.scale.measure,
+        all_angles=section.has_all_angles,
     )
+    # Measures are those of the components as they were recorded.
+    if section.angle and not section.has_all_angles:
+        records = tuple(_turned(record, section.angle) for record in records)
     # Each response ends at a time of its own. The case has been checked for the duration of
     # [envelope] alone, which is the longest.
     for record in records:
@@ -74,7 +83,7 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
     if spectrum is None:
         return None
     return scale_suite(
-        _corrected(section),
+        [ground for (ground,) in _corrected(section)],  # of one component each
         spectrum.target,
         structure.model,
         fit=spectrum.fit,
@@ -82,9 +91,26 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
     )
 
 
-def _corrected(section: RecordsSection) -> list[Accelerogram]:
-    """Return the records after their baseline correction."""
-    return [recording.accelerogram(section.baseline) for recording in section.recordings]
+def _corrected(section: RecordsSection) -> list[tuple[Accelerogram, ...]]:
+    """Return the components of the records after their baseline correction.
+
+    The third component of a record is the vertical one.
+    """
+    suite = []
+    for components in section.suite:
+        corrected = []
+        for k, recording in enumerate(components):
+            ground = recording.accelerogram(section.baseline, is_vertical=k == VERTICAL)
+            corrected.append(ground)
+        suite.append(tuple(corrected))
+    return suite
+
+
+def _turned(record: ScaledRecord, angle: float) -> ScaledRecord:
+    """Return a record whose two horizontal components are turned by an angle in rad."""
+    first, second, *vertical = record.components
+    horizontal = turned_components(first, second, angle)
+    return replace(record, components=(*horizontal, *vertical))
 
 
 def linear_model(structure: Structure) -> LinearSystem:
@@ -95,7 +121,7 @@ def linear_model(structure: Structure) -> LinearSystem:
 
 def moved_by(structure: Structure, record: ScaledRecord) -> Structure:
     """Return the structure moved by a record in place of its own."""
-    return replace(structure, model=linear_model(structure).moved_by(record.ground))
+    return replace(structure, model=linear_model(structure).moved_by(*record.components))
 
 
 def stage(structure: Structure, task: EnvelopeTask, record: ScaledRecord) -> Stage[dict[str, Peak]]:

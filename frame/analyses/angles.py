@@ -28,6 +28,7 @@ from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, WorstCase, close_peaks, largest_peaks
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
@@ -40,6 +41,11 @@ GAIN = 2e-3
 """Fraction of the bound that further directions must promise (tuned: each costs a proof)."""
 FURTHER = 12
 """Number of further directions of an output at most (tuned: frames in plan take one to five)."""
+TURN = (
+    "The angle turns the horizontal ground motion from the first component's direction towards the"
+    " second one's."
+)
+"""Sentence on what an angle of incidence is."""
 COARSE_ERROR = 0.02
 """Error of the peaks that is aimed at in the first directions (tuned: it costs a fifth of 0.5 %,
 and matters little in directions far from the worst one)."""
@@ -148,11 +154,7 @@ class AnglePeaks(Answer):
 
     def words(self) -> str:
         """Return a sentence on what the angle is."""
-        return (
-            f"Peaks over all angles, bounded from {len(self.by_angle)} directions. The angle turns"
-            " the horizontal ground motion from the first component's direction towards the second"
-            " one's."
-        )
+        return f"Peaks over all angles, bounded from {len(self.by_angle)} directions. {TURN}"
 
 
 def over_angles(
@@ -284,15 +286,25 @@ def turned(structure: MatrixStructure, angle: float) -> MatrixStructure:
     first = structure.ground
     assert first is not None
     assert second is not None
+    first, second = turned_components(first, second, angle)
+    return replace(structure, ground=first, components=[(second, influence), *others])
+
+
+def turned_components(
+    first: Accelerogram, second: Accelerogram, angle: float
+) -> tuple[Accelerogram, Accelerogram]:
+    """Return two horizontal components of a ground motion that is turned by an angle.
+
+    Args:
+        first: Acceleration along the first direction.
+        second: Acceleration along the second direction, at the same times.
+        angle: In rad, from the first towards the second direction.
+    """
     cosine = cos(angle)
     sine = sin(angle)
     along_first = cosine * first.samples - sine * second.samples
     along_second = sine * first.samples + cosine * second.samples
-    return replace(
-        structure,
-        ground=replace(first, samples=along_first),
-        components=[(replace(second, samples=along_second), influence), *others],
-    )
+    return replace(first, samples=along_first), replace(second, samples=along_second)
 
 
 def angle_response(

@@ -42,7 +42,8 @@ class LimitDecision(LimitResult):
         from_level: Lowest level that was computed.
         nature: Guarantee of the bounds on which both degrees rest.
         peak: The limited peak; None for the event of several limits.
-        record: Record of a suite under which the peak is attained; empty if there is none.
+        record: Record of a suite under which the peak is attained, with the angle of incidence if
+            all angles are meant; empty if there is none.
         input_units: SI units of the inputs at which the peak is attained, as far as known.
     """
 
@@ -260,7 +261,7 @@ def decide(
         'not exceeded'
     """
     output_units = dict(units or {})
-    farthest_record: Mapping[str, str] = {}
+    records: Mapping[str, str] = {}
     if isinstance(response, Envelope):
         named = limits_by_name(limits, response.outputs)
         output_units |= dict(zip(response.outputs, response.units, strict=False))
@@ -270,7 +271,7 @@ def decide(
         # A limit applies to the largest peak over the records, or to the mean.
         if isinstance(response, SuitePeaks):
             output_units |= response.units
-            farthest_record = response.farthest_record
+            records = {peak: response.where(peak) for peak in response.peak}
             response = response.peak
         found = response
 
@@ -281,7 +282,7 @@ def decide(
             limit,
             found[limit.peak],
             unit=output_units.get(limit.output) or Output(limit.output).unit,
-            record=farthest_record.get(limit.peak, ""),
+            record=records.get(limit.peak, ""),
             input_units=input_units or {},
         )
     if len(decisions) > 1:

@@ -20,7 +20,7 @@ from alphacut.base.number_text import (
     range_text,
 )
 from alphacut.base.progress_bar import Progress, nth_subprogress
-from alphacut.frame.analyses.angles import angle_peaks, angle_response
+from alphacut.frame.analyses.angles import TURN, angle_peaks, angle_response
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak, Peaks, close_peaks, largest_peaks, with_combined
 from alphacut.frame.boxes import ALPHA, boxes
@@ -38,7 +38,7 @@ from alphacut.fuzzy.result import Nature
 NODES = 2
 """Time nodes in each step at which peaks are bounded (tuned: the error between the nodes falls with
 the square of this number, and the time rises in proportion to it)."""
-ROTATED = {"RotD50": "m/s^2", "RotD100": "m/s^2"}
+ROTATED = {"RotD50(T1)": "m/s^2", "RotD100(T1)": "m/s^2"}
 """SI units of the intensity measures of records with two horizontal components alone."""
 MEASURES = {"PGA": "m/s^2", "Sa(T1)": "m/s^2", "scale": ""} | ROTATED
 """SI units of the intensity measures of a record, by their names."""
@@ -82,7 +82,7 @@ class RecordPeaks:
             the response.
         measures: Intensity measures of the scaled record: "PGA" and "Sa(T1)" in m/s², the latter
             the pseudo-acceleration with the structure's own damping; and "scale", which is 1. Of
-            two horizontal components the larger values, and "RotD50" and "RotD100" of Sa(T1).
+            two horizontal components the larger values, and "RotD50(T1)" and "RotD100(T1)".
         peak: Peaks by name; empty before they are computed.
     """
 
@@ -141,7 +141,7 @@ def scaled_records(
     The measures of a record are its largest ground acceleration "PGA" and "Sa(T1)", the largest
     pseudo-acceleration of an oscillator with period and damping of the structure's first mode. Of
     a record with two horizontal components they are the larger ones of both; further measures are
-    then "RotD50" and "RotD100" of Sa(T1), the median and the largest value over all directions.
+    then "RotD50(T1)" and "RotD100(T1)", the median and the largest Sa(T1) over all directions.
 
     Args:
         model: The structure; its first mode is that at its own parameters.
@@ -153,7 +153,7 @@ def scaled_records(
         step: Distance of the time nodes, in s.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled. All
             components of a record have the same factor.
-        measure: "PGA", "Sa(T1)", "RotD50" or "RotD100"; empty if `scale` is a factor.
+        measure: "PGA", "Sa(T1)", "RotD50(T1)" or "RotD100(T1)"; empty if `scale` is a factor.
         all_angles: Whether the horizontal components are to be turned by all angles.
 
     Returns:
@@ -248,7 +248,8 @@ def _measures(components: Sequence[Accelerogram], mode: NominalMode) -> dict[str
     }
     if len(horizontal) > 1:
         rotated = rotated_spectra(horizontal[0], horizontal[1], mode.period, ratio)
-        measures |= {"RotD50": float(rotated.rotd50), "RotD100": float(rotated.rotd100)}
+        measures["RotD50(T1)"] = float(rotated.rotd50)
+        measures["RotD100(T1)"] = float(rotated.rotd100)
     return measures
 
 
@@ -424,7 +425,6 @@ class SuitePeaks(Answer):
         over all records, measures, attained values and guarantee are None.
         """
         rows: list[Record] = []
-        has_angles = any(peak.worst is not None for peak in self.peak.values())
         for name, record in self.by_record.items():
             for peak_name, peak in record.peak.items():
                 row: Record = {
@@ -437,7 +437,7 @@ class SuitePeaks(Answer):
                     "peak reached": known(peak.reached[0]),
                     "nature": self.nature_text(peak.nature),
                 }
-                if has_angles:
+                if self.has_angles:
                     row["angle [deg]"] = None if peak.worst is None else peak.worst.angle
                 rows.append(row)
         no_values = dict.fromkeys(rows[0])
@@ -454,12 +454,20 @@ class SuitePeaks(Answer):
         return rows
 
     def words(self) -> str:
-        """Return sentences on what the peaks and the means belong to."""
-        return (
+        """Return sentences on what the peaks, the means and the angles belong to."""
+        text = (
             f"Peaks under {len(self.by_record)} records (T1 = {self.period_s:.4g} s,"
             f" ζ = {self.damping_ratio:.3g}, at the most plausible inputs). A mean is the mean of"
             " the peaks of one structure; its bounds are the means of the bounds under the records."
         )
+        if self.has_angles:
+            text += f" Each peak is the largest one over all angles of incidence. {TURN}"
+        return text
+
+    @property
+    def has_angles(self) -> bool:
+        """Whether the angles are known at which peaks over all angles of incidence are attained."""
+        return any(peak.worst is not None for peak in self.peak.values())
 
 
 def over_records(
@@ -489,8 +497,8 @@ def over_records(
         names: Names of peaks, such as "drift1" for the magnitude, "max q3" or "min q3"; by default
             the magnitudes of all outputs.
         scale: Factor of every record, or the value in m/s² to which `measure` is scaled.
-        measure: "PGA" or "Sa(T1)", of two components also "RotD50" or "RotD100" of Sa(T1); empty
-            if `scale` is a factor.
+        measure: "PGA" or "Sa(T1)", of two components also "RotD50(T1)" or "RotD100(T1)", the median
+            and the largest Sa(T1) over all directions; empty if `scale` is a factor.
         all_angles: Whether the two horizontal components come from all directions, turned together
             by any angle, so that peaks are those of the worst angle; magnitudes alone.
         progress: Called with the completed fraction.
@@ -650,5 +658,6 @@ def mean_peaks(
             reached=reached,
             least_upper=np.full_like(reached, np.inf),  # no structure has a known small mean
             reached_at=reached_at,
+            worst=None,  # each record has an angle of its own
         )
     return found

@@ -48,12 +48,15 @@ class Recording:
         """Mean acceleration over the peak; 0 of a recording of zeros."""
         return float(self.samples.mean()) / max(self.peak, np.finfo(float).tiny)
 
-    def doubts(self) -> Iterator[str]:
+    def doubts(self, *, is_vertical: bool = False) -> Iterator[str]:
         """Yield clauses on what a user should look at, as "its step is 0.2 s: check it".
 
         First come the remarks that reading the file has left. Then follow clauses on a peak above 5
         g, on a step that is not from 1e-4 to 0.1 s, and on a channel whose name says that it is
         vertical. Nothing is yielded if all is as usual.
+
+        Args:
+            is_vertical: Whether it is used as the vertical component.
         """
         yield from self.remarks
         peak_in_g = self.peak / STANDARD_GRAVITY
@@ -65,15 +68,19 @@ class Recording:
         # Vertical channels have one of these words, or a SEED code such as HNZ. The words must
         # stand alone: "v" is vertical in "090 V", and not in "HNV1".
         words = "up|dn|down|ud|u-d|v|vert|vertical|z|[A-Z][HNLG]Z"
-        if re.fullmatch(rf"(?:.*\W)?(?:{words})(?:\W.*)?", self.channel, re.IGNORECASE):
+        pattern = rf"(?:.*\W)?(?:{words})(?:\W.*)?"
+        if not is_vertical and re.fullmatch(pattern, self.channel, re.IGNORECASE):
             yield f"its channel {self.channel} is vertical"
 
-    def accelerogram(self, baseline: Baseline = "none") -> Accelerogram:
+    def accelerogram(
+        self, baseline: Baseline = "none", *, is_vertical: bool = False
+    ) -> Accelerogram:
         """Return the accelerogram of these samples, in m/s², with their baseline subtracted.
 
         Args:
             baseline: What is subtracted: nothing ("none"), the "mean" of the samples, or their
                 straight line of least squares ("linear").
+            is_vertical: Whether it is used as the vertical component.
 
         Returns:
             An accelerogram with the same step and name. Its remarks are the clauses on what is
@@ -88,7 +95,8 @@ class Recording:
             # The maximum keeps a single sample from a division by zero.
             time = np.arange(len(samples)) - (len(samples) - 1) / 2  # in steps
             samples = samples - time * (time @ samples) / max(float(time @ time), 1.0)
-        return Accelerogram(self.step, samples, name=self.name, remarks=tuple(self.doubts()))
+        remarks = tuple(self.doubts(is_vertical=is_vertical))
+        return Accelerogram(self.step, samples, name=self.name, remarks=remarks)
 
 
 def arias_fractions(samples: Array, step: float) -> Array:

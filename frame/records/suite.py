@@ -112,7 +112,7 @@ def read_suite(
         else:
             paths += [Path(name) for name in sorted(glob(str(pattern)))]
     recordings = read_recordings(paths, channel=channel, step=step, unit=unit, shown=files)
-    require_distinct("files", recordings)
+    require_distinct("files", [recording.name for recording in recordings])
     return tuple(recording.accelerogram(baseline) for recording in recordings)
 
 
@@ -172,10 +172,9 @@ def read_recordings(
     return tuple(recordings)
 
 
-def require_distinct(key: str, recordings: Sequence[Recording]) -> None:
-    """Raise RefusedError if two recordings have the same name, which is that of their results."""
-    counts = Counter(recording.name for recording in recordings)
-    repeated = ", ".join(sorted(name for name, count in counts.items() if count > 1))
+def require_distinct(key: str, names: Sequence[str]) -> None:
+    """Raise RefusedError if two records have the same name, which is that of their results."""
+    repeated = ", ".join(sorted(name for name, count in Counter(names).items() if count > 1))
     require(not repeated, key, repeated, allowed="each file once, by its name")
 
 

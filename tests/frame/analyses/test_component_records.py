@@ -86,7 +86,7 @@ def test_motions_under_records_of_components_stay_within_the_bounds(components, 
     assert ("angle [deg]" in found.records()[0]) == all_angles
 
 
-@pytest.mark.parametrize("measure", ["RotD50", "RotD100", "PGA"])
+@pytest.mark.parametrize("measure", ["RotD50(T1)", "RotD100(T1)", "PGA"])
 def test_both_components_have_one_factor(measure):
     rng = np.random.default_rng(SEED)
     model = plan(rng)
@@ -98,8 +98,8 @@ def test_both_components_have_one_factor(measure):
         assert measures[measure] == pytest.approx(2.5)
         rotated = rotated_spectra(x, y, mode.period, mode.ratio)
         pga = max(x.extremes[0], y.extremes[0])
-        assert measures["RotD100"] / measures["PGA"] == pytest.approx(rotated.rotd100 / pga)
-        assert measures["RotD50"] / measures["PGA"] == pytest.approx(rotated.rotd50 / pga)
+        assert measures["RotD100(T1)"] / measures["PGA"] == pytest.approx(rotated.rotd100 / pga)
+        assert measures["RotD50(T1)"] / measures["PGA"] == pytest.approx(rotated.rotd50 / pga)
 
 
 def test_what_has_too_few_components_is_one_line():
@@ -111,7 +111,7 @@ def test_what_has_too_few_components_is_one_line():
         ("ground is of 1 components; allowed: 2, one for each", model, pair[:1], {}),
         ("ground is of 2 components; allowed: 1, one for each", single, [pair], {}),
         ("record r0x is of one component; .* for all angles", single, pair[:1], {"all_angles": 1}),
-        ("of one component; .* for RotD50", single, pair[:1], {"measure": "RotD50"}),
+        ("of one component; .* for RotD50", single, pair[:1], {"measure": "RotD50(T1)"}),
         ("samples of components", model, [(pair[0], Accelerogram(0.05, np.ones(4)))], {}),
     ]:
         with pytest.raises(RefusedError, match=message):
