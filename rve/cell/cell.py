@@ -12,6 +12,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, is_number
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
@@ -170,19 +171,21 @@ def require_loss(loss: float | None) -> None:
 
 @dataclass(frozen=True)
 class Cell:
-    """Periodic square cell of side 2 with one centred particle of random radius r(θ).
+    """Periodic cell with one centred particle of random radius r(θ).
 
     Args:
         matrix: Material outside the particle.
         inclusion: Material of the particle.
         radius_map: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+        lattice: Outline and periods of the cell; by default the square of side 2.
     """
 
     matrix: AnyPhase
     inclusion: AnyPhase
     radius_map: RadiusMap
     outline: Outline = circle
+    lattice: Lattice = SQUARE
 
     @property
     def phases(self) -> tuple[AnyPhase, ...]:
@@ -192,7 +195,7 @@ class Cell:
     def fraction(self, theta: Array) -> Array:
         """Area fraction of the particle at θ of any shape."""
         # Outlines of all radii are similar, so that areas grow with r².
-        return np.asarray(area(self.outline) / AREA * self.radius_map(theta) ** 2)
+        return np.asarray(area(self.outline) / self.lattice.area * self.radius_map(theta) ** 2)
 
     def fractions(self, theta: Array) -> Array:
         """Area fractions of the phases at θ, shape (phases, n)."""
@@ -206,9 +209,9 @@ class Cell:
 
     @property
     def square(self) -> bool:
-        """Whether the stiffness has the symmetry of the square: round and isotropic phases."""
+        """Whether C11 = C22 without coupling to shear: round and isotropic, on no rectangle."""
         is_isotropic = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
-        return is_isotropic and is_round(self.outline)
+        return is_isotropic and is_round(self.outline) and self.lattice.is_square
 
 
 def require_mesh_size(size: float) -> None:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, is_number
+
+Arrangement = Literal["square", "hexagonal"] | Sequence[float]
+"""Arrangement of the particles by its name, or by both sides of a rectangle in any unit."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,16 @@ class Lattice:
         return np.asarray(half_vectors / (half_vectors**2).sum(axis=1, keepdims=True))
 
     @property
+    def is_isotropic(self) -> bool:
+        """Whether a plane stiffness with the symmetry of the lattice is isotropic: of a hexagon."""
+        return len(self.half_vectors) == 3
+
+    @property
+    def is_square(self) -> bool:
+        """Whether C11 = C22 and C16 = C26 = 0 for particles with the symmetry of the lattice."""
+        return self == SQUARE or self.is_isotropic
+
+    @property
     def area(self) -> float:
         """Area of the cell; 4 for the square."""
         return float(4 * abs(np.linalg.det(self.half_vectors[:2])))
@@ -58,3 +74,43 @@ class Lattice:
 
 SQUARE = Lattice(((1.0, 0.0), (0.0, 1.0)))
 """The cell [−1, 1]²."""
+HEXAGONAL = Lattice(((1.0, 0.0), (0.5, 3**0.5 / 2), (-0.5, 3**0.5 / 2)))
+"""The regular hexagon around a particle whose six neighbours are 2 away, two of them along x1."""
+NAMED = {"square": SQUARE, "hexagonal": HEXAGONAL}
+MAX_ASPECT = 10.0
+"""Largest ratio of the sides of a rectangle. Tuned: meshes of longer ones take many elements."""
+
+
+def lattice_of(arrangement: Arrangement) -> Lattice:
+    """Return the cell of an arrangement, in which the nearest particles are 2 apart.
+
+    Args:
+        arrangement: "square", "hexagonal", or the two sides of a rectangle along x1 and x2, of
+            which the ratio counts.
+
+    Raises:
+        RefusedError: It is none of these, a side is not positive and finite, or one is more than
+            ten times the other.
+    """
+    if isinstance(arrangement, str):
+        found = NAMED.get(arrangement)
+    else:
+        found = _rectangle(arrangement)
+    if found is None:
+        allowed = f'"square", "hexagonal" or two sides [a, b], of a ratio up to {MAX_ASPECT:g}'
+        cure = "mesh another cell and give it as mesh.file"
+        raise RefusedError("lattice", arrangement, allowed, cure)
+    return found
+
+
+def _rectangle(sides: Sequence[float]) -> Lattice | None:
+    """Return the rectangle of two sides in any unit; None if they are not two allowed numbers."""
+    if not isinstance(sides, Sequence) or len(sides) != 2:
+        return None
+    if not all(is_number(side) and 0 < side < np.inf for side in sides):
+        return None
+    # In units of the shorter side, which makes equal sides the square to the bit.
+    width, height = (float(side) / min(sides) for side in sides)
+    if max(width, height) > MAX_ASPECT:
+        return None
+    return Lattice(((width, 0.0), (0.0, height)))

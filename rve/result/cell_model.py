@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, Self
 
 from alphacut.rve.cell.cell import AnyPhase
+from alphacut.rve.cell.lattice import Arrangement
 from alphacut.rve.cell.outline import Outline, circle
 from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stochastic import RadiusMap, ThetaDistribution
@@ -23,6 +24,7 @@ class Resolution:
         mesh_size: Edge length of elements, in halves of the cell's side.
         layers: Layers of prisms along θ.
         outline: Distance of the particle's edge from its centre over r(θ), by the angle.
+        lattice: Arrangement of the particles, "square", "hexagonal" or the sides of a rectangle.
         whole_stiffness: Whether C11 − C12 is needed beside C11 + C12 and C33.
         energies: Whether the strain energies of the phases are needed, for loss factors.
         petsc: PETSc options without their prefix `rve_`.
@@ -34,6 +36,7 @@ class Resolution:
     mesh_size: float = 0.15
     layers: int = 12
     outline: Outline = circle
+    lattice: Arrangement = "square"
     whole_stiffness: bool = False
     energies: bool = False
     petsc: Mapping[str, str] = field(default_factory=dict)

@@ -5,7 +5,7 @@ With the in-plane bulk modulus k, l = C13 and n = C33 of `engineering_constants`
     E_L = n − l²/k,   ν_LT = l/(2 k),   1/E_T = 1/(4 G_T) + 1/(4 K_T) + ν_LT²/E_L.
 
 G_T and K_T are those of the result's average. G_L, the shear modulus along the fibres, is that of
-the square array by Rayleigh's harmonic multipoles (1892). The conductivity across the fibres is
+the array by Rayleigh's harmonic multipoles (1892). The conductivity across the fibres is
 found by the same equation: shear moduli are conductivities there, and axial displacements
 temperatures.
 """
@@ -13,15 +13,16 @@ temperatures.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number
+from alphacut.rve.cell.lattice import SQUARE, Arrangement, Lattice, lattice_of
 from alphacut.rve.result.engineering_constants import Mixture
 from alphacut.rve.result.result import DeclaredConstants, HomogenisedStiffness
-from alphacut.rve.series.lattice_sums import LatticeSums, lattice_images, lattice_sums
+from alphacut.rve.series.lattice_sums import lattice_images, lattice_sums
 from alphacut.rve.series.means import SAFETY, finer_count
 from alphacut.stochastic import RadiusMap, gauss_rule
 from alphacut.stochastic.radius_map import require_map
@@ -46,16 +47,20 @@ def fibre_constants(result: HomogenisedStiffness) -> DeclaredConstants:
         Pa. If the result declares no errors, all errors but the one of G_L are NaN.
 
     Raises:
-        RefusedError: The cell has no round particle and two isotropic phases.
+        RefusedError: The cell has no round particle and two isotropic phases, or is a rectangle,
+            across which directions differ.
     """
     cell = result.cell
     if cell is None or not cell.square:
-        raise RefusedError("cell", cell, "a result of round particles and two isotropic phases")
+        allowed = "a result of round particles and two isotropic phases, on no rectangle"
+        raise RefusedError("cell", cell, allowed)
     mixture = Mixture.of_cell(cell)
     K_T = result.moduli[0] / 2
     G_T = result.shear
     shear = (cell.matrix.stiffness[2, 2], cell.inclusion.stiffness[2, 2])
-    G_L, G_L_error = theta_mean(cell.radius_map, lambda radius: longitudinal_shear(radius, *shear))
+    G_L, G_L_error = theta_mean(
+        cell.radius_map, lambda radius: longitudinal_shear(radius, *shear, lattice=cell.lattice)
+    )
     G_T_error = float(result.error_of(result.shear_of)) / G_T
     z, lowest_z, highest_z = mixture.z_from_bulk(K_T, result.modulus_errors[0])
     values = _constants(mixture, z, K_T=K_T, G_T=G_T, G_L=G_L)
@@ -83,39 +88,48 @@ def _constants(mixture: Mixture, z: float, *, K_T: float, G_T: float, G_L: float
     return np.array([E_T, E_L, nu_LT, G_T, G_L, K_T])
 
 
-def fibre_conductivity(radius_map: RadiusMap, matrix: float, inclusion: float) -> DeclaredConstants:
-    """Return the conductivities of a square array of fibres of random radius, with their errors.
+def fibre_conductivity(
+    radius_map: RadiusMap, matrix: float, inclusion: float, *, lattice: Arrangement = "square"
+) -> DeclaredConstants:
+    """Return the conductivities of an array of fibres of random radius, with their errors.
 
     They are means over θ, as those of the stiffness.
 
     Args:
-        radius_map: Function of θ: the radius over half the cell's side.
+        radius_map: Function of θ: the radius over half the distance of the nearest fibres.
         matrix: Conductivity around the fibres (of heat, electricity, or a diffusivity), positive.
         inclusion: Conductivity of the fibres along and across their axis, positive, in the same
             unit.
+        lattice: "square", "hexagonal", or the sides [a, b] of a rectangle along x and y.
 
     Returns:
-        "k_T", across the fibres, and "k_L", along them, in that unit, with absolute errors.
+        "k_T", across the fibres, and "k_L", along them, in that unit, with absolute errors. A
+        rectangle has "k_x" and "k_y" in place of "k_T".
 
     Raises:
-        RefusedError: A conductivity is not positive and finite, or the radius map is not one.
+        RefusedError: A conductivity is not positive and finite, the radius map is not one, or there
+            is no such lattice.
     """
+    cell = lattice_of(lattice)
     require_map(radius_map)
     checked_number("matrix", matrix, positive=True)
     checked_number("inclusion", inclusion, positive=True)
 
-    def across(radius: Array) -> tuple[Array, Array]:
-        """Return the conductivity across the fibres at each radius, and its relative error."""
-        return longitudinal_shear(radius, matrix, inclusion)
+    def across(radius: Array, *, axis: int = 0) -> tuple[Array, Array]:
+        """Return the conductivity along x or y at each radius, and its relative error."""
+        return longitudinal_shear(radius, matrix, inclusion, lattice=cell, axis=axis)
 
     def along(radius: Array) -> tuple[Array, Array]:
         """Return the mean of both conductivities at each radius, which is exact."""
-        fraction = np.pi * radius**2 / 4
+        fraction = np.pi * radius**2 / cell.area
         return matrix + (inclusion - matrix) * fraction, np.full_like(radius, 1e-15)
 
-    means = np.array([theta_mean(radius_map, values_at) for values_at in (across, along)])
+    functions: dict[str, Callable[[Array], tuple[Array, Array]]] = {"k_T": across, "k_L": along}
+    if not cell.is_square:
+        functions = {"k_x": across, "k_y": partial(across, axis=1), "k_L": along}
+    means = np.array([theta_mean(radius_map, values_at) for values_at in functions.values()])
     values, relative_errors = means.T
-    return DeclaredConstants.from_arrays(("k_T", "k_L"), values, values * relative_errors)
+    return DeclaredConstants.from_arrays(tuple(functions), values, values * relative_errors)
 
 
 def theta_mean(
@@ -147,16 +161,21 @@ def theta_mean(
     return mean, error + SAFETY * max(abs(mean / finer - 1), abs(mean / finest - 1))
 
 
-def longitudinal_shear(radius: Array, matrix: float, inclusion: float) -> tuple[Array, Array]:
-    """Return the shear modulus G_L along the fibres of a square array, and its relative error.
+def longitudinal_shear(
+    radius: Array, matrix: float, inclusion: float, *, lattice: Lattice = SQUARE, axis: int = 0
+) -> tuple[Array, Array]:
+    """Return the shear modulus G_L along the fibres of an array, and its relative error.
 
     The number of harmonics of Rayleigh's series (1892) is doubled from 4 until no modulus changes
     by more than 1e-12, or up to 128; the last change is the error, plus 1e-12.
 
     Args:
-        radius: Radii over half the cell's side, in [0, 1), shape (n,), one at least.
+        radius: Radii over half the distance of the fibres, in [0, 1), shape (n,), one at least.
         matrix: Shear modulus around the fibres, in Pa.
         inclusion: Shear modulus of the fibres, in Pa.
+        lattice: The array.
+        axis: 0 for shear of the plane of the fibres and x, 1 for that of the fibres and y; they
+            differ on a rectangle.
 
     Returns:
         G_L in Pa and its relative errors, shape (n,) each. The error is larger where 128 harmonics
@@ -165,33 +184,47 @@ def longitudinal_shear(radius: Array, matrix: float, inclusion: float) -> tuple[
     tolerance = 1e-12
     max_harmonics = 128  # more would cost their third power
     harmonics = 4
-    moduli = _rayleigh_moduli(radius, matrix, inclusion, harmonics=harmonics)
+    moduli_by = partial(_rayleigh_moduli, radius, matrix, inclusion, lattice=lattice, axis=axis)
+    moduli = moduli_by(harmonics=harmonics)
     while True:
         harmonics *= 2
         previous = moduli
-        moduli = _rayleigh_moduli(radius, matrix, inclusion, harmonics=harmonics)
+        moduli = moduli_by(harmonics=harmonics)
         change = np.abs(moduli / previous - 1)
         if change.max() <= tolerance or harmonics >= max_harmonics:
             return moduli, change + tolerance
 
 
-def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, *, harmonics: int) -> Array:
-    """Return the shear modulus G_L along the fibres of a square array, by a number of harmonics.
+def _rayleigh_moduli(
+    radius: Array,
+    matrix: float,
+    inclusion: float,
+    *,
+    harmonics: int,
+    lattice: Lattice,
+    axis: int,
+) -> Array:
+    """Return the shear modulus G_L along the fibres of an array, by a number of harmonics.
 
     The axial displacement outside the fibres is the real part of A z + Σ_P Σ_n a_n (z − P)^-n, with
-    odd n, over the axes P of all fibres (Rayleigh 1892). Its continuity, and that of the traction,
-    at the fibre at 0 give a linear system for the a_n.
+    odd n, over the axes P of all fibres (Rayleigh 1892); A and a_n are real for a load along x and
+    imaginary along y. Its continuity, and that of the traction, at the fibre at 0 give a linear
+    system for the a_n.
 
     Args:
         radius: Radii over half the cell's side, in [0, 1), shape (n,).
         matrix: Shear modulus of the matrix, in Pa.
         inclusion: Shear modulus of the fibres, in Pa.
         harmonics: Number of unknown a_n, for n = 1, 3, 5, ….
+        lattice: The array.
+        axis: 0 for a load along x, 1 for one along y.
 
     Returns:
         Moduli in Pa, shape (n,).
     """
-    images = _image_couplings(harmonics)
+    # The conditions at the fibre take the conjugates of what the images cause, which changes the
+    # sign of imaginary numbers; unknowns are −a_n / A there.
+    images = _image_couplings(harmonics, lattice) * (-1) ** axis
     # Unknowns are scaled by r^n / A, so that the system has entries of order one for any order n.
     scale = radius[:, None] ** (2 * np.arange(harmonics) + 1)
     contrast = (matrix - inclusion) / (matrix + inclusion)
@@ -199,20 +232,19 @@ def _rayleigh_moduli(radius: Array, matrix: float, inclusion: float, *, harmonic
     source = np.zeros((radius.size, harmonics, 1))
     source[:, 0, 0] = contrast * radius
     dipole = np.linalg.solve(system, source)[:, 0, 0]  # a_1
-    # The sum over the images, Weierstrass' ζ, is not periodic: it jumps across the cell by this
-    # (Legendre's relation), which is part of the mean strain.
-    jump = LatticeSums.ZETA_PERIOD * radius * dipole
+    # The sum over the images is not periodic: it jumps across the cell by this, which is part of
+    # the mean strain.
+    jump = np.pi / lattice.area * radius * dipole
     return np.asarray(matrix * (1 - jump) / (1 + jump))
 
 
 @cache
-def _image_couplings(harmonics: int) -> Array:
+def _image_couplings(harmonics: int, lattice: Lattice) -> Array:
     """Return what unit a_n of all images add to the Taylor coefficients at 0, for odd orders.
 
     Rows are the orders k = 1, 3, … of the coefficients and columns the n = 1, 3, … of the a_n,
-    shape (harmonics, harmonics). The lattice has the period 2. Equal arguments give the same array,
-    which must not be changed.
+    shape (harmonics, harmonics). Equal arguments give the same array, which must not be changed.
     """
     orders = 2 * np.arange(harmonics) + 1
     # Two orders add up to 4 · harmonics − 2 at most.
-    return lattice_images(lattice_sums(4 * harmonics).plain, orders, orders)
+    return lattice_images(lattice_sums(4 * harmonics, lattice).plain, orders, orders)

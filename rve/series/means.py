@@ -55,22 +55,24 @@ class CellModuli:
     """Moduli of cells with n radii and m inclusion materials.
 
     Args:
-        moduli: Three moduli of each cell in Pa, shape (n, m, 3). Of plane cells these are C11 +
-            C12, C11 − C12 and C33, of cells in space K, (C11 − C12)/2 and C44.
-        errors: Declared relative truncation errors of the moduli, shape (n, m, 3).
+        moduli: Moduli of each cell in Pa, shape (n, m, 3). Of plane cells these are C11 + C12, C11
+            − C12 and C33, of cells in space K, (C11 − C12)/2 and C44. Cells without the symmetry of
+            the square have the mean of C11 and C22 in place of C11, and C11 and C22 as fourth and
+            fifth moduli.
+        errors: Declared relative truncation errors of the moduli, in their shape.
         terms: Number of terms of the series, shape (n, m).
-        voigt: Function that returns the stiffness matrix for the three moduli.
+        voigt: Function that returns the stiffness matrix for the moduli.
     """
 
     moduli: Array
     errors: Array
     terms: Ints
-    voigt: Callable[[Array, Array, Array], Array]
+    voigt: Callable[..., Array]
 
     @property
     def matrix(self) -> Array:
         """Stiffness matrices in Pa, shape (n, m, 3, 3) of plane cells, else (n, m, 6, 6)."""
-        return self.voigt(self.moduli[..., 0], self.moduli[..., 1], self.moduli[..., 2])
+        return self.voigt(*np.moveaxis(self.moduli, -1, 0))
 
 
 def _error_terms(terms: int) -> tuple[int, int]:
@@ -87,8 +89,9 @@ class Series:
 
     Args:
         moduli: Function of n radii, the materials of the matrix and of m inclusions, and a number
-            of terms. It returns three moduli of each cell in Pa, shape (n, m, 3).
-        voigt: Function that returns the stiffness matrix for the three moduli.
+            of terms. It returns the moduli of each cell in Pa, shape (n, m, size), as those of
+            `CellModuli`.
+        voigt: Function that returns the stiffness matrix for the moduli.
         steps: Numbers of terms to try, rising.
         decay: The constant d in: error ~ exp(−d · terms · arccosh(1/r)) at the reduced radius r.
         start: Fraction of the terms that this decay demands, with which to begin; cells of mild
@@ -97,10 +100,11 @@ class Series:
         safety: Factor of the estimated error.
         round_off: Relative rounding error of a modulus.
         tolerance: Relative truncation error allowed by default.
+        size: Number of the moduli, 3, or 5 of cells without the symmetry of the square.
     """
 
     moduli: Callable[[Array, Sequence[Material], int], Array]
-    voigt: Callable[[Array, Array, Array], Array]
+    voigt: Callable[..., Array]
     steps: tuple[int, ...]
     decay: float
     start: float
@@ -108,6 +112,7 @@ class Series:
     safety: float
     round_off: float
     tolerance: float
+    size: int = 3
 
     def converged_moduli(
         self,
@@ -124,7 +129,7 @@ class Series:
         depend on the other cells.
 
         Args:
-            radius: Radii over half the cell's side, in [0, 1), shape (n,).
+            radius: Radii over half the cell's shorter side, in [0, 1), shape (n,).
             matrix: Material around the particle.
             inclusions: Materials of the particle, m of them. Moduli of 1e-12 and of 1e12 times
                 those of the matrix give a pore and a rigid particle to as many digits.
@@ -143,8 +148,8 @@ class Series:
             raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
         steps = np.array(self.steps)
         shape = (radius.size, len(inclusions))
-        moduli = np.zeros((*shape, 3))
-        errors = np.full((*shape, 3), np.inf)
+        moduli = np.zeros((*shape, self.size))
+        errors = np.full((*shape, self.size), np.inf)
         terms = np.zeros(shape, int)
         rate = np.empty(shape)
         rate[:] = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))[:, None]
@@ -196,8 +201,8 @@ class Series:
             terms: Number of terms of the series.
 
         Returns:
-            Three moduli of each cell in Pa, shape (n, m, 3): of plane cells C11 + C12, C11 − C12
-            and C33, in space K, (C11 − C12)/2 and C44. They are complex if a material is.
+            Moduli of each cell in Pa, shape (n, m, size), as those of `CellModuli`. They are
+            complex if a material is.
         """
         entries_of_batch = 2_000_000  # 16 MB of real numbers
         entries = radius.size * (len(materials) - 1) * self.unknowns(terms) ** 2
@@ -238,8 +243,8 @@ def converged_means(
 
     Args:
         radius_map: Radius of the particle over θ, in halves of the cell's side.
-        cells: Function that returns the three moduli of cells at n radii for m inclusions, shape
-            (n, m, 3), with their errors and numbers of terms.
+        cells: Function that returns the moduli of cells at n radii for m inclusions, with their
+            errors and numbers of terms.
         points: Number of nodes of the rule, whatever its error; None for as many as the accuracy
             demands.
         accuracy: Relative error allowed for every mean modulus.
@@ -283,7 +288,8 @@ def converged_means(
             if k not in means and (points or errors[k].max() <= accuracy):
                 in_space = np.maximum(truncation_errors[0][k], truncation_errors[-1][k])
                 curve = StressCurve.from_stiffness(rule, coarse.matrix[:, k])
-                means[k] = Mean(curve, {"space": in_space, "theta": errors[k]}, coarse.terms[:, k])
+                by_source = {"space": _of_three(in_space), "theta": _of_three(errors[k])}
+                means[k] = Mean(curve, by_source, coarse.terms[:, k])
         if len(means) == len(errors):
             return [means[k] for k in range(len(errors))]
         if counts[-1] >= most_points:
@@ -293,6 +299,16 @@ def converged_means(
                 "allow a larger error, or give the number of nodes",
             )
         count = counts[1]
+
+
+def _of_three(errors: Array) -> Array:
+    """Return the errors of C11 + C12, C11 − C12 and C33 that hold with C11 and with C22 alone.
+
+    Args:
+        errors: Relative errors of the moduli of `CellModuli`, shape (3,) or (5,).
+    """
+    axial = errors[3:].max(initial=0.0)
+    return np.maximum(errors[:3], [axial, axial, 0.0])
 
 
 def finer_count(count: int) -> int:
@@ -390,5 +406,6 @@ def _mean_moduli(
     # Nodes with equally many terms are solved as one batch.
     for count in np.unique(terms):
         nodes = np.flatnonzero(terms == count)
-        total += rule.weights[nodes] @ series.solve(radii[nodes], materials, int(count))[:, 0]
+        moduli = series.solve(radii[nodes], materials, int(count))[:, 0, :3]
+        total += rule.weights[nodes] @ moduli
     return total

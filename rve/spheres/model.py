@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.rve.series.means import Material, Series
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.multipoles import VOLUME, Multipoles, TMatrices, couplings, t_matrices
@@ -68,7 +69,17 @@ class SpheresModel(SeriesModel):
     convention: ClassVar[str] = HILL
     DEFAULT_TOLERANCE: ClassVar[float | None] = 1e-5
     MIN_ACCURACY: ClassVar[float] = 1e-11
-    series: ClassVar[Series] = SPHERES
+
+    @property
+    def series(self) -> Series:
+        """The multipole series of the simple cubic array."""
+        return SPHERES
+
+    def __post_init__(self) -> None:
+        """RefusedError for points or an accuracy not allowed, or an array that is not cubic."""
+        super().__post_init__()
+        cure = 'particles = "cylinders" have other arrays'
+        require(self.lattice == "square", "lattice", self.lattice, '"square", of spheres', cure)
 
     def _checked_result(self, **fields: Any) -> HomogenisedSpheres:
         """Return the result with these fields and its checks."""

@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve import Phase, SeriesModel, SlicesModel
-from alphacut.rve.series.model import CIRCLES
+from alphacut.rve.series.circles import CIRCLES
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from tests.rve.test_result import Bent, crisp_cell
 

@@ -14,7 +14,7 @@ from alphacut.rve.spheres.result import cubic_moduli, cubic_voigt, hill_average,
 from alphacut.stochastic import HermiteMap
 from tests.rve.series.test_series import random_cells
 
-SPHERES = SpheresModel.series
+SPHERES = SpheresModel().series
 MATRIX, STIFF = Phase(20e9), Phase(80e9)
 MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 
