@@ -165,6 +165,22 @@ def test_random_volumes_hold_what_finite_volumes_tend_to(seed):
     assert high / low - 1 < 1.5 * (shear.upper / shear.lower - 1)
 
 
+@pytest.mark.parametrize("contrast", [0.01, 10.0, 1000.0])
+def test_a_cube_in_each_cell_holds_what_finite_volumes_tend_to(contrast):
+    """A cube of half the cell's side, as in NIST IR 6269: the simplest solid with edges."""
+    cube = np.ones((4, 4, 4))
+    cube[1:3, 1:3, 1:3] = contrast
+    coarse, middle, fine = (finite_volumes(np.kron(cube, np.ones((n, n, n)))) for n in (2, 4, 8))
+    limit = fine + (fine - middle) ** 2 / (middle - coarse - (fine - middle))
+    gaps = []
+    for n in (1, 2, 4):
+        bounds = solve_conduction(np.kron(cube, np.ones((n, n, n)))).bounds
+        low, high = bounds.components()[0]
+        assert low < limit < high
+        gaps.append(high - low)
+    assert gaps[2] < 0.6 * gaps[1] < 0.36 * gaps[0]
+
+
 @pytest.mark.parametrize("shape", [(12, 12), (10, 10, 10)])
 def test_insulators_and_perfect_conductors(shape, rng):
     """In the plane the cell of insulators is the inverse of that of perfect conductors."""
