@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,48 +56,30 @@ def affine_terms(
     names = tuple(exports[0][0])
     values = np.array([[parameters[name] for name in names] for parameters, _ in exports], float)
     arrays = np.array([array for _, array in exports], float)
-    nominal = arrays[0]
-    is_moved = values != values[0]
-    chosen: list[int] = []
-    for k, name in enumerate(names):
-        alone = np.flatnonzero(is_moved[:, k] & (is_moved.sum(axis=1) == 1))
-        steps = np.append(values[alone, k] - values[0, k], 0.0)
-        far = int(np.abs(steps).argmax())
-        # A further export tells a straight line from a bent one if it is well inside of its ends.
-        inner = np.abs(steps * (steps[far] - steps)).max()
-        is_told = inner > MIN_STEP / 2 * steps[far] ** 2
-        is_told = is_told and abs(steps[far]) >= MIN_STEP * abs(values[0, k])
-        value = f"moved alone by {', '.join(f'{step:g}' for step in steps[:-1]) or 'none'}"
-        cure = "move it by its own size, and once by half of this"
-        require(is_told, name, value, "two steps of a tenth or more, well apart", cure)
-        chosen.append(int(alone[far]))
-    is_joint = len(names) == 1 or bool(is_moved.all(axis=1).any())
+    chosen = [_chosen_export(values, k, name) for k, name in enumerate(names)]
+    is_joint = len(names) == 1 or bool((values != values[0]).all(axis=1).any())
     require(
         is_joint, "exports that move all parameters", 0, "one, to see that they do not multiply"
     )
-
-    steps = np.diag(values[chosen] - values[0])
-    differences = arrays[chosen] - nominal
     # Each entry is rounded to `unit` of its magnitude by printing, and by what the program adds up.
     diagonal = np.sqrt(np.abs(np.diagonal(arrays, axis1=1, axis2=2)).max(axis=0))
     assembly = ASSEMBLY_ROUNDING * np.outer(diagonal, diagonal)
     roundings = _rounding_unit(arrays) * np.abs(arrays) + assembly
-    of_differences = roundings[chosen] + roundings[0]
+    model = _AffineMatrix(
+        values[0],
+        np.diag(values[chosen] - values[0]),
+        _Rounded(arrays[0], roundings[0]),
+        _Rounded(arrays[chosen] - arrays[0], roundings[chosen] + roundings[0]),
+    )
 
-    def prediction(point: Array) -> tuple[Array, Array]:
-        """Return the affine matrix at a point, and the rounding of its entries."""
-        fractions = (point - values[0]) / steps
-        rounding = roundings[0] + np.tensordot(np.abs(fractions), of_differences, 1)
-        return nominal + np.tensordot(fractions, differences, 1), rounding
-
-    rows = unknowns or range(1, len(nominal) + 1)
     for k, array in enumerate(arrays):
-        expected, rounding = prediction(values[k])
-        deviation = np.abs(array - expected)
-        excess = deviation - rounding - roundings[k]
-        i, j = divmod(int(excess.argmax()), len(nominal))  # entries are counted row by row
+        expected = model.at(values[k])
+        deviation = np.abs(array - expected.entries)
+        excess = deviation - expected.rounding - roundings[k]
+        i, j = divmod(int(excess.argmax()), len(array))  # entries are counted row by row
         relative = deviation[i, j] / max(np.abs(arrays[:, i, j]).max(), assembly[i, j])
-        moved = [name for name, x in zip(names, is_moved[k], strict=True) if x]
+        rows = unknowns or range(1, len(array) + 1)
+        moved = [name for name, x in zip(names, values[k] != values[0], strict=True) if x]
         value = f"not affine in {' and '.join(moved)}:"
         value += f" {relative:.2g} of the entry at [{rows[i]}, {rows[j]}]"
         cure = "let exports differ in this parameter alone"
@@ -104,17 +87,82 @@ def affine_terms(
             cure = "make one parameter of what is multiplied, as EI"
         allowed = "a sum of terms with one parameter each"
         require(bool(excess[i, j] <= 0), f"export {k + 1}", value, allowed, cure)
+    return model.terms(names)
 
-    constant, rounding = prediction(np.zeros(len(names)))
-    constant[np.abs(constant) <= rounding] = 0.0
-    differences[np.abs(differences) <= of_differences] = 0.0
-    terms: list[tuple[str | float, Array]] = []
-    for name, difference, step in zip(names, differences, steps, strict=True):
-        require(bool(difference.any()), name, "without any effect", "parameters of the matrix")
-        terms.append((name, difference / step))
-    if constant.any():
-        terms.append((1.0, constant))
-    return tuple(terms)
+
+class _Rounded(NamedTuple):
+    """Entries of arrays, and the largest error of each by rounding, in the same shape."""
+
+    entries: Array
+    rounding: Array
+
+    @property
+    def cleared(self) -> Array:
+        """The entries, 0 where rounding alone can have made them."""
+        return np.where(np.abs(self.entries) <= self.rounding, 0.0, self.entries)
+
+
+class _AffineMatrix(NamedTuple):
+    """The affine matrix through a nominal array and one more for each of P parameters.
+
+    Args:
+        point: Nominal parameters, shape (P,).
+        steps: Change of each parameter in its array, shape (P,).
+        nominal: The nominal array, shape (n, n).
+        differences: Changes of the arrays, shape (P, n, n).
+    """
+
+    point: Array
+    steps: Array
+    nominal: _Rounded
+    differences: _Rounded
+
+    def at(self, point: Array) -> _Rounded:
+        """Return the matrix at some parameters, shape (P,)."""
+        fractions = (point - self.point) / self.steps
+        change = np.tensordot(fractions, self.differences.entries, 1)
+        rounding = np.tensordot(np.abs(fractions), self.differences.rounding, 1)
+        return _Rounded(self.nominal.entries + change, self.nominal.rounding + rounding)
+
+    def terms(self, names: Sequence[str]) -> tuple[tuple[str | float, Array], ...]:
+        """Return the term of each parameter, and the constant one if there is one.
+
+        Raises:
+            RefusedError: A parameter changes nothing.
+        """
+        terms: list[tuple[str | float, Array]] = []
+        for name, difference, step in zip(names, self.differences.cleared, self.steps, strict=True):
+            require(bool(difference.any()), name, "without any effect", "parameters of the matrix")
+            terms.append((name, np.asarray(difference / step)))
+        constant = self.at(np.zeros(len(names))).cleared
+        if constant.any():
+            terms.append((1.0, constant))
+        return tuple(terms)
+
+
+def _chosen_export(values: Array, k: int, name: str) -> int:
+    """Return the number of the export that moves a parameter alone, the farthest.
+
+    Args:
+        values: Parameters of all exports, shape (exports, P).
+        k: Number of the parameter.
+        name: Its name, for the message.
+
+    Raises:
+        RefusedError: There are no two such exports, far enough from the nominal one and apart.
+    """
+    is_moved = values != values[0]
+    alone = np.flatnonzero(is_moved[:, k] & (is_moved.sum(axis=1) == 1))
+    steps = np.append(values[alone, k] - values[0, k], 0.0)
+    far = int(np.abs(steps).argmax())
+    # A further export tells a straight line from a bent one if it is well inside of its ends.
+    inner = np.abs(steps * (steps[far] - steps)).max()
+    is_told = inner > MIN_STEP / 2 * steps[far] ** 2
+    is_told = is_told and abs(steps[far]) >= MIN_STEP * abs(values[0, k])
+    value = f"moved alone by {', '.join(f'{step:g}' for step in steps[:-1]) or 'none'}"
+    cure = "move it by its own size, and once by half of this"
+    require(is_told, name, value, "two steps of a tenth or more, well apart", cure)
+    return int(alone[far])
 
 
 def _require_exports(
