@@ -389,6 +389,8 @@ def lattice_of(xy: Array) -> Lattice:
 def _require_periodic(grid: PrismGrid) -> None:
     """Raise unless each level of θ fills the same parallelogram and its opposite sides match.
 
+    So must the nodes half-way between two levels.
+
     Args:
         grid: A mesh with the positions `fixed` of all nodes (else an AssertionError is raised),
             which are numbered level by level, and with the lattice of its lowest level.
@@ -400,10 +402,10 @@ def _require_periodic(grid: PrismGrid) -> None:
     """
     assert grid.fixed is not None
     lattice = grid.plane.lattice
-    per_level = len(grid.plane.points)
-    lowest: Ints | None = None  # unknowns of its nodes, which partners have in common
-    for level in range(grid.layers + 1):
-        points = grid.fixed[level * per_level : (level + 1) * per_level]
+    first_middle = (grid.layers + 1) * len(grid.plane.points)
+    levels = np.split(grid.fixed[:first_middle], grid.layers + 1)
+    middles = np.split(grid.fixed[first_middle:], grid.layers)
+    for points in levels + middles:
         xy, theta = points[:, :2], points[0, 2]
         reaches = abs(lattice.side_coordinates(xy)).max(axis=0)
         if abs(reaches - 1).max() > SAME_PLACE:
@@ -412,12 +414,12 @@ def _require_periodic(grid: PrismGrid) -> None:
             what += " of the lowest level"
             raise MeshError(what, "mesh a square, a rectangle or a parallelogram, alike at all θ")
         try:
-            unknown = unknowns(xy, lattice)
+            partners = unknowns(xy, lattice)
         except MeshError as error:
             raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
-        if lowest is not None and not np.array_equal(unknown, lowest):
+        # Vertices, which middles have alone, are the first nodes of a level.
+        if not np.array_equal(partners, unknowns(levels[0][: len(xy), :2], lattice)):
             raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
-        lowest = unknown
 
 
 def write(

@@ -1,0 +1,59 @@
+"""Guaranteed integrals over slices of prisms and over θ."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("alphacut.rve.fenicsx")
+
+from alphacut.rve.mesh.wedge import vertices_and_midpoints
+from alphacut.rve.prism.theta_means import (
+    InverseDeterminant,
+    chebyshev_points,
+    determinant_ranges,
+    mean_over_theta,
+    planar_slopes,
+)
+from alphacut.stochastic import TruncatedNormal
+from alphacut.stochastic.theta.quadrature import gauss_rule
+
+
+@pytest.mark.parametrize("ratio", [1 + 1e-8, 1.3, 2.0, 30.0])
+def test_the_inverse_is_near_and_its_error_is_reached(ratio, rng):
+    low = rng.uniform(0.1, 10)
+    inverse = InverseDeterminant.of_ends(np.array([[low], [ratio * low]]), ratio)
+    places = low * np.linspace(1, ratio, 2001)[np.newaxis]
+    errors = abs(places * inverse(places) - 1)
+    assert errors.max() <= inverse.errors[0] + 1e-13
+    assert errors.max() >= 0.99 * inverse.errors[0] or inverse.errors[0] < 1e-11
+    assert inverse.errors[0] < 1e-6 or ratio == 30
+
+
+def test_determinants_lie_in_their_ranges(rng):
+    nodes = vertices_and_midpoints()[:, :2] + 0.04 * rng.normal(size=(20, 15, 2))
+    low, high = np.sort(rng.random(2))
+    ends = determinant_ranges(nodes, low, high)
+    triangle = rng.dirichlet(np.ones(3), 500)[:, :2]
+    points = np.column_stack([triangle, rng.uniform(low, high, 500)])
+    first, second = planar_slopes(points)[:, np.newaxis] @ nodes
+    values = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    assert (ends[0] <= values.min(axis=1)).all()
+    assert (values.max(axis=1) <= ends[1]).all()
+    assert (np.diff(ends, axis=0) < 2 * np.ptp(values, axis=1)).all()
+
+
+def test_means_over_theta_hold_those_by_quadrature(rng):
+    law = TruncatedNormal(-2.0, 3.0)
+    polynomials = [np.polynomial.Polynomial(rng.normal(size=9)) for _ in range(3)]
+    levels = [-2.0, -0.5, 1.0, 3.0]
+    total = np.zeros(2)
+    for low, high, polynomial in zip(levels[:-1], levels[1:], polynomials, strict=True):
+        values = polynomial(low + chebyshev_points(12) * (high - low))
+        total += mean_over_theta(law, low, high, values)
+    exact = 0.0
+    for low, high, polynomial in zip(levels[:-1], levels[1:], polynomials, strict=True):
+        x, weights = np.polynomial.legendre.leggauss(40)
+        theta = low + (x + 1) / 2 * (high - low)
+        exact += (high - low) / 2 * weights @ (polynomial(theta) * law.pdf(theta))
+    assert abs(total[0] - exact) < total[1]
+    scale = gauss_rule(law, points=20).mean(abs(polynomials[1](gauss_rule(law, points=20).nodes)))
+    assert total[1] < 1e-3 * scale
