@@ -288,8 +288,8 @@ def spectrum_response(
 
     Returns:
         Modes and combined peaks at the nominal inputs; over each cut the smallest and largest
-        combined peaks at corners and at points inside, and guaranteed bounds of all, where modes
-        are known to keep apart in the cut or in each of its parts.
+        combined peaks at corners and at points inside, and guaranteed bounds of all, whether modes
+        meet in the cut or not.
 
     Raises:
         RefusedError: An argument is not as said, the structure is not linear, an output takes

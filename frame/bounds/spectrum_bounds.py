@@ -1,9 +1,25 @@
-"""Guaranteed bounds over a box of the combined peaks of the response-spectrum method."""
+"""Guaranteed bounds over a box of the combined peaks of the response-spectrum method.
+
+Let a mode k of a group have the output a_k, the participation factor β_k and the spectral
+displacement S_k = S(λ_k), so that its peak is r_k = a_k β_k S_k. The sums s = Σ a_k β_k S_k,
+A = Σ a_k² S_k and B = Σ β_k² S_k over the group do not depend on how its modes turn in their common
+subspace. With w² = A B, Cauchy and Schwarz give W = Σ |r_k| ≤ w. The positive peaks sum up to
+(W + s)/2 and the negative ones to (W − s)/2 in magnitude, and Σ r_k² ≥ W²/p for p modes. Hence
+
+    Σ_{i≠j} d_ij r_i r_j ≥ −d (W² − s²)/2           by pairs of opposite signs,
+    Σ_{i≠j} d_ij r_i r_j ≤ d ((W² + s²)/2 − W²/p)   by pairs of equal signs
+
+for 0 ≤ d_ij ≤ d, and with w in the place of W for p ≥ 2. The square of the combined peak is s² less
+this sum with d_ij = 1 − ρ_ij. SRSS has d_ij = 1.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +27,8 @@ from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box import over_box
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.modes_apart import ModeApart, modes_apart, ranges
-from alphacut.frame.spectra.displacement_chord import displacement_chord
+from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups
+from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
 from alphacut.frame.spectra.modal_combination import correlation_range
 from alphacut.frame.spectra.target import TargetSpectrum
 from alphacut.frame.structures.linear import LinearSystem
@@ -20,9 +36,36 @@ from alphacut.frame.structures.linear import LinearSystem
 GAP = 0.01
 """Fraction of a bound within which an attained value suffices (tuned)."""
 MAX_SPLITS = 60
-"""Largest number of bisections of boxes over which modes are known (tuned)."""
+"""Largest number of bisections of boxes (tuned)."""
+MAX_ENCLOSURES = 16
+"""Largest number of boxes in which the modes are enclosed anew (tuned)."""
 MAX_DEPTH = 4
-"""Largest number of bisections in a row of a box in which modes are not known to keep apart."""
+"""Largest number of bisections in a row of a box over which nothing is known of the modes."""
+
+
+class _Peaks(NamedTuple):
+    """Peaks of a group of modes, for m outputs."""
+
+    sum: TaylorModel  # s, (m,)
+    sum_of_magnitudes: Array  # upper bound of w over the box, (m,)
+    squared_magnitudes: TaylorModel  # w², (m,)
+
+
+class Squares(NamedTuple):
+    """Taylor models that are nowhere above and nowhere below the squared combined peaks, (m,)."""
+
+    lower: TaylorModel
+    upper: TaylorModel
+
+
+class _Correlations(NamedTuple):
+    """Range of the correlation coefficients of modes of two groups, (groups, groups) each.
+
+    On the diagonal it is that of different modes of one group. Below it there is nothing of use.
+    """
+
+    smallest: Array
+    largest: Array
 
 
 @dataclass(frozen=True)
@@ -41,66 +84,214 @@ class Combination:
     modes: int | None
     own_ratios: bool
 
-    def squares(self, modes: Sequence[ModeApart]) -> TaylorModel:
-        """Return the squares of the combined peaks of m outputs as Taylor models, shape (m,).
+    def squares(self, groups: Sequence[ModeGroup]) -> Squares:
+        """Return bounds of the squares of the combined peaks as Taylor models, shape (m,).
 
         Raises:
             UnprovedError: A period may lie outside the range of the spectrum, or a damping ratio
                 may be zero with CQC.
         """
-        periods = ranges([mode.period for mode in modes])
+        periods = np.array([group.period_range for group in groups])
         first, last = self.spectrum.periods[[0, -1]]
-        if periods[0].min() < first * (1 - 1e-9) or periods[1].max() > last * (1 + 1e-9):
+        if periods.min() < first * (1 - 1e-9) or periods.max() > last * (1 + 1e-9):
             raise UnprovedError("a period may lie outside the spectrum", "give a longer spectrum")
-        peaks = []
-        for mode, low, high in zip(modes, *np.clip(periods, first, last), strict=True):
-            chord = displacement_chord(self.spectrum, float(low), float(high))
-            displacement = chord.value + chord.slope * (mode.period - chord.midpoint)
-            peaks.append(mode.factors * displacement.widened(chord.error))
-        total = peaks[0] * peaks[0]
-        for peak in peaks[1:]:
-            total = total + peak * peak
-        if self.rule == "SRSS":
-            return total
+        correlations = self._correlations(groups, periods)
+        periods = np.clip(periods, first, last)
+        peaks = [self._peaks(x, ends) for x, ends in zip(groups, periods, strict=True)]
+        lower = upper = peaks[0].sum * 0.0
+        for j, (group, (total, _, magnitudes)) in enumerate(zip(groups, peaks, strict=True)):
+            p = len(group.modes)
+            square = total * total
+            if not group.is_whole:
+                upper = upper + magnitudes
+            elif p == 1:
+                lower = lower + square
+                upper = upper + square
+            else:
+                half = (1 - correlations.smallest[j, j]) / 2
+                lower = lower + square * (1 - half) - magnitudes * (half * (1 - 2 / p))
+                upper = upper + square * (1 - half) + magnitudes * half
+        for i, j in combinations(range(len(groups)), 2):
+            low = correlations.smallest[i, j]
+            high = correlations.largest[i, j]
+            if high > 0:
+                # The factor covers the rounding of sum and difference.
+                radius = (high - low) * (1 + 1e-12) + 1e-15
+                if not (groups[i].is_whole and groups[j].is_whole):
+                    radius = 2 * high  # no sum is known of one of both, and 0 stands for it
+                product = peaks[i].sum * peaks[j].sum * (low + high)
+                error = radius * peaks[i].sum_of_magnitudes * peaks[j].sum_of_magnitudes
+                lower = lower + product.widened(error)
+                upper = upper + product.widened(error)
+        return Squares(lower, upper)
 
-        equal: Array = np.full(len(modes), self.spectrum.damping)
+    def _correlations(self, groups: Sequence[ModeGroup], periods: Array) -> _Correlations:
+        """Return ranges of the correlation coefficients; those of SRSS are 0.
+
+        Args:
+            groups: The groups, by rising first mode.
+            periods: Shortest and longest period of each, shape (groups, 2).
+
+        Raises:
+            UnprovedError: A damping ratio may be zero.
+        """
+        count = len(groups)
+        if self.rule == "SRSS":
+            return _Correlations(np.zeros((count, count)), np.zeros((count, count)))
+        equal: Array = np.full(count, self.spectrum.damping)
         damping = (equal, equal)
         if self.own_ratios:
-            damping = ranges([mode.ratio for mode in modes])
-            if damping[0].min() <= 0:
+            low, high = np.transpose([group.ratio_range for group in groups])
+            damping = (low, high)
+            if low.min() <= 0:
                 raise UnprovedError("a damping ratio may be zero", "combine by SRSS")
-        smallest, largest = correlation_range(periods, damping)
-        for i, j in zip(*np.triu_indices(len(modes), 1), strict=True):
-            product = peaks[i] * peaks[j]
-            middle = smallest[i, j] + largest[i, j]
-            # The factor covers the rounding of sum and difference.
-            radius = (largest[i, j] - smallest[i, j]) * (1 + 1e-12) + 1e-15
-            total = total + (product * middle).widened(radius * product.magnitude())
-        return total
+        smallest, largest = correlation_range((periods[:, 0], periods[:, 1]), damping)
+        # The range is that of groups of which one has the longer periods.
+        last = np.array([group.modes[-1] for group in groups])
+        following = np.array([group.modes[0] for group in groups])
+        is_ordered = (last[:, np.newaxis] < following) | np.eye(count, dtype=bool)
+        return _Correlations(
+            np.where(is_ordered, smallest, 0.0), np.where(is_ordered, largest, 1.0)
+        )
+
+    def _peaks(self, group: ModeGroup, periods: Array) -> _Peaks:
+        """Return the peaks of a group.
+
+        Args:
+            group: The group.
+            periods: Its shortest and longest period, within the range of the spectrum, shape (2,).
+        """
+        sums = group.sums
+        shortest, longest = periods.tolist()
+        if not group.is_whole:
+            # S(λ) is at most the largest acceleration over λ.
+            acceleration = max_acceleration(self.spectrum, shortest, longest)
+            of_outputs = np.maximum(sums.output_squares_over_eigenvalue.bounds()[1], 0.0)
+            of_ground = np.maximum(sums.source_squares_over_eigenvalue.bounds()[1], 0.0)
+            squared = acceleration**2 * of_outputs * of_ground * (1 + 1e-12)
+            magnitudes = sums.products.like(squared)
+            return _Peaks(sums.products * 0.0, np.sqrt(squared) * (1 + 1e-15), magnitudes)
+        # S(λ) = constant + slope/λ ± error
+        chord = displacement_chord(self.spectrum, shortest, longest)
+        slope = 4 * np.pi**2 * chord.slope
+        constant = chord.value - chord.slope * chord.midpoint
+        # The rounding of both numbers changes S by far less than this.
+        error = chord.error + 1e-14 * (abs(chord.value) + abs(chord.slope) * chord.midpoint)
+
+        def weighted(plain: TaylorModel, over_eigenvalue: TaylorModel) -> TaylorModel:
+            """Return a sum with the weight S of the modes, but for the error of S."""
+            return plain * constant + over_eigenvalue * slope
+
+        outputs = weighted(sums.output_squares, sums.output_squares_over_eigenvalue)
+        outputs = outputs.widened(error * sums.output_squares.magnitude())
+        ground = weighted(sums.source_squares, sums.source_squares_over_eigenvalue)
+        ground = ground.widened(error * sums.source_squares.magnitude())
+        unweighted = np.sqrt(sums.output_squares.magnitude() * sums.source_squares.magnitude())
+        squared_magnitudes = outputs * ground
+        largest = np.maximum(squared_magnitudes.bounds()[1], 0.0)
+        total = weighted(sums.products, sums.products_over_eigenvalue)
+        return _Peaks(
+            sum=total.widened(error * unweighted * (1 + 1e-15)),
+            sum_of_magnitudes=np.sqrt(largest) * (1 + 1e-15),
+            squared_magnitudes=squared_magnitudes,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A structure, the names of its inputs, and what is combined."""
+
+    system: LinearSystem
+    names: Sequence[str]
+    combination: Combination
+
+    def parts(self, low: Array, high: Array, depth: int) -> Iterator[_Part]:
+        """Yield parts of a box, each with its modes.
+
+        Args:
+            low: Lower ends of the inputs, shape (d,).
+            high: Upper ends, shape (d,).
+            depth: How many bisections in a row are tried.
+
+        Raises:
+            UnprovedError: See `combined_bounds`.
+        """
+        try:
+            groups, along = mode_groups(
+                over_box(self.system, self.names, low, high), self.combination.modes
+            )
+            yield _Part(
+                low, high, groups, self.combination.squares(groups), along, is_enclosed=True
+            )
+            return
+        except UnprovedError as error:
+            if not depth:
+                raise
+            along = error.along
+        active = np.flatnonzero(high > low)
+        axis = depth % len(active) if along is None else along
+        for half_low, half_high in _halves(low, high, int(active[axis])):
+            yield from self.parts(half_low, half_high, depth - 1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A sub-box: its modes, and the squares of the combined peaks of m outputs over it."""
+    """A sub-box: its modes, and the squares of the combined peaks of m outputs over it.
 
-    modes: Sequence[ModeApart]
-    squares: TaylorModel
+    Args:
+        low: Lower ends of the inputs in SI units, shape (d,).
+        high: Upper ends, shape (d,).
+        groups: The modes.
+        squares: Bounds of the squares.
+        bisection_input: That of `ModeGroups`.
+        is_enclosed: Whether the modes were enclosed over this box, and not over a wider one.
+    """
 
-    def halves(self, combination: Combination, output: int) -> list[_Part]:
-        """Bisect the sub-box along the input that changes an output most."""
-        slopes = np.abs(self.squares.homogeneous_part(1)[:, output])
-        axis = int(slopes.argmax())
-        models = [model for mode in self.modes for model in mode]
+    low: Array
+    high: Array
+    groups: Sequence[ModeGroup]
+    squares: Squares
+    bisection_input: int | None = None
+    is_enclosed: bool = False
+
+    @property
+    def may_gain(self) -> bool:
+        """Whether modes of a group are likely to keep apart if they are enclosed anew."""
+        return not self.is_enclosed and any(group.has_gap for group in self.groups)
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether the sub-box is too narrow to be bisected."""
+        return bool((self.high - self.low <= 1e-9 * np.abs(self.high)).all())
+
+    def halves(self, problem: _Problem, output: int) -> list[_Part]:
+        """Bisect the sub-box along the input that changes an output or the modes most."""
+        axis = self._bisected_input(output)
+        active = np.flatnonzero(self.high > self.low)
+        ends = _halves(self.low, self.high, int(active[axis]))
+        unit = np.ones(len(active))
+        models = [model for group in self.groups for model in group.models]
         halves = []
-        for low_end, high_end in ((-1.0, 0.0), (0.0, 1.0)):
-            low = np.full(len(slopes), -1.0)
-            high = np.full(len(slopes), 1.0)
-            low[axis] = low_end
-            high[axis] = high_end
+        for half, (low, high) in zip(ends, _halves(-unit, unit, axis), strict=True):
             moved = iter(all_on_subbox(models, low, high))
-            modes = [ModeApart(*three) for three in zip(moved, moved, moved, strict=True)]
-            halves.append(_Part(modes, combination.squares(modes)))
+            groups = []
+            for group in self.groups:
+                own = [next(moved) for _ in group.models]
+                groups.append(group.with_models(own))
+            halves.append(_Part(*half, groups, problem.combination.squares(groups)))
         return halves
+
+    def _bisected_input(self, output: int) -> int:
+        """Return the active input whose bisection promises most."""
+        if self.bisection_input is not None:
+            return self.bisection_input
+        upper = self.squares.upper
+        change = np.abs(upper.homogeneous_part(1)[:, output])
+        change = change / max(float(upper.magnitude()[output]), 1e-300)
+        for group in self.groups:
+            diagonal = np.diagonal(group.eigenvalue_block.homogeneous_part(1), axis1=1, axis2=2)
+            change = change + np.ptp(diagonal, axis=1) / group.eigenvalue_block.value[0, 0]
+        return int(change.argmax())
 
 
 def combined_bounds(
@@ -112,11 +303,12 @@ def combined_bounds(
 ) -> Array:
     """Return guaranteed bounds of the combined peaks over a box, shape (outputs, 2).
 
-    Each of the modes is enclosed over the box, or over parts of it, as polynomials of the inputs
-    with guaranteed remainders: participation times output, and the period. The spectrum over the
-    range of the period is a line with a bound of its distance. So is the square of each combined
-    peak a polynomial with a remainder. The part with the farthest bound is bisected until the
-    bounds lie within 1 % of attained values, or for 60 times.
+    The modes are enclosed over the box as polynomials of the inputs with guaranteed remainders:
+    each for itself, or those that come near one another as a group. The spectrum over the periods
+    of a group is a line with a bound of its distance. So are bounds of the square of each combined
+    peak polynomials with a remainder. The part of the box with the farthest bound is bisected until
+    the bounds lie within 1 % of attained values, or for 60 times. Modes of a group that keep apart
+    in such a part are enclosed anew.
 
     Args:
         system: The structure, whose outputs are of displacements.
@@ -126,14 +318,16 @@ def combined_bounds(
         attained: Smallest and largest attained combined peak of each output, shape (outputs, 2).
 
     Raises:
-        UnprovedError: Modes are not known to keep apart in some part of the box, the structure has
-            no classical modes, or a period may lie outside the range of the spectrum.
+        UnprovedError: The structure has no classical modes, may lose its stiffness in some part of
+            the box, or may have a period outside the range of the spectrum.
     """
     low, high = ends
     if (low == high).all():
         # A box needs a width. A slightly wider one contains it.
         high = np.maximum(np.nextafter(low, np.inf), low + 1e-12 * np.abs(low))
-    parts = _parts(system, names, (low, high), combination, MAX_DEPTH)
+    problem = _Problem(system, names, combination)
+    parts = list(problem.parts(low, high, MAX_DEPTH))
+    enclosures = 0
     for _ in range(MAX_SPLITS):
         bounds = _bounds(parts)  # (parts, outputs, 2)
         # Attained values within the bounds; all signs are such that larger values lie farther out.
@@ -141,52 +335,37 @@ def combined_bounds(
         excess = (sign * (bounds - attained)).max(axis=0)
         relative = excess / np.maximum(bounds[..., 1].max(axis=0), 1e-300)[:, np.newaxis]
         output, side = np.unravel_index(int(relative.argmax()), relative.shape)
-        if relative[output, side] < GAP:
-            break
         farthest = int((sign[side] * bounds[:, output, side]).argmax())
-        parts += parts.pop(farthest).halves(combination, int(output))
+        part = parts[farthest]
+        if relative[output, side] < GAP or part.is_narrow:
+            break
+        smaller = part.halves(problem, int(output))
+        if part.may_gain and enclosures < MAX_ENCLOSURES:
+            enclosures += 1
+            with suppress(UnprovedError):  # then the enclosure over the wider box is bisected
+                smaller = list(problem.parts(part.low, part.high, MAX_DEPTH))
+        parts[farthest : farthest + 1] = smaller
     bounds = _bounds(parts)
     return np.stack([bounds[..., 0].min(axis=0), bounds[..., 1].max(axis=0)], axis=-1)
 
 
 def _bounds(parts: Sequence[_Part]) -> Array:
     """Return bounds of the combined peaks over each part, shape (parts, outputs, 2)."""
-    squares = np.array([np.stack(part.squares.bounds(), axis=-1) for part in parts])
+    squares = np.array(
+        [
+            np.stack([part.squares.lower.bounds()[0], part.squares.upper.bounds()[1]], axis=-1)
+            for part in parts
+        ]
+    )
     # The factors cover the rounding of the root.
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) * [1 - 1e-15, 1 + 1e-15])
 
 
-def _parts(
-    system: LinearSystem,
-    names: Sequence[str],
-    ends: tuple[Array, Array],
-    combination: Combination,
-    depth: int,
-) -> list[_Part]:
-    """Return the parts of a box in each of which the modes are known to keep apart.
-
-    Args:
-        system: The structure.
-        names: Names of its inputs.
-        ends: Lower and upper ends of the inputs, shape (d,) each.
-        combination: What is combined.
-        depth: How many bisections in a row are tried.
-
-    Raises:
-        UnprovedError: See `combined_bounds`.
-    """
-    low, high = ends
-    try:
-        modes = modes_apart(over_box(system, names, low, high), combination.modes)
-        return [_Part(modes, combination.squares(modes))]
-    except UnprovedError as error:
-        if not depth:
-            raise
-        along = error.along
-    active = np.flatnonzero(high > low)
-    axis = active[depth % len(active) if along is None else along]
+def _halves(low: Array, high: Array, axis: int) -> Iterator[tuple[Array, Array]]:
+    """Yield the ends, shape (d,) each, of both halves of a box bisected along an axis."""
     middle = (low[axis] + high[axis]) / 2
-    below, above = high.copy(), low.copy()
+    below = high.copy()
+    above = low.copy()
     below[axis] = above[axis] = middle
-    first = _parts(system, names, (low, below), combination, depth - 1)
-    return first + _parts(system, names, (above, high), combination, depth - 1)
+    yield low, below
+    yield above, high

@@ -87,7 +87,7 @@ def enclose_subspaces(
                 blocks.append(block)
                 free = np.setdiff1d(free, modes)
                 break
-            outside = nearness[np.ix_(modes, free)] * ~np.isin(free, modes)
+            outside = np.where(np.isin(free, modes), 0.0, nearness[np.ix_(modes, free)])
             inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
             # Both limits are tuned: the nearness from which a mode may be what hinders the
             # enclosure, and the number of modes of a block, with which the effort grows.

@@ -133,7 +133,7 @@ def truncated_modes(
     if not len(modes):
         return None
     order = max(x.block.modal_mass.order for x in participations)
-    sums = _sums_over_all_modes(found, rows, patterns, order)
+    sums = sums_over_all_modes(found, rows, patterns, order)
     for of_block in participations:
         enclosed = modal_sums_of_block(of_block)
         sums = ModalSums(*(x - y for x, y in zip(sums, enclosed, strict=True)))
@@ -175,7 +175,7 @@ def response_of_truncated_modes(
     return _with_best_weights(structure, _weighted_sums(sums, structure, found), responses)
 
 
-def _sums_over_all_modes(
+def sums_over_all_modes(
     found: Subspaces, rows: TaylorModel, patterns: TaylorModel, order: int
 ) -> ModalSums:
     """Return sums over all modes by solutions of M and K, as functions of the inputs of `patterns`.

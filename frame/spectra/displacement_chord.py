@@ -1,4 +1,4 @@
-"""Spectral displacement over an interval of periods: a straight line and a bound of its error."""
+"""Spectral displacement over an interval of periods, by a line in T², and largest acceleration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from alphacut.frame.spectra.target import TargetSpectrum
 
 
 class Chord(NamedTuple):
-    """A line `value` + `slope` (T − `midpoint`), and the bound `error` of the distance from it."""
+    """A line `value` + `slope` (T² − `midpoint`), and the bound `error` of the distance from it."""
 
     midpoint: float
     value: float
@@ -22,8 +22,9 @@ class Chord(NamedTuple):
 
 
 def displacement_chord(spectrum: TargetSpectrum, low: float, high: float) -> Chord:
-    """Return a line that is close to the spectral displacement Sa T²/(4 π²) over an interval.
+    """Return a line in T² that is close to the spectral displacement Sa T²/(4 π²).
 
+    It is exact where the acceleration is constant and where the displacement is.
     Between corners of the spectrum 4 π² Sd is a polynomial of at most third degree, or the minimum
     of the spectrum times T², whichever is larger. The extremes of its distance from the line are
     found from the roots of derivatives.
@@ -34,15 +35,13 @@ def displacement_chord(spectrum: TargetSpectrum, low: float, high: float) -> Cho
         high: Longest period, not below `low` and within the same range.
     """
     scale = 1 / (4 * np.pi**2)
-    corners = np.concatenate([spectrum.periods, spectrum.falls_from])
-    inside = np.unique(corners[(corners > low) & (corners < high)])
-    ends = np.concatenate([[low], inside, [high]])
+    ends = _pieces(spectrum, low, high)
     at_ends: Array = scale * spectrum(ends) * ends**2
-    midpoint = (low + high) / 2
+    midpoint = (low**2 + high**2) / 2
     slope = 0.0
     if high > low:
-        slope = float((at_ends[-1] - at_ends[0]) / (high - low))
-    line = Polynomial([0.0, slope])
+        slope = float((at_ends[-1] - at_ends[0]) / (high**2 - low**2))
+    line = Polynomial([0.0, 0.0, slope])
 
     smallest = np.inf
     largest = -np.inf
@@ -59,13 +58,38 @@ def displacement_chord(spectrum: TargetSpectrum, low: float, high: float) -> Cho
         largest = max(largest, max(most for _, most in ranges))
     # The line is moved to the middle of the distances. Their rounding is far below 1e-12 of the
     # largest term.
-    rounding = 1e-12 * (float(at_ends.max()) + abs(slope) * high)
+    rounding = 1e-12 * (float(at_ends.max()) + abs(slope) * high**2)
     return Chord(
         midpoint=midpoint,
         value=(smallest + largest) / 2 + slope * midpoint,
         slope=slope,
         error=(largest - smallest) / 2 + rounding,
     )
+
+
+def max_acceleration(spectrum: TargetSpectrum, low: float, high: float) -> float:
+    """Return an upper bound of the spectral acceleration over an interval of periods, in m/s².
+
+    It is attained where the spectrum does not rise and fall by its branches at once.
+
+    Args:
+        spectrum: The spectrum.
+        low: Shortest period, in s, within the range of the spectrum.
+        high: Longest period, not below `low` and within the same range.
+    """
+    ends = _pieces(spectrum, low, high)
+    linear = np.interp(ends, spectrum.periods, spectrum.accelerations)
+    largest = np.maximum(linear[:-1], linear[1:])
+    for corner in spectrum.falls_from:
+        largest = largest * corner / np.maximum(ends[:-1], corner)
+    return float(max(largest.max(), spectrum.minimum) * (1 + 1e-12))
+
+
+def _pieces(spectrum: TargetSpectrum, low: float, high: float) -> Array:
+    """Return both ends of an interval of periods and the corners of the spectrum between them."""
+    corners = np.concatenate([spectrum.periods, spectrum.falls_from])
+    inside = np.unique(corners[(corners > low) & (corners < high)])
+    return np.concatenate([[low], inside, [high]])
 
 
 def _range(curve: Polynomial, first: float, last: float) -> tuple[float, float]:

@@ -1,0 +1,187 @@
+"""Periods and participation of the lowest modes over a box, in groups that keep apart.
+
+A group is one mode, several that meet or come near one another in the box, or all modes that are
+not enclosed. Of a group the sums over its modes are known, however the modes turn in their common
+subspace (see `truncated_modes`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.base.arrays import Array, Ints
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
+from alphacut.frame.modes.intervening import BlockParticipation, Ends, source_patterns
+from alphacut.frame.modes.models import inverse_with_rounding
+from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.modes.truncated_modes import (
+    ModalSums,
+    modal_sums_of_block,
+    sums_over_all_modes,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ModeGroup:
+    """A group of modes as functions of the inputs over the unit box, for m outputs.
+
+    Args:
+        modes: Their numbers from below, from 0, rising, shape (p,).
+        is_whole: Whether `sums` are over these modes alone; else they are over more modes, and
+            bound what these add.
+        eigenvalue_block: Matrix that has the eigenvalues ω² of the modes, shape (p, p), in 1/s²; of
+            modes that are not enclosed a range of them, shape (1, 1).
+        ratios: Modal damping ratios that the structure states, shape (p,).
+        rayleigh: Rayleigh's factors a in 1/s and b in s, shape (2,).
+        sums: Sums over the modes of output and participation in the motion of the ground, with
+            the factors of the outputs.
+    """
+
+    modes: Ints
+    is_whole: bool
+    eigenvalue_block: TaylorModel
+    ratios: TaylorModel
+    rayleigh: TaylorModel
+    sums: ModalSums
+
+    @property
+    def models(self) -> list[TaylorModel]:
+        """All Taylor models of the group."""
+        return [self.eigenvalue_block, self.ratios, self.rayleigh, *self.sums]
+
+    def with_models(self, models: Sequence[TaylorModel]) -> ModeGroup:
+        """Return the group with other models in the order of `models`."""
+        block, ratios, rayleigh, *sums = models
+        return replace(
+            self,
+            eigenvalue_block=block,
+            ratios=ratios,
+            rayleigh=rayleigh,
+            sums=ModalSums(*sums),
+        )
+
+    @property
+    def eigenvalue_discs(self) -> tuple[Array, Array]:
+        """Lower and upper ends of Gershgorin's discs, shape (p,) each, in 1/s².
+
+        Together they contain all eigenvalues.
+        """
+        j = np.arange(len(self.eigenvalue_block.remainder))
+        low, high = self.eigenvalue_block[j, j].bounds()
+        off_diagonal = self.eigenvalue_block.magnitude() * (1.0 - np.eye(len(j)))
+        # The factor covers the rounding.
+        radius = off_diagonal.sum(axis=1) * (1 + 1e-12)
+        return low - radius, high + radius
+
+    @property
+    def has_gap(self) -> bool:
+        """Whether the modes are not enclosed, or some keep apart from the others in the box."""
+        low, high = self.eigenvalue_discs
+        order = low.argsort()
+        reached = np.maximum.accumulate(high[order])
+        return not self.is_whole or bool((low[order][1:] > reached[:-1]).any())
+
+    @property
+    def period_range(self) -> Ends:
+        """The shortest and the longest period in s that a mode of the group may have in the box.
+
+        Raises:
+            UnprovedError: An eigenvalue may be zero.
+        """
+        low, high = self.eigenvalue_discs
+        if low.min() <= 0:
+            raise UnprovedError("the structure may lose its stiffness", "take narrower inputs")
+        # The factors cover the rounding.
+        shortest = float(2 * np.pi / np.sqrt(high.max()) * (1 - 1e-15))
+        return shortest, float(2 * np.pi / np.sqrt(low.min()) * (1 + 1e-15))
+
+    @property
+    def ratio_range(self) -> Ends:
+        """Ends of the damping ratios a/(2 ω) + b ω/2 + ζ of the modes of the group in the box."""
+        low = np.maximum(self.rayleigh.bounds()[0], 0.0)
+        high = self.rayleigh.bounds()[1]
+        stated_low, stated_high = self.ratios.bounds()
+        shortest, longest = self.period_range
+        smallest = low[0] * shortest / (4 * np.pi) + low[1] * np.pi / longest
+        largest = high[0] * longest / (4 * np.pi) + high[1] * np.pi / shortest
+        return float(smallest + stated_low.min()), float(largest + stated_high.max())
+
+
+class ModeGroups(NamedTuple):
+    """The lowest modes of a structure over its box, in groups by rising first mode."""
+
+    groups: list[ModeGroup]
+    # input whose bisection separates a pair of modes that hinder an enclosure; None if none do
+    bisection_input: int | None
+
+
+def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
+    """Return the lowest modes of a structure over its box, in groups.
+
+    Args:
+        structure: The structure over the box.
+        count: Number of modes; all if it is None or larger than their number.
+
+    Raises:
+        UnprovedError: The structure may lose mass or stiffness in the box.
+    """
+    centre, used = centred_matrices(structure.mass, structure.stiffness)
+    count = min(count or centre.mode_count, centre.mode_count)
+    found = enclose_subspaces(centre, used, count)
+    to_centred = inverse_with_rounding(centre.basis, like=structure.initial_state)
+    patterns = source_patterns(structure, ["load"]) @ to_centred.T
+    rows = structure.initial_state.like(structure.output_rows) @ centre.basis
+
+    def group(modes: Ints, eigenvalue_block: TaylorModel, sums: ModalSums) -> ModeGroup:
+        """Return a group with its models made functions of all inputs."""
+        inputs = structure.initial_state.inputs
+        order = structure.initial_state.order
+        block, *sums_ = (
+            x.truncated(order).embedded(used, inputs) for x in (eigenvalue_block, *sums)
+        )
+        factors = structure.output_factors
+        squares = factors * factors
+        all_sums = ModalSums(*sums_)
+        return ModeGroup(
+            modes=modes,
+            is_whole=True,
+            eigenvalue_block=block,
+            ratios=structure.damping_ratios[modes],
+            rayleigh=structure.rayleigh,
+            sums=all_sums._replace(
+                products=all_sums.products[0] * factors,
+                products_over_eigenvalue=all_sums.products_over_eigenvalue[0] * factors,
+                output_squares=all_sums.output_squares * squares,
+                output_squares_over_eigenvalue=all_sums.output_squares_over_eigenvalue * squares,
+            ),
+        )
+
+    groups = []
+    remaining: Ints = np.arange(count)
+    enclosed = []
+    for block in found.blocks:
+        if block.modes[-1] >= count:
+            continue  # only some of its modes are wanted, whose own sums are not known
+        participation = BlockParticipation.from_block(block, rows, patterns, used)
+        enclosed.append(modal_sums_of_block(participation))
+        groups.append(group(block.modes, block.eigenvalue_block, enclosed[-1]))
+        remaining = np.setdiff1d(remaining, block.modes)
+    if len(remaining):
+        # What the enclosed groups leave of the sums over all modes.
+        order = max((x.products.order for x in enclosed), default=structure.initial_state.order)
+        others = sums_over_all_modes(found, rows, patterns, order)
+        for sums in enclosed:
+            others = ModalSums(*(x - y for x, y in zip(others, sums, strict=True)))
+        low = found.eigenvalue_low[remaining].min()
+        high = found.eigenvalue_high[remaining].max()
+        middle = centre.mass.like([[(low + high) / 2]])
+        rough = group(remaining, middle.widened([[(high - low) / 2 * (1 + 1e-12)]]), others)
+        groups.append(replace(rough, is_whole=False))
+    groups.sort(key=lambda found_group: int(found_group.modes[0]))
+    return ModeGroups(groups, found.bisection_input)
