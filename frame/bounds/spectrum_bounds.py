@@ -162,7 +162,8 @@ class Combination:
             periods: Its shortest and longest period, within the range of the spectrum, shape (2,).
         """
         sums = group.sums
-        shortest, longest = periods.tolist()
+        shortest = float(periods[0])
+        longest = float(periods[1])
         if not group.is_whole:
             # S(λ) is at most the largest acceleration over λ.
             acceleration = max_acceleration(self.spectrum, shortest, longest)
