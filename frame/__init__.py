@@ -13,6 +13,7 @@ from alphacut.base.first_use import at_first_use
 if TYPE_CHECKING:
     from alphacut.frame.analyses.angles import AnglePeaks, over_angles
     from alphacut.frame.analyses.decision import Decision, decide
+    from alphacut.frame.analyses.floor_spectrum import FloorSpectrum, floor_spectrum
     from alphacut.frame.analyses.fragility import Fragility, fragility
     from alphacut.frame.analyses.incremental import ScaledPeaks, incremental
     from alphacut.frame.analyses.limits import Limit
@@ -62,18 +63,18 @@ if TYPE_CHECKING:
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "AnglePeaks", "Auto", "Decision", "DualProof",
-    "Envelope", "Exact", "Force", "Fragility", "GraphFollower", "History", "Identified",
-    "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LearnedInputs", "Limit",
-    "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter", "Peak",
-    "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
+    "Envelope", "Exact", "FloorSpectrum", "Force", "Fragility", "GraphFollower", "History",
+    "Identified", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LearnedInputs",
+    "Limit", "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter",
+    "Peak", "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
     "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumResponse", "StoreyFrame",
     "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "affine_terms",
     "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
-    "eurocode8_spectrum", "fragility", "identify", "incremental", "learned_envelope",
-    "measured_mode", "over_angles", "over_records", "peaks", "pendulum", "probability",
-    "read_matrix", "read_modes", "read_record", "read_spectrum", "read_suite", "read_unknowns",
-    "require_envelope", "response_spectrum", "rotated_spectra", "scale_suite", "sensitivity",
-    "spectral_acceleration", "spectrum_response", "tolerances",
+    "eurocode8_spectrum", "floor_spectrum", "fragility", "identify", "incremental",
+    "learned_envelope", "measured_mode", "over_angles", "over_records", "peaks", "pendulum",
+    "probability", "read_matrix", "read_modes", "read_record", "read_spectrum", "read_suite",
+    "read_unknowns", "require_envelope", "response_spectrum", "rotated_spectra", "scale_suite",
+    "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -85,6 +86,7 @@ AT_FIRST_USE = {
     "DualProof": "methods.dual",
     "Envelope": "result",
     "Exact": "dynamics.integrators",
+    "FloorSpectrum": "analyses.floor_spectrum",
     "Force": "structures.loads",
     "Fragility": "analyses.fragility",
     "GraphFollower": "methods.graph_follower",
@@ -125,6 +127,7 @@ AT_FIRST_USE = {
     "decide": "analyses.decision",
     "envelope": "propagation",
     "eurocode8_spectrum": "spectra.eurocode8",
+    "floor_spectrum": "analyses.floor_spectrum",
     "fragility": "analyses.fragility",
     "identify": "identification.identify",
     "incremental": "analyses.incremental",

@@ -283,6 +283,13 @@ def over_box(
             displacements and velocities, or a matrix that is inverted may be singular in the box.
         ValueError: `names` and the ends differ in length.
     """
+    return classical_structure(system, parameters_over_box(system, names, low, high))
+
+
+def parameters_over_box(
+    system: LinearSystem, names: Sequence[str], low: Array, high: Array
+) -> dict[str, TaylorModel]:
+    """Return all parameters of a structure by name, as scalar Taylor models as of `over_box`."""
     midpoint = (low + high) / 2
     radius = (high - low) / 2
     active = np.flatnonzero(high > low)
@@ -293,7 +300,7 @@ def over_box(
     parameters = {name: TaylorModel.constant(x, len(active)) for name, x in values.items()}
     for column, i in enumerate(active):
         parameters[names[int(i)]] = variables[column]
-    return classical_structure(system, parameters)
+    return parameters
 
 
 def sources(system: LinearSystem, structure: ClassicalStructure) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
         [3.0, 1.69, 0.17]
     """
     ratio = checked_number("damping", damping, least=0, most=0.999)
-    shaped = _checked_periods(periods)
+    shaped = checked_periods(periods)
     oscillates = shaped != 0
     positive = shaped[oscillates]
     found = np.full(shaped.shape, ground.extremes[0])
@@ -60,7 +60,7 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
     return found
 
 
-def _checked_periods(periods: ArrayLike) -> Array:
+def checked_periods(periods: ArrayLike) -> Array:
     """Return periods as an array; raises RefusedError if one is neither 0 nor from 0.001 s on."""
     require_numbers("periods", np.asarray(periods))
     shaped = np.asarray(periods, float)
@@ -114,7 +114,7 @@ def rotated_spectra(
     """
     ratio = checked_number("damping", damping, least=0, most=0.999)
     first.require_times_of(second)
-    shaped = _checked_periods(periods)
+    shaped = checked_periods(periods)
     flat = shaped.ravel()
     directions = np.radians(np.arange(180))
     turns = np.column_stack([np.cos(directions), np.sin(directions)])

@@ -215,7 +215,8 @@ class MatrixStructure(LinearSystem):
         ground at once. Inertia forces of further components give accelerations relative to them. A
         factor would be one of what forces add to accelerations at once as well.
         """
-        for name, row in zip(self.observed, self._rows[:, 2 * self.size :], strict=True):
+        for k, name in enumerate(self.observed):
+            row = self._rows[k, 2 * self.size :]
             if not row.any():
                 continue
             key = f"observed: {name}"

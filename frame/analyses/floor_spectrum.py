@@ -1,0 +1,380 @@
+"""Floor spectra: peaks of oscillators that stand on the floors of an uncertain structure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import checked_number, require
+from alphacut.base.number_text import Table, engineering, number_text, rounded_ends
+from alphacut.base.progress_bar import Progress, nth_subprogress, progress_reporter
+from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.peaks import PEAK_ERROR, Peak, close_peaks
+from alphacut.frame.bounds.acceleration_gain import acceleration_gain
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.response.filtered_record import filtered_record
+from alphacut.frame.spectra.response_spectrum import checked_periods
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.model import Dynamics, StructureModel
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.result import Nature
+
+NODES = 20
+"""Time nodes in a period of the oscillator, at least (tuned: the bound between them falls with the
+square of their number, and the time rises with it)."""
+FIRST_PHASE = 0.25
+"""Phase in rad that the oscillator may turn in a step of its response (tuned)."""
+PHASE_WITHOUT_PROOF = 0.05
+"""The same where the error of these steps has no bound. A sine is 0.03 % from such lines."""
+STEP_ERROR = 1e-3
+"""Error of these steps that is aimed at, as a fraction of the spectrum (tuned)."""
+MAX_SAMPLES = 200_000
+"""Most samples of an oscillator's response; more would take minutes for a bound (tuned)."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FloorSpectrum(Answer):
+    """Floor spectra of a structure over the tolerances of its inputs.
+
+    Args:
+        damping: Damping ratio of the oscillators.
+        outputs: Names of the accelerations of the floors.
+        alpha: Levels, rising, shape (levels,).
+        periods: Periods of the oscillators in s, as they were given, shape (P,).
+        nominal: Floor spectra at the nominal inputs, in m/s², shape (outputs, P).
+        bound: Upper bounds of the spectra in each cut, in m/s², shape (levels, outputs, P);
+            infinite where none is known.
+        attained: Largest value in each cut that some inputs are known to have, the same shape;
+            -∞ where none is known.
+        natures: Guarantee of the bounds of each output and period, nested sequences.
+        unproved: Why some bounds are not guaranteed; empty if all are.
+    """
+
+    key = "floor_spectrum"
+    title = "Which accelerations do oscillators on the floors have?"
+    damping: float
+    outputs: tuple[str, ...]
+    alpha: Array
+    periods: Array
+    nominal: Array
+    bound: Array
+    attained: Array
+    natures: tuple[tuple[Nature, ...], ...]
+    unproved: str = ""
+
+    def table(self) -> Table:
+        """Return a table of texts with a row for each output and period, at the lowest level.
+
+        The columns are output and period, the bound, its guarantee, the attained value, and the
+        value at the nominal inputs.
+        """
+        rows = []
+        for k, name in enumerate(self.outputs):
+            for p, period in enumerate(map(float, self.periods)):
+                nature = self.natures[k][p]
+                _, bound = rounded_ends(0.0, float(self.bound[0, k, p]), nature)
+                attained = float(self.attained[0, k, p])
+                row = {
+                    "floor": name,
+                    f"Sa at α = {self.alpha[0]:g}": "not bounded",
+                    "nature": self.nature_text(nature),
+                    "T": engineering(period, "s"),
+                    "reached": "not known",
+                    "nominal": engineering(float(self.nominal[k, p]), "m/s^2"),
+                }
+                if np.isfinite(bound):
+                    row[f"Sa at α = {self.alpha[0]:g}"] = f"≤ {number_text(bound)} m/s^2"
+                if np.isfinite(attained):
+                    row["reached"] = engineering(attained, "m/s^2")
+                rows.append(row)
+        return table_of(rows)
+
+    def records(self) -> list[Record]:
+        """Return a row for each output, level and period, in s and m/s²; None where unknown."""
+        rows: list[Record] = []
+        for k, name in enumerate(self.outputs):
+            for j, level in enumerate(map(float, self.alpha)):
+                for p, period in enumerate(map(float, self.periods)):
+                    row: Record = {
+                        "output": name,
+                        "alpha": level,
+                        "period [s]": period,
+                        "nominal [m/s^2]": float(self.nominal[k, p]),
+                        "attained [m/s^2]": known(self.attained[j, k, p]),
+                        "bound [m/s^2]": known(self.bound[j, k, p]),
+                        "nature": str(self.natures[k][p]),
+                    }
+                    rows.append(row)
+        return rows
+
+    def words(self) -> str:
+        """Return sentences on the oscillators, the curves, and what is not proved."""
+        unproved = f" Not all bounds are guaranteed: {self.unproved}." if self.unproved else ""
+        return (
+            f"Largest |ω² w| of an oscillator with the damping ratio {self.damping:.3g} and the"
+            " relative displacement w that stands on the floor and is too light to move it, within"
+            " the duration. Some structure of the cut has the attained value, and none has more"
+            f" than a guaranteed bound.{unproved}"
+        )
+
+
+def floor_spectrum(
+    structure: StructureModel,
+    inputs: Mapping[str, FuzzyNumber | float],
+    outputs: str | Sequence[str],
+    periods: ArrayLike,
+    damping: float = 0.05,
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    error: float = PEAK_ERROR,
+    progress: Progress | bool | None = None,
+) -> FloorSpectrum:
+    """Return upper bounds of the floor spectra of a structure over its uncertain inputs.
+
+    An oscillator of the period T = 2π/ω and the damping ratio ζ stands on a floor that moves with
+    the absolute acceleration a. Its displacement w relative to the floor follows from w'' +
+    2 ζ ω w' + ω² w = -a, from rest, and the floor spectrum is the largest |ω² w| up to the
+    duration, between time nodes as well. The oscillator does not act on the structure. It may have
+    the frequency of a mode.
+
+    Args:
+        structure: A linear structure at rest, moved by one accelerogram of the ground.
+        inputs: Fuzzy parameters by name, in SI units; a number is a crisp one.
+        outputs: Names of absolute accelerations, one or more: "a3" of a storey frame.
+        periods: Periods in s, 0 or from 0.001 s on. At 0 the spectrum is the floor's largest
+            acceleration.
+        damping: Damping ratio of the oscillators, from 0 to 0.999.
+        duration: Length of the simulation, in s. An oscillator may swing higher after the record.
+        step: Largest distance of the time nodes, in s. It is divided for short periods.
+        alpha: Levels, rising within [0, 1].
+        error: Error that is aimed at, and need not be reached, as a fraction of each value.
+        progress: Called with the completed fraction; None shows a bar on a terminal, False shows
+            nothing.
+
+    Raises:
+        RefusedError: The structure is not linear, not at rest, under forces, or not moved by one
+            plain record; an output is no absolute acceleration; or an argument is not as said.
+        FailedError: A step is too long, or no bounds are found.
+
+    Example:
+        >>> from alphacut.frame import Accelerogram, StoreyFrame, floor_spectrum
+        >>> from alphacut.fuzzy import Interval
+        >>> pulse = Accelerogram(0.02, [0.0, 3.0, -3.0, 0.0])
+        >>> frame = StoreyFrame([2e4], stiffness=[8e6], damping_ratio=0.05, ground=pulse)
+        >>> inputs = {"k1": Interval(7.8e6, 8.2e6)}
+        >>> found = floor_spectrum(frame, inputs, "a1", [0.1, 0.3], duration=1.0, step=0.01)
+        >>> found.natures[0][0], bool((found.attained <= found.bound).all())
+        (<Nature.GUARANTEED: 'guaranteed'>, True)
+    """
+    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    require(len(names) > 0, "outputs", None, "one acceleration or more")
+    shaped = checked_periods(periods).ravel()
+    require(len(shaped) > 0, "periods", None, "one period or more")
+    ratio = checked_number("damping", damping, least=0, most=0.999)
+    cuts = boxes(inputs, alpha)
+    system = _observed(structure, names, cuts)
+    floor = _Floor.of(system, cuts, ratio, duration=duration, step=step, error=error)
+    columns: list[_Column] = []
+    with progress_reporter(progress) as report:
+        for p, period in enumerate(map(float, shaped)):
+            columns.append(floor.column(period, nth_subprogress(report, p, len(shaped))))
+    natures = [[column.natures[k] for column in columns] for k in range(len(names))]
+    is_proved = all(nature is Nature.GUARANTEED for row in natures for nature in row)
+    reason = floor.unproved or "branch and bound and the dual bound find none there"
+    return FloorSpectrum(
+        encloses=columns[0].encloses,
+        damping=ratio,
+        outputs=system.outputs,
+        alpha=cuts.alpha,
+        periods=shaped,
+        nominal=np.stack([column.nominal for column in columns], axis=-1),
+        bound=np.stack([column.bound for column in columns], axis=-1),
+        attained=np.stack([column.attained for column in columns], axis=-1),
+        natures=tuple(map(tuple, natures)),
+        unproved="" if is_proved else reason,
+    )
+
+
+def _observed(structure: StructureModel, names: Sequence[str], cuts: Boxes) -> LinearSystem:
+    """Return the structure with some absolute accelerations as its outputs.
+
+    Raises:
+        RefusedError: It is not linear, not at rest, under forces, or not moved by a record from
+            t = 0 on; or an output is no absolute acceleration.
+    """
+    allowed = "a linear structure, whose columns do not yield"
+    is_linear = structure.dynamics is Dynamics.LINEAR and isinstance(structure, LinearSystem)
+    require(is_linear, "structure", type(structure).__name__, allowed)
+    assert isinstance(structure, LinearSystem)
+    ground = structure.ground
+    require(ground is not None, "ground", None, "an accelerogram, which moves the structure")
+    assert ground is not None
+    is_plain = not (ground.start or ground.frequency or ground.is_held)
+    allowed = "samples from t = 0 on alone"
+    require(is_plain, "ground", "a record that starts late, is held or has a sine", allowed)
+    allowed = "one accelerogram of the ground alone"
+    require(not structure.loads, "loads", f"{len(structure.loads)} forces", allowed)
+    system = structure.with_outputs(names)
+    values = dict(system.parameters) | dict(zip(cuts.names, cuts.probes.T, strict=True))
+    count = len(cuts.probes)
+    assembly = system.assembly(
+        {name: Jet.constant(np.full(count, value), 0) for name, value in values.items()}
+    )
+    is_at_rest = not (assembly.q0.value.any() or assembly.v0.value.any())
+    require(is_at_rest, "structure", "displaced or in motion at the start", "one at rest")
+    for k, name in enumerate(system.outputs):
+        # Rows are an array unless the overturning moment is an output, which is no acceleration.
+        row = assembly.rows[k] if isinstance(assembly.rows, np.ndarray) else np.ones(1)
+        is_acceleration = bool(assembly.accelerated[k].any() and not row.any())
+        require(is_acceleration, "output", name, "absolute accelerations, as a3 of a frame")
+    return system
+
+
+class _Column(NamedTuple):
+    """Floor spectra at one period, of m outputs; levels as of `FloorSpectrum`.
+
+    Args:
+        nominal: Values at the nominal inputs, shape (m,), in m/s².
+        bound: Upper bounds, shape (levels, m).
+        attained: Attained values, shape (levels, m).
+        natures: Guarantees of the bounds of each output.
+        encloses: Name of the set that the cuts enclose, or empty.
+    """
+
+    nominal: Array
+    bound: Array
+    attained: Array
+    natures: tuple[Nature, ...]
+    encloses: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Floor:
+    """What the spectra of all periods have in common.
+
+    Args:
+        system: The structure, whose outputs are absolute accelerations.
+        cuts: Boxes of its inputs.
+        damping: Damping ratio of the oscillators.
+        duration: Length of the simulation, in s.
+        step: Largest distance of the time nodes, in s.
+        error: Error that is aimed at, as a fraction of each value.
+        gain: Bounds in 1/s of the accelerations for a unit of the integral of that of the ground,
+            shape (outputs,); None where no bound is known, for the reason `unproved`.
+    """
+
+    system: LinearSystem
+    cuts: Boxes
+    damping: float
+    duration: float
+    step: float
+    error: float
+    gain: Array | None
+    unproved: str
+
+    @classmethod
+    def of(
+        cls,
+        system: LinearSystem,
+        cuts: Boxes,
+        damping: float,
+        *,
+        duration: float,
+        step: float,
+        error: float,
+    ) -> _Floor:
+        """Return what the spectra have in common; see the class."""
+        gain = None
+        unproved = ""
+        try:
+            gain = acceleration_gain(system, cuts, duration)
+        except UnprovedError as reason:
+            unproved = str(reason)
+        return cls(system, cuts, damping, duration, step, error, gain, unproved)
+
+    def column(self, period: float, progress: Progress) -> _Column:
+        """Return the floor spectra at a period in s, which may be 0."""
+        step = self.step
+        if period:
+            step /= ceil(NODES * step / period)
+        system, nominal, error = self._filtered(period, step)
+        peaks = close_peaks(
+            system,
+            self.cuts.inputs,
+            system.outputs,
+            duration=self.duration,
+            step=step,
+            alpha=self.cuts.alpha.tolist(),
+            error=self.error,
+            progress=progress,
+        )
+        found = [peaks[name] for name in system.outputs]
+        natures = [peak.nature for peak in found]
+        if error is None:
+            natures = [Nature.weakest((nature, Nature.ESTIMATED)) for nature in natures]
+            error = np.zeros(len(found))
+        bound = np.stack([_upper(peak) for peak in found], axis=-1)
+        attained = np.stack([peak.reached for peak in found], axis=-1)
+        encloses = found[0].encloses
+        if not encloses:  # the nominal inputs belong to each cut
+            attained = np.maximum(np.maximum(attained, nominal) - error, 0.0)
+        return _Column(nominal, bound + error, attained, tuple(natures), encloses)
+
+    def _filtered(self, period: float, step: float) -> tuple[LinearSystem, Array, Array | None]:
+        """Return the structure under the response of an oscillator on the ground.
+
+        Its outputs are the accelerations of oscillators on the floors, see `filtered_record`.
+
+        Args:
+            period: Period of the oscillator; at 0 it follows the ground.
+            step: Distance of the time nodes, in s.
+
+        Returns:
+            The structure; the peaks of its outputs at the nominal inputs, shape (outputs,); and the
+            bounds of their errors by the steps of the response, the same shape, None if not known.
+        """
+        ground = self.system.ground
+        assert ground is not None
+        if not period:
+            return self.system, self._nominal(self.system, step), np.zeros(len(self.system.outputs))
+        phase = PHASE_WITHOUT_PROOF if self.gain is None else FIRST_PHASE
+        substeps = ceil(2 * np.pi / period * ground.step / phase)
+        while True:
+            filtered = filtered_record(
+                ground, period, self.damping, substeps=substeps, duration=self.duration
+            )
+            system = self.system.moved_by(filtered.record)
+            nominal = self._nominal(system, step)
+            if self.gain is None:
+                return system, nominal, None
+            error = self.gain * filtered.integral_error
+            # The error falls with the cube of the step.
+            excess = float((error / np.maximum(nominal, 1e-300)).max()) / STEP_ERROR
+            finer = substeps * max(2, ceil(excess ** (1 / 3)))
+            if excess <= 1 or self.duration * finer > MAX_SAMPLES * ground.step:
+                return system, nominal, error
+            substeps = finer
+
+    def _nominal(self, system: LinearSystem, step: float) -> Array:
+        """Return the peaks of the outputs at the nominal inputs at a third of the step, (m,)."""
+        flow = LinearFlow(system, self.cuts.names, self.duration, step / 3, Exact())
+        return np.asarray(np.abs(flow.values(self.cuts.nominal[np.newaxis])[0]).max(axis=0))
+
+
+def _upper(peak: Peak) -> Array:
+    """Return the upper bound of a peak with its error, shape (levels,); infinite without one."""
+    if peak.nature is Nature.ATTAINED:
+        return np.full_like(peak.upper, np.inf)
+    return np.asarray(peak.upper + peak.error)

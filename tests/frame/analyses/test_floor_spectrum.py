@@ -1,0 +1,169 @@
+"""Floor spectra, against exact integration of structures with an oscillator on a floor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, expm
+
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    MatrixStructure,
+    StoreyFrame,
+    floor_spectrum,
+    pendulum,
+    response_spectrum,
+)
+from alphacut.fuzzy import Interval, RefusedError, Triangular
+from tests.frame.motions import random_points
+
+MASSES = np.array([3.0, 2.0])
+MOTION = {"duration": 2.0, "step": 0.02, "progress": False}
+
+
+def record(rng, count=60):
+    return Accelerogram(0.02, rng.normal(size=count))
+
+
+def frame_of(ground, **changes):
+    springs = {"stiffness": (900.0, 400.0), "damping_ratio": 0.05}
+    return StoreyFrame(tuple(MASSES), **springs, outputs=("a1", "a2"), ground=ground, **changes)
+
+
+def cascade_peak(k, ratio, ground, floor, period, damping):
+    """Peak |Ω² w| of the oscillator, as a part of one system of first order, at 10 times a step."""
+    M, K = np.diag(MASSES), np.array([[k[0] + k[1], -k[1]], [-k[1], k[1]]])
+    squares, shapes = eigh(K, M)
+    C = M @ shapes @ np.diag(2 * ratio * np.sqrt(squares)) @ shapes.T @ M
+    omega, h = 2 * np.pi / period, ground.step / 10
+    A = np.zeros((8, 8))  # of q, q', w, w', the ground's acceleration and its slope
+    A[:2, 2:4] = np.eye(2)
+    A[2:4, :4] = -np.linalg.solve(M, np.hstack([K, C]))
+    A[2:4, 6] = -1.0
+    A[4, 5] = A[6, 7] = 1.0
+    A[5, 4:6] = -(omega**2), -2 * damping * omega
+    A[5, :4] = -A[2 + floor, :4]  # the absolute acceleration of the floor
+    advance = expm(A * h)
+    time = np.arange(round(MOTION["duration"] / h) + 1) * h
+    state, peak = np.zeros(8), 0.0
+    for begin, end in zip(ground.values(time), ground.before(time)[1:], strict=False):
+        state[6:] = begin, (end - begin) / h
+        state = advance @ state
+        peak = max(peak, omega**2 * abs(state[4]))
+    return peak
+
+
+def mode_period(frame):
+    squares = eigh([[1300.0, -400.0], [-400.0, 400.0]], np.diag(MASSES), eigvals_only=True)
+    return 2 * np.pi / np.sqrt(squares[0])
+
+
+@pytest.mark.parametrize("which", ["of a mode", "long"])
+def test_bounds_hold_also_where_the_oscillator_is_tuned_to_a_mode(rng, which):
+    """With the damping of the mode, the two have one frequency and one shape (a Jordan block)."""
+    ground = record(rng)
+    frame = frame_of(ground)
+    period = {"of a mode": mode_period(frame), "long": 1.3}[which]
+    inputs = {"k1": Interval(870.0, 930.0), "zeta": Triangular(0.04, 0.05, 0.06)}
+    found = floor_spectrum(frame, inputs, "a2", period, 0.05, alpha=[0, 1], **MOTION)
+    assert found.natures == (("guaranteed",),)
+    peaks = []
+    for k1, ratio in random_points(inputs, 60, rng):
+        peaks.append(cascade_peak((k1, 400.0), ratio, ground, 1, period, 0.05))
+    nominal = cascade_peak((900.0, 400.0), 0.05, ground, 1, period, 0.05)
+    assert max(peaks) <= found.bound[0, 0, 0] < 1.1 * max(peaks)
+    assert found.nominal[0, 0] == pytest.approx(nominal, rel=1e-2)
+    assert nominal <= found.bound[1, 0, 0] <= found.bound[0, 0, 0]
+    assert (found.attained <= found.bound).all()
+    # Some structure of the interval of the other level has the attained value.
+    assert found.attained[0, 0, 0] > 0.95 * max(peaks)
+
+
+def test_the_nominal_curve_is_the_response_spectrum_of_the_floor(rng):
+    """By the exact history of the floor's acceleration, as a record of straight lines."""
+    frame = frame_of(record(rng))
+    periods = np.array([0.0, 0.09, 0.3, 1.0])
+    found = floor_spectrum(frame, {"m1": 3.0}, ["a1", "a2"], periods, 0.03, alpha=[1], **MOTION)
+    step = 5e-4
+    history = LinearFlow(frame, (), MOTION["duration"], step, Exact()).values(np.zeros((1, 0)))
+    for k in range(2):
+        floor = Accelerogram(step, history[0, :, k])
+        # In contrast to the spectrum, the oscillator is followed no longer than the floor.
+        expected = response_spectrum(floor, periods, 0.03)
+        assert found.nominal[k] == pytest.approx(expected, rel=1e-2)
+        assert (found.bound[0, k] >= expected * (1 - 1e-3)).all()
+        assert found.bound[0, k] == pytest.approx(expected, rel=4e-2)
+
+
+def test_matrices_and_coupled_damping_have_floor_spectra(rng):
+    """Dashpots couple the modes, so that the error of the steps is bounded by energy."""
+    ground = record(rng)
+    matrices = MatrixStructure(
+        {"k1": 900.0},
+        mass=[(1.0, np.diag(MASSES))],
+        stiffness=[("k1", np.diag([1.0, 0])), (400.0, np.array([[1.0, -1], [-1, 1]]))],
+        observed={"top": np.eye(6)[5]},
+        damping=[(1.0, np.array([[4.0, -1.0], [-1.0, 1.0]]))],
+        ground=ground,
+    )
+    frame = StoreyFrame(
+        tuple(MASSES), stiffness=(900.0, 400.0), dampers=(3.0, 1.0), damper_placement="storey",
+        outputs=("a2",), ground=ground,
+    )  # fmt: skip
+    inputs = {"k1": Interval(880.0, 920.0)}
+    a = floor_spectrum(matrices, inputs, "top", [0.3], alpha=[0], **MOTION)
+    b = floor_spectrum(frame, inputs, "a2", [0.3], alpha=[0], **MOTION)
+    assert a.natures == b.natures == (("guaranteed",),)
+    assert a.bound == pytest.approx(b.bound, rel=1e-2)
+    assert a.nominal == pytest.approx(b.nominal, rel=1e-6)
+
+
+def test_without_a_bound_of_the_steps_nothing_is_guaranteed(rng):
+    dashpots = {"dampers": (3.0, 1.0), "damper_placement": "storey"}
+    frame = frame_of(record(rng), **dashpots)
+    found = floor_spectrum(frame, {"k1": Interval(880.0, 920.0)}, "a2", [0.3], alpha=[0], **MOTION)
+    assert found.natures == (("estimated",),)
+    assert "Not all bounds are guaranteed: dashpots couple" in found.words()
+
+
+def test_a_table_and_rows_tell_all(rng):
+    inputs = {"k1": Interval(880.0, 920.0)}
+    found = floor_spectrum(frame_of(record(rng)), inputs, "a2", [0.0, 0.3], alpha=[0, 1], **MOTION)
+    assert found.table().head[:3] == ("floor", "Sa at α = 0", "nature")
+    rows = found.records()
+    assert [row["period [s]"] for row in rows] == [0.0, 0.3] * 2
+    assert rows[1]["bound [m/s^2]"] == found.bound[0, 0, 1]
+    assert "≤" in str(found)
+
+
+def test_what_has_no_floor_spectrum_is_one_line(rng):
+    ground = record(rng)
+    frame = frame_of(ground)
+    force = Force(1, 2.0, History.constant())
+
+    def refuses(structure, message, outputs="a2", periods=(0.3,), **changes):
+        with pytest.raises(RefusedError, match=message):
+            floor_spectrum(
+                structure,
+                changes.pop("inputs", {"k1": 900.0}),
+                outputs,
+                periods,
+                **MOTION,
+                **changes,
+            )
+
+    refuses(pendulum(), "structure is LagrangianSystem; allowed: a linear structure")
+    refuses(frame_of(None), "ground is missing; allowed: an accelerogram")
+    refuses(frame_of(replace(ground, start=0.5)), "ground is a record that starts late")
+    refuses(frame_of(ground, loads=(force,)), "loads is 1 forces; allowed: one accelerogram")
+    refuses(frame_of(ground, q0=(0.1, 0.0)), "structure is displaced or in motion at the start")
+    refuses(frame, "displaced or in motion", inputs={"q1_0": Interval(-0.1, 0.1)})
+    refuses(frame, "output is q2; allowed: absolute accelerations, as a3", outputs="q2")
+    refuses(frame, "outputs is missing", outputs=())
+    refuses(frame, "periods is missing", periods=())
+    refuses(frame, "periods is 0.0001 s", periods=[1e-4])
+    refuses(frame, "damping is 1.5", damping=1.5)
