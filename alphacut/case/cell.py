@@ -122,11 +122,11 @@ class CellContent(Section, defer_build=True):
     def _require_mesh(self) -> None:
         """Refuse keys of [mesh], [radius] and [modulus] that do not fit the source of the mesh.
 
-        Without `mesh.file` the program makes the mesh: then [cell.phases] and `mesh.refine` have no
-        meaning, and [radius] must be a whole radius map, with the keys a1 … a4. With `mesh.file`
-        the geometry comes from the file: [cell.phases] must give a phase for each physical group,
-        element sizes and radius maps are refused, [radius] may only have the distribution of θ, and
-        `modulus.tolerance` needs `mesh.refine`.
+        Without `mesh.file` the program makes the mesh: then [cell.phases], `mesh.refine` and
+        `mesh.bounds` have no meaning, and [radius] must be a whole radius map, with the keys a1 …
+        a4. With `mesh.file` the geometry comes from the file: [cell.phases] must give a phase for
+        each physical group, element sizes and radius maps are refused, [radius] may only have the
+        distribution of θ, and `modulus.tolerance` needs `mesh.refine`.
 
         Raises:
             RefusedError: With the key that does not fit.
@@ -135,6 +135,7 @@ class CellContent(Section, defer_build=True):
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.mesh_cell is None, "mesh.file", None, allowed)
             require(not self.mesh.refine, "mesh.refine", True, "true beside mesh.file")
+            require(not self.mesh.bounds, "mesh.bounds", True, "true beside mesh.file")
             # `radius_map` is [radius] if it has a1 … a4, else None.
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.described_fields()["a1"].description

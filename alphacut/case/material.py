@@ -124,10 +124,17 @@ class PhaseSection(Section):
     @property
     def nominal(self) -> Phase | VoigtPhase:
         """The material at its nominal Young's modulus, if it is isotropic."""
+        return self.extremes(None)[0]
+
+    def extremes(self, level: float | None) -> tuple[Phase | VoigtPhase, Phase | VoigtPhase]:
+        """Return the softest and the stiffest material of an α-cut, or the nominal one twice."""
         if isinstance(self.modulus, VoigtPhase):
-            return self.modulus
+            return self.modulus, self.modulus
         assert self.poisson is not None
-        return Phase(self.modulus.nominal, self.poisson)
+        low = high = self.modulus.nominal
+        if level is not None:
+            low, high = self.modulus.cut(level)
+        return Phase(low, self.poisson), Phase(high, self.poisson)
 
 
 class MeshedCell(Section):
@@ -151,6 +158,14 @@ class MeshedCell(Section):
     def nominal_phases(self) -> dict[str, Phase | VoigtPhase]:
         """Phases by name at the nominal values."""
         return {name: phase.nominal for name, phase in self.phases.items()}
+
+    def extreme_phases(
+        self, level: float | None
+    ) -> tuple[dict[str, Phase | VoigtPhase], dict[str, Phase | VoigtPhase]]:
+        """Return the softest and the stiffest phases of an α-cut by name, or the nominal twice."""
+        extremes = {name: phase.extremes(level) for name, phase in self.phases.items()}
+        soft = {name: ends[0] for name, ends in extremes.items()}
+        return soft, {name: ends[1] for name, ends in extremes.items()}
 
     @property
     def loss_names(self) -> tuple[str, ...]:
@@ -474,6 +489,8 @@ class Mesh(Section):
     layers; its physical groups are the phases of [cell.phases]"""
     refine: bool = False
     """whether to refine the mesh of a file once, for a declared error"""
+    bounds: bool = False
+    """whether to prove bounds of the constants of a mesh from a file, for its geometry"""
     layers: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 12
     """element layers in θ, of method prism"""
     size: Annotated[float, Quantity(minimum=0.005, below=1)] = 0.15

@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
 from alphacut.base.kept_files import whole_file
-from alphacut.base.number_text import text_table
+from alphacut.base.number_text import range_text, text_table
 from alphacut.case.cell import CellCase
 from alphacut.case.material import MeshedCell
 from alphacut.case.parse import parse
 from alphacut.case.structures import with_structures
 from alphacut.commands.options import require_petsc, write_answer
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, ranks
 from alphacut.io.provenance import versions
 from alphacut.rve.cell.cell import STRAIN
@@ -27,6 +28,7 @@ from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.rve.series.fibre_constants import fibre_constants
 from alphacut.rve.spheres.result import HomogenisedSpheres, hill_average
 from alphacut.stages.cell import (
+    BOTH_BOUNDS,
     GPA,
     UPPER_BOUND,
     CellProblem,
@@ -36,6 +38,7 @@ from alphacut.stages.cell import (
     require_bounds,
     require_tolerance,
 )
+from alphacut.stages.mesh_bounds import bounds_of_mesh, guaranteed_constants
 from alphacut.stochastic import ThetaDistribution
 
 
@@ -70,6 +73,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         require_bounds((young, young), references, problem.cell.particles)
     document = document_of(result)
     document["references"] = references
+    document["bounds"] = None
+    if problem.mesh.bounds:
+        document["bounds"] = bounds_document(problem)
     if options.export:
         document["export"] = export(problem, Path(options.export))
     text = summary(document, result.convention)
@@ -112,6 +118,30 @@ def export(problem: CellProblem, path: Path) -> Document:
     with whole_file(path) as partial:
         nodes = fields.write(partial)
     return {"file": str(path), "nodes": nodes}
+
+
+def bounds_document(problem: CellProblem) -> Document:
+    """Return guaranteed bounds of a mesh from a file at the nominal values.
+
+    Args:
+        problem: The cell.
+
+    Returns:
+        "constants" with the lower and upper end of each by its key, such as E_GPa and nu; and
+        "stiffness_GPa", the lower and the upper bound as quadratic forms, shape (2, 3, 3).
+
+    Raises:
+        FailedError: The mesh is too coarse for a lower bound.
+    """
+    [bounds] = bounds_of_mesh(problem, [None], parallel=ranks() > 1)
+    constants = {}
+    for name, cuts in guaranteed_constants(problem, [bounds]).items():
+        key, unit = key_and_unit(name)
+        if name == "E":
+            key = "E_GPa"
+        constants[key] = cuts[0] / unit
+    stiffness = np.array([bounds.lower, bounds.upper]) / GPA
+    return {"constants": constants, "stiffness_GPa": stiffness}
 
 
 def document_of(result: HomogenisedStiffness) -> Document:
@@ -240,11 +270,18 @@ def summary(document: Document, convention: str) -> str:
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
         lower, upper = bounds
         rows.append((f"{isotropic_label(convention)}, GPa", f"{lower:.4f} … {upper:.4f}", ""))
+    bounds_of_file = document.get("bounds")
+    if bounds_of_file:
+        for key, (lower, upper) in bounds_of_file["constants"].items():
+            value = range_text(lower, upper, Nature.GUARANTEED, 6)
+            rows.append((f"{constant_label(key)}, bounds", value, ""))
     text = text_table((convention, "value", "± error"), rows)
     text += f"{document['method']}, {document['unknowns']} unknowns"
     if document["iterations"]:
         text += f", iterations {', '.join(map(str, document['iterations']))}"
-    if document["declared_error"] is None:
+    if bounds_of_file:
+        text += f"\n{BOTH_BOUNDS}"
+    elif document["declared_error"] is None:
         text += f"\n{UPPER_BOUND}"
     return f"{text}\n"
 

@@ -29,11 +29,12 @@ from alphacut.report.results import (
     fractions_text,
     guaranteed_of,
     material,
+    mesh_words,
     run_text,
     width_text,
 )
 from alphacut.rve.result.engineering_constants import PLANE_STRAIN
-from alphacut.stages.cell import UPPER_BOUND, isotropic_label
+from alphacut.stages.cell import isotropic_label
 from alphacut.stages.identify import identify_inputs
 from alphacut.stages.image import ImageResult
 from alphacut.stages.microstructure import fragment
@@ -232,7 +233,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
             why = "the other definition is for one particle of two isotropic phases"
             lines.append(f"Plane strain alone: {why}")
         if cell.particles == "mesh":
-            lines.append(UPPER_BOUND)
+            lines.append(mesh_words(cell.nature))
         lines.append(f"{cost}, {cell.method}")
         if cell.solver:
             lines.append(cell.solver)

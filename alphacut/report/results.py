@@ -25,7 +25,7 @@ from alphacut.frame import Peak, SuitePeaks, Tolerances
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
-from alphacut.stages.cell import UPPER_BOUND, constant_label
+from alphacut.stages.cell import BOTH_BOUNDS, UPPER_BOUND, constant_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
@@ -199,9 +199,11 @@ def _constants(part: ModulusResult | ImageResult, *, every_constant: bool) -> It
         nature_of_constants = Nature.ATTAINED
         error = sum(part.error.values()) * float(young.upper.max())
         error_words = error_text(error, part.nature)
-        # A mesh from a file is solved once; the error would need a finer mesh.
         if part.particles == "mesh":
-            error_words = "not declared"
+            nature_of_constants = part.nature  # guaranteed with `mesh.bounds`, by energies as well
+            # A mesh from a file is solved once; the error would need a finer mesh.
+            if part.nature is not Nature.GUARANTEED:
+                error_words = "not declared"
         constants["ν"] = part.nu_cuts
         # E belongs to an isotropic solid with the moduli of the plane. E_T is the modulus across
         # fibres whose ends are free, which a designer needs beside it.
@@ -263,6 +265,11 @@ def without_empty_columns(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     filled_rows = [tuple(row[k] for k in columns) for row in rows]
     return Table(tuple(head[k] for k in columns), filled_rows)
+
+
+def mesh_words(nature: Nature) -> str:
+    """Return a sentence, without its full stop, on the bounds of a mesh from a file."""
+    return BOTH_BOUNDS if nature is Nature.GUARANTEED else UPPER_BOUND
 
 
 def guaranteed_of(image: ImageResult) -> str:
@@ -494,7 +501,7 @@ def natures(parts: Parts) -> Iterator[str]:
     """
     suite = parts.records
     if parts.modulus is not None and parts.modulus.particles == "mesh":
-        yield UPPER_BOUND
+        yield mesh_words(parts.modulus.nature)
     peaks_of_studies = [study.peak for study in parts.envelopes.values()]
     over = "over time"
     if suite is not None:

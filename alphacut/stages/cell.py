@@ -43,6 +43,8 @@ class References(TypedDict, total=False):
 
 UPPER_BOUND = "C is an upper bound of this mesh: that of a finer one is smaller"
 """Of a mesh of one's own by Galerkin's method, whose fields have more energy than the true ones."""
+BOTH_BOUNDS = "The bounds are guaranteed for this mesh's geometry"
+"""Of a mesh of one's own with `mesh.bounds`."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
 

@@ -32,6 +32,7 @@ from alphacut.rve.fuzzy_cell import (
 )
 from alphacut.rve.result.engineering_constants import NAMES
 from alphacut.stages.cell import GPA, CellProblem, References, key_and_unit, require_levels
+from alphacut.stages.mesh_bounds import with_guaranteed_cuts
 from alphacut.stages.store import Stage, StageContext, StageResult
 
 if TYPE_CHECKING:
@@ -238,6 +239,7 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
 
     Raises:
         CampaignError: Samples failed. The others are kept if there is a store.
+        FailedError: The mesh is too coarse for a lower bound, of a case with `mesh.bounds`.
     """
     stiffness = solved(
         problem,
@@ -246,6 +248,8 @@ def compute(problem: CellProblem, context: StageContext) -> StageResult[ModulusR
         store=context.samples,
         identity=identity(problem) if context.samples else None,
     )
+    if problem.mesh.bounds:
+        stiffness = with_guaranteed_cuts(problem, stiffness)
     return StageResult(modulus_result(problem, stiffness), stiffness.to_dataset())
 
 

@@ -80,6 +80,9 @@ def mesh_bounds(
         options: PETSc's options, the ones of the default solver included. A looser tolerance makes
             wider bounds.
 
+    Returns:
+        The bounds; the lower one is 0 where the mesh is so coarse that it is not positive definite.
+
     Raises:
         MeshError: Middles of vertical edges do not lie half-way between the levels.
         FoldedMeshError: A prism cannot be shown to be unfolded.
@@ -100,7 +103,10 @@ def mesh_bounds(
     rounding = ROUNDING**2 * np.trace(upper.upper)
     s = np.sqrt((np.trace(upper.asymmetry) + rounding) / (np.trace(upper.residual) + rounding))
     distance = (1 + s) * upper.residual + (1 + 1 / s) * upper.asymmetry
-    return StiffnessBounds(lower.lower * (1 - ROUNDING) - distance, upper.upper * (1 + ROUNDING))
+    lowest = lower.lower * (1 - ROUNDING) - distance
+    if np.linalg.eigvalsh(lowest)[0] <= 0:
+        lowest = np.zeros_like(lowest)
+    return StiffnessBounds(lowest, upper.upper * (1 + ROUNDING))
 
 
 def _mean_energies(

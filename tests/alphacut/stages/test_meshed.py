@@ -9,6 +9,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut import main
 from alphacut.rve import MeshModel, Phase
+from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.stochastic import TruncatedNormal
 from tests.alphacut.small import CELL, summary_of, summary_of_run, written
 
@@ -64,6 +65,53 @@ def test_a_mesh_that_is_refined_declares_its_error(tmp_path, capsys):
     assert 0 < modulus(80e9) / 1e9 / found["E_GPa"] - 1 < found["error"]["space"] < 1e-3
     assert main(["check", str(written(tmp_path, CELL)), "--set", "mesh.refine=true"]) == 2
     assert "mesh.refine is True; allowed: true beside mesh.file" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def bounds():
+    """Bounds of E and ν of the two particles at the ends of their modulus."""
+
+    def of(young):
+        phases = {"matrix": Phase(20e9), "particles": Phase(young)}
+        return MeshModel(MESHES / "two-particles.msh").bounds(TruncatedNormal(-3, 3), phases)
+
+    return {young: of(young) for young in (75e9, 80e9, 85e9)}
+
+
+def test_a_mesh_has_bounds_from_both_sides(tmp_path, capsys, bounds):
+    words = ["--set", "mesh.bounds=true", "--json", str(tmp_path / "a.json")]
+    assert main(["cell", str(written(tmp_path, TEXT)), *words]) == 0
+    shown = capsys.readouterr().out
+    assert "The bounds are guaranteed for this mesh's geometry" in shown
+    assert "C is an upper bound" not in shown
+    assert "E_x, GPa, bounds" in shown
+    found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    low, high = found["bounds"]["constants"]["E_GPa"]
+    assert [low, high] == pytest.approx([x / 1e9 for x in bounds[80e9].young("isotropic")])
+    assert low < found["E_GPa"] <= high * (1 + 1e-7)
+    assert high < low * 1.001
+    assert found["bounds"]["stiffness_GPa"][1] == pytest.approx(bounds[80e9].upper / 1e9)
+    assert main(["check", str(written(tmp_path, CELL)), "--set", "mesh.bounds=true"]) == 2
+    assert "mesh.bounds is True; allowed: true beside mesh.file" in capsys.readouterr().err
+
+
+def test_alpha_cuts_of_a_mesh_with_bounds_are_guaranteed(tmp_path, capsys, bounds):
+    case, out = written(tmp_path, TEXT), tmp_path / "out"
+    words = ["--set", "mesh.bounds=true", "--out", str(out), "--no-figures"]
+    assert main(["run", str(case), *words]) == 0
+    text = capsys.readouterr().out
+    assert "guaranteed for this mesh's geometry" in text
+    assert "attained" not in text
+    result = summary_of(out)["modulus"]
+    assert result["nature"] == "guaranteed"
+    low, high = StiffnessBounds(bounds[75e9].lower, bounds[85e9].upper).young("isotropic")
+    cuts = result["E_GPa"]
+    assert [cuts["lower"][0], cuts["upper"][0]] == pytest.approx([low / 1e9, high / 1e9])
+    assert cuts["lower"][0] < modulus(75e9) / 1e9 < modulus(85e9) / 1e9 < cuts["upper"][0]
+    assert cuts["upper"][1] < 1.001 * cuts["lower"][1]
+    assert main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "bounds are guaranteed for this mesh" in page
 
 
 AUXETIC = [

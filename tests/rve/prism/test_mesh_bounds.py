@@ -10,7 +10,7 @@ pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy import FailedError
 from alphacut.rve import MeshModel, Phase, SeriesModel, VoigtPhase
-from alphacut.rve.fenicsx import MPI, basix
+from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.file import write
 from alphacut.rve.mesh.prism_grid import reference_radius
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
@@ -19,9 +19,10 @@ from alphacut.rve.prism.mesh_bounds import ROTATION, mesh_bounds
 from alphacut.rve.prism.model import cached_grid
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.prism.stress_functions import solved_fields_of_bounds
-from alphacut.rve.prism.theta_means import mean_over_theta, planar_slopes
+from alphacut.rve.prism.theta_means import mean_over_theta
 from alphacut.rve.solver.krylov import SolverOptions
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+from benchmarks.rve.mesh_bounds import work_of_stresses
 from tests.rve.prism.test_own_mesh import write_lattice
 
 MESHES = Path(__file__).parents[3] / "meshes"
@@ -154,17 +155,6 @@ def test_a_hexagonal_array_in_a_rhombus_is_transversely_isotropic(tmp_path, gmsh
     assert abs(middle[0, 0] - middle[0, 1] - 2 * middle[2, 2]) < 4 * half
 
 
-def fields_of(name, phases):
-    """The problem of a mesh, the stiffness of its phases, and its fields."""
-    model = MeshModel(MESHES / f"{name}.msh")
-    problem = model.moved_problem(LAW)
-    stiffness = [phase.stiffness for phase in model.named_phases(problem, phases).values()]
-    fields = solved_fields_of_bounds(
-        problem, stiffness, rotation_factor=1 / 20e9, options=SolverOptions()
-    )
-    return problem, stiffness, fields
-
-
 def random_field(problem, rng):
     """A periodic field at the nodes of prisms, shape (prisms, 15, 2)."""
     vector = problem.matrix.createVecRight()
@@ -178,24 +168,7 @@ def test_stresses_are_in_equilibrium_at_each_theta(name, rng):
     phases = {"matrix": SOFT, "ring": HARD, "particle": TURNED, "inclusion": HARD}
     model = MeshModel(MESHES / f"{name}.msh")
     named = {key: phases[key] for key in model.cached_problem().grid.names}
-    problem, _, fields = fields_of(name, named)
-    displacement = random_field(problem, rng)
-    layer = rng.integers(problem.grid.layers)
-    z = rng.random()
-    triangle, weights = basix.make_quadrature(basix.CellType.triangle, 9)
-    slopes = planar_slopes(np.column_stack([triangle, np.full(len(weights), z)]))
-    chosen = problem.layer == layer
-    jacobian = np.einsum("apn,cni->cpai", slopes, fields.nodes[chosen])
-    inverse = np.linalg.inv(jacobian)  # derivatives along x are inverse @ those on the triangle
-    areas = weights * np.linalg.det(jacobian)
-    of_potential = np.einsum("cpja,apn,cnil->cpijl", inverse, slopes, fields.potential[chosen])
-    stress = np.stack([of_potential[..., 1, :], -of_potential[..., 0, :]], axis=3)
-    s11, s22, s12 = fields.mean_stress_at(z)[layer]
-    stress += np.array([[s11, s12], [s12, s22]])
-    gradient = np.einsum("cpja,apn,cni->cpij", inverse, slopes, displacement[chosen])
-    work = np.einsum("cp,cpijl,cpij->l", areas, stress, gradient)
-    largest = np.einsum("cp,cpijl,cpij->l", areas, abs(stress), abs(gradient))
-    assert (abs(work) < 1e-12 * largest).all()
+    assert work_of_stresses(model, named, rng) < 1e-12
 
 
 @pytest.mark.parametrize(("scale", "noise"), [(1.0, 1e-4), (1e4, 1e-4), (1e-4, 0.0)])
