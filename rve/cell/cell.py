@@ -16,8 +16,6 @@ from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.cell.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
-AREA = 4.0
-"""Area of the cell, in squares of half of its side."""
 STRAIN = 0.01
 """Macroscopic strain of eq. 15."""
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])

@@ -55,6 +55,19 @@ class Lattice:
         """Area of the cell; 4 for the square."""
         return float(4 * abs(np.linalg.det(self.half_vectors[:2])))
 
+    @cached_property
+    def corners(self) -> Array:
+        """Corners counterclockwise, shape (4 or 6, 2), the first one between the sides −h1 and −h2.
+
+        h1 and h2 are the first two of the half vectors.
+        """
+        half_vectors = np.array(self.half_vectors)
+        outward = np.concatenate([-half_vectors, half_vectors])
+        # Of a parallelogram the sum of two half vectors leads to a corner; in a regular hexagon the
+        # corner is at 2/√3 of their length, and their sum √3 long.
+        share = 1.0 if len(half_vectors) == 2 else 2 / 3
+        return np.asarray(np.array(self.centre) + share * (outward + np.roll(outward, -1, axis=0)))
+
     def side_coordinates(self, points: Array) -> Array:
         """Return the side coordinates of points, shape (…, 2), in the shape (…, pairs)."""
         return np.asarray((points - np.array(self.centre)) @ self.normals.T)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, array_of_call, checked_number
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
-_ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
+ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
+"""Angles at which outlines are looked at, from 0 to 2π."""
 
 
 def circle(angle: Array) -> Array:
@@ -54,72 +55,65 @@ class Ellipse:
 def require_outline(outline: object) -> None:
     """Refuse what is no function of an array of angles that gives as many distances."""
     allowed = "a function of an array of angles that gives as many distances over r, or Ellipse"
-    array_of_call("outline", outline, _ANGLES, allowed=allowed)
+    array_of_call("outline", outline, ANGLES, allowed=allowed)
 
 
 def is_round(outline: Outline) -> bool:
     """Return whether an outline is a circle, but for round-off."""
     # A circle of another radius than 1 counts as well.
-    return bool(np.ptp(outline(_ANGLES)) < 1e-12)
+    return bool(np.ptp(outline(ANGLES)) < 1e-12)
 
 
 def area(outline: Outline) -> float:
     """Return the area for ρ = 1, ∮ s²/2 dφ: π for a circle."""
     # The trapezoidal rule of a smooth periodic function converges faster than any power. The last
     # angle is the first one once more.
-    return float(np.mean(outline(_ANGLES[:-1]) ** 2) * np.pi)
+    return float(np.mean(outline(ANGLES[:-1]) ** 2) * np.pi)
 
 
-class Extents(NamedTuple):
-    """Extents of an outline for ρ = 1: the largest |x1| and |x2|, and the smallest distance."""
+def extents(outline: Outline, lattice: Lattice = SQUARE) -> tuple[float, ...]:
+    """Return the largest side coordinates of an outline, one for each pair of sides, for ρ = 1.
 
-    half_width: float
-    half_height: float
-    min_distance: float
-
-
-def extents(outline: Outline) -> Extents:
-    """Return the largest |x1|, the largest |x2| and the smallest distance of an outline.
-
-    All three are for a particle of radius 1.
+    On the square they are the largest |x1| and |x2|.
 
     Args:
         outline: Distance of the edge from the centre over the radius, as a function of the polar
             angle in radians; it is taken at 720 even steps.
+        lattice: The cell around the particle, at whose sides the side coordinates are 1.
     """
-    distances = outline(_ANGLES)
-    return Extents(
-        half_width=float((distances * abs(np.cos(_ANGLES))).max()),
-        half_height=float((distances * abs(np.sin(_ANGLES))).max()),
-        min_distance=float(distances.min()),
-    )
+    directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    coordinates = outline(ANGLES)[:, np.newaxis] * abs(directions @ lattice.normals.T)
+    return tuple(coordinates.max(axis=0).tolist())
 
 
-def reach(outline: Outline) -> float:
-    """Return the largest coordinate on the outline for ρ = 1: below 1/ρ the particle fits."""
-    found = extents(outline)
-    return max(found.half_width, found.half_height)
+def reach(outline: Outline, lattice: Lattice = SQUARE) -> float:
+    """Return the largest side coordinate on the outline for ρ = 1: below 1/ρ the particle fits."""
+    return max(extents(outline, lattice))
 
 
-def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
-    """Raise for a particle that does not fit into the square [−1, 1]², or for what is no outline.
+def require_fit(
+    outline: Outline, radius: float, limit: float = 1.0, lattice: Lattice = SQUARE
+) -> None:
+    """Raise for a particle that does not fit into its cell, or for what is no outline.
 
     Args:
         outline: Distance of the edge from the centre over `radius`, as a function of the polar
             angle in radians; it is taken at 720 even steps.
         radius: Radius of the particle, in halves of the cell's side.
-        limit: What the largest coordinate of the particle must stay below, in halves of the side.
+        limit: What the largest side coordinate of the particle must stay below.
+        lattice: The cell.
 
     Raises:
         RefusedError: A distance is not positive or the outline not periodic; `radius` is not
             positive; or the particle reaches `limit`.
     """
-    distances = outline(_ANGLES)
+    distances = outline(ANGLES)
     is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]
     if not (distances > 0).all() or not is_periodic:
         raise RefusedError("outline", distances.min(), "positive distances of period 2π")
-    if not radius > 0 or radius * reach(outline) >= limit:
-        allowed = f"values in (0, {limit / reach(outline):.4g}), in halves of the cell's side"
+    largest = limit / reach(outline, lattice)
+    if not radius > 0 or radius * reach(outline, lattice) >= limit:
+        allowed = f"values in (0, {largest:.4g}), in halves of the cell's side"
         raise RefusedError("radius", f"{radius:g}", allowed)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar, cast
 
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from alphacut.base.arrays import Array, Ints
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.cell.outline import Outline, circle, is_round
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
@@ -32,11 +34,12 @@ def extrude(
     outline: Outline = circle,
     refinement: float = REFINEMENTS[0],
     parallel: bool = False,
+    lattice: Lattice = SQUARE,
 ) -> PrismGrid:
-    """Mesh the square [−1, 1]² with triangles by Gmsh, and extrude them to prisms along θ.
+    """Mesh the cell with triangles by Gmsh, and extrude them to prisms along θ.
 
     θ is the random number on which the radius of the particle depends; it is the third coordinate
-    of the mesh. Opposite sides of the square get the same nodes.
+    of the mesh. Opposite sides of the cell get the same nodes.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
@@ -49,6 +52,7 @@ def extrude(
             circle and where `radius` is 0.
         parallel: Whether Gmsh runs on the first MPI rank alone, which sends the triangles to the
             others. All ranks must call.
+        lattice: The cell, centred at 0.
 
     Returns:
         Grid of six-node triangles times layers, with the heights of its levels from 0 to 1. Its
@@ -58,14 +62,14 @@ def extrude(
     """
     has_bends = bool(radius) and not is_round(outline)
     bends = refinement if has_bends else 0.0
-    make = partial(square.triangles, size, radius, outline, refinement=bends)
+    make = partial(square.triangles, size, radius, outline, refinement=bends, lattice=lattice)
     points, triangles, phase = from_first_rank(make) if parallel else make()
     # Sorted by their vertices, neighbours are near one another in memory. `lexsort` sorts by its
     # last row first, so the rows are the vertices from the largest to the smallest number.
     order = np.lexsort(np.sort(triangles, axis=1).T[::-1])
     triangles = triangles[order]
     phase = phase[order]
-    plane = _quadratic(points, triangles, phase, radius, outline)
+    plane = replace(_quadratic(points, triangles, phase, radius, outline), lattice=lattice)
 
     # The nodes of all levels come first, then those of all mid-levels. A mid-level has nodes at the
     # vertices alone, since a serendipity prism has no node in the middle of a rectangular face.

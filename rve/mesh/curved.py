@@ -13,6 +13,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.errors import RefusedError
 from alphacut.rve.cell.cell import require_mesh_size
+from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.cell.outline import Outline, circle, is_round, require_fit
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
@@ -28,7 +29,7 @@ a larger one takes more elements at the bends of an outline."""
 
 @dataclass(frozen=True)
 class PlaneMesh:
-    """Straight-sided triangles of the cell [−1, 1]², opposite sides matching.
+    """Straight-sided triangles of the cell, opposite sides matching.
 
     Args:
         points: Vertices, shape (n, 2).
@@ -37,6 +38,7 @@ class PlaneMesh:
         phase: Phase of a triangle: matrix 0, particle 1, shape (m,).
         radius: Radius of the particle.
         outline: Outline of the particle.
+        lattice: The cell.
     """
 
     points: Array
@@ -44,6 +46,7 @@ class PlaneMesh:
     phase: Ints
     radius: float
     outline: Outline = circle
+    lattice: Lattice = SQUARE
 
     @property
     def inside(self) -> Mask:
@@ -51,8 +54,10 @@ class PlaneMesh:
         return np.asarray(self.phase == PARTICLE)
 
 
-def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> PlaneMesh:
-    """Mesh the square [−1, 1]² around a centred particle with triangles by Gmsh.
+def plane_mesh(
+    radius: float, *, size: float, outline: Outline = circle, lattice: Lattice = SQUARE
+) -> PlaneMesh:
+    """Mesh the cell around a centred particle with triangles by Gmsh.
 
     Edges are shorter where the particle is small, where it nearly touches its periodic images, and
     where its outline bends. Opposite sides have the same nodes.
@@ -63,6 +68,7 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
             it is taken as 0.7.
         outline: Distance of the particle's edge from its centre over `radius`, as a function of the
             polar angle in radians.
+        lattice: The cell, centred at 0.
 
     Returns:
         Straight-sided triangles with the vertices of the interface on the outline. For an outline
@@ -72,21 +78,21 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
 
     Raises:
         RefusedError: `size` is outside (0, 1]; the outline is not positive or not periodic;
-            `radius` is not positive or the particle reaches 0.9995 of half the side, where the gap
-            to its images would need too many elements; or the outline is so sharp that triangles
-            fold at the shortest edges that are tried.
+            `radius` is not positive or the particle reaches 0.9995 of the way to a side, where the
+            gap to its images would need too many elements; or the outline is so sharp that
+            triangles fold at the shortest edges that are tried.
         MissingLibraryError: Gmsh is not installed, and the mesh is not in the user's cache.
     """
     require_mesh_size(size)
     # Beyond 0.9995 of half the side the gap to the images would need too many elements.
-    require_fit(outline, radius, limit=0.9995)
+    require_fit(outline, radius, limit=0.9995, lattice=lattice)
     # On coarser meshes no order of elements resolves a small particle, and errors that are
     # estimated by comparing orders come out too small.
     size = min(size, 0.7)
     if is_round(outline):
-        return _graded_mesh(radius, size, outline, refinement=0.0)
+        return _graded_mesh(radius, size, outline, lattice, refinement=0.0)
     for refinement in REFINEMENTS:
-        mesh = _graded_mesh(radius, size, outline, refinement=refinement)
+        mesh = _graded_mesh(radius, size, outline, lattice, refinement=refinement)
         if all(_is_valid(mesh, order) for order in (2, 3, 4, 5)):
             return mesh
     raise RefusedError(
@@ -103,20 +109,23 @@ def _is_valid(mesh: PlaneMesh, order: int) -> bool:
     return bool((jacobian_ratios(nodes, cells, order) > MIN_JACOBIAN_RATIO).all())
 
 
-def _graded_mesh(radius: float, size: float, outline: Outline, *, refinement: float) -> PlaneMesh:
-    """Mesh the square [−1, 1]² with shorter edges near the particle, by Gmsh.
+def _graded_mesh(
+    radius: float, size: float, outline: Outline, lattice: Lattice, *, refinement: float
+) -> PlaneMesh:
+    """Mesh the cell with shorter edges near the particle, by Gmsh.
 
     Args:
         radius: Radius of the particle, in halves of the cell's side, positive.
         size: Edge length far from the particle, in halves of the cell's side.
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+        lattice: The cell.
         refinement: Divisor of the edge length at bends of the outline; 0 to leave bends alone.
 
     Returns:
         Triangles whose vertices between matrix (phase 0) and particle (phase 1) lie on the outline.
     """
     points, triangles, phase = square.triangles(
-        size, radius, outline, near_particle=True, refinement=refinement
+        size, radius, outline, near_particle=True, refinement=refinement, lattice=lattice
     )
     inside = phase == PARTICLE
     on_interface = np.intersect1d(triangles[inside], triangles[~inside])
@@ -125,7 +134,7 @@ def _graded_mesh(radius: float, size: float, outline: Outline, *, refinement: fl
     x, y = points[on_interface].T
     distance = radius * outline(np.arctan2(y, x))
     points[on_interface] *= (distance / np.hypot(x, y))[:, np.newaxis]
-    return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline)
+    return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline, lattice)
 
 
 def _lagrange_triangle(order: int) -> Any:

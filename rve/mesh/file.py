@@ -33,8 +33,8 @@ def read_grid(path: Path | str) -> PrismGrid:
     """Read a mesh of the cell from a file in Gmsh's format MSH and check it.
 
     The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on a
-    parallelogram, with the random number θ as third coordinate. Each physical group of volumes is a
-    material.
+    parallelogram or a regular hexagon, with the random number θ as third coordinate. Each physical
+    group of volumes is a material.
 
     Args:
         path: The file, MSH 2.x or 4.1, text or binary.
@@ -45,7 +45,7 @@ def read_grid(path: Path | str) -> PrismGrid:
     Raises:
         RefusedError: The file cannot be read, is not in that format, or contradicts itself.
         MeshError: It is no mesh of a cell: other elements than prisms, a volume without a group or
-            in two, θ along another axis, no parallelogram, no columns, folded prisms, voids or
+            in two, θ along another axis, no such cell, no columns, folded prisms, voids or
             overlaps, opposite sides that do not match, slits, or a material that changes along θ.
     """
     try:
@@ -355,10 +355,10 @@ def _require_theta_last(points: Array) -> None:
 
 
 def lattice_of(xy: Array) -> Lattice:
-    """Return the parallelogram whose corners are among points, as a cell of a lattice.
+    """Return the parallelogram or regular hexagon whose corners are among points, as a cell.
 
-    The first vector of the lattice is the one nearer to the x1 axis, and the second one stands
-    counterclockwise from it. Other points may lie outside of the parallelogram.
+    The first vector of the lattice is the one nearer to the x1 axis, and the next one stands
+    counterclockwise from it. Other points may lie outside of a parallelogram.
 
     Args:
         xy: Points, shape (n, 2), at least three of them not on a line.
@@ -371,6 +371,9 @@ def lattice_of(xy: Array) -> Lattice:
     centre = (xy.min(axis=0) + xy.max(axis=0)) / 2
     offsets = xy - centre
     diagonal = offsets[np.argmax(np.hypot(offsets[:, 0], offsets[:, 1]))]
+    hexagon = _hexagon(offsets, diagonal)
+    if hexagon is not None:
+        return replace(hexagon, centre=(float(centre[0]), float(centre[1])))
     distances = diagonal[0] * offsets[:, 1] - diagonal[1] * offsets[:, 0]
     other = offsets[np.argmax(abs(distances))]
     half_vectors = np.array([diagonal - other, diagonal + other]) / 2
@@ -386,8 +389,29 @@ def lattice_of(xy: Array) -> Lattice:
     return Lattice((first, second), middle)
 
 
+def _hexagon(offsets: Array, corner: Array) -> Lattice | None:
+    """Return the regular hexagon about 0 with a corner, None unless its other corners are there.
+
+    Args:
+        offsets: Points, shape (n, 2).
+        corner: One of them, (x1, x2), farthest from 0.
+    """
+    # Complex factors that turn the plane by 30°, 90° and 150°, and by −60° and 60°.
+    turns = np.exp(1j * np.pi * np.array([1, 3, 5]) / 6)
+    points = offsets[:, 0] + 1j * offsets[:, 1]
+    first = complex(*corner)
+    others = first * np.exp(1j * np.pi * np.array([-1, 1]) / 3)
+    if abs(points - others[:, np.newaxis]).min(axis=1).max() > SAME_PLACE * abs(first):
+        return None
+    # Half vectors stand at right angles to the sides, whose distance is cos 30° of the corners'.
+    half_vectors = first * np.cos(np.pi / 6) * turns
+    # Turned by whole 60°, the first one is the nearest to the x1 axis.
+    half_vectors *= np.exp(-1j * np.pi / 3 * np.round(np.angle(half_vectors[0]) * 3 / np.pi))
+    return Lattice(tuple((float(vector.real), float(vector.imag)) for vector in half_vectors))
+
+
 def _require_periodic(grid: PrismGrid) -> None:
-    """Raise unless each level of θ fills the same parallelogram and its opposite sides match.
+    """Raise unless each level of θ fills the same cell and its opposite sides match.
 
     So must the nodes half-way between two levels.
 
@@ -396,7 +420,7 @@ def _require_periodic(grid: PrismGrid) -> None:
             which are numbered level by level, and with the lattice of its lowest level.
 
     Raises:
-        MeshError: The nodes of a level reach out of the parallelogram or do not reach its sides, a
+        MeshError: The nodes of a level reach out of the cell or do not reach its sides, a
             node on a side has no partner on the opposite side, or nodes are partners on one level
             and not on another.
     """
@@ -410,9 +434,11 @@ def _require_periodic(grid: PrismGrid) -> None:
         reaches = abs(lattice.side_coordinates(xy)).max(axis=0)
         if abs(reaches - 1).max() > SAME_PLACE:
             vectors = " and ".join(f"({2 * x:.6g}, {2 * y:.6g})" for x, y in lattice.half_vectors)
-            what = f"the level θ = {theta:.4g} is not the parallelogram of the sides {vectors}"
+            shape = "parallelogram" if len(lattice.half_vectors) == 2 else "hexagon"
+            what = f"the level θ = {theta:.4g} is not the {shape} of the vectors {vectors}"
             what += " of the lowest level"
-            raise MeshError(what, "mesh a square, a rectangle or a parallelogram, alike at all θ")
+            cure = "mesh a parallelogram or regular hexagon, alike at all θ"
+            raise MeshError(what, cure)
         try:
             partners = unknowns(xy, lattice)
         except MeshError as error:

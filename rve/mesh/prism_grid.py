@@ -69,29 +69,32 @@ class Prisms:
     names: tuple[str, ...]
 
 
-def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
+def reference_radius(
+    radius_map: RadiusMap, outline: Outline = circle, lattice: Lattice = SQUARE
+) -> float:
     """Choose the radius of a particle at which its planar mesh is made, to be moved to other radii.
 
     It is the midpoint of the range of the map's radii, rounded to 1/20, so that many maps share one
-    mesh. It is then clipped to 0.1 … 0.9 / (largest coordinate of the outline of radius 1), where
-    the mesh leaves room inside the particle and between the particle and the side.
+    mesh. It is then clipped to 0.1 … 0.9 / (largest side coordinate of the outline of radius 1),
+    where the mesh leaves room inside the particle and between the particle and the side.
 
     Args:
         radius_map: Function r(θ), in halves of the cell's side, with the distribution of θ; its
             range is taken from 65 points.
         outline: Distance of the particle's edge over r, as a function of the polar angle in
             radians.
+        lattice: The cell.
 
     Raises:
         RefusedError: `radius_map` is no such map or leaves (0, 1), the outline is not positive and
-            periodic, or the largest particle does not fit into the square.
+            periodic, or the largest particle does not fit into the cell.
     """
     require_map(radius_map)
     distribution = radius_map.distribution
     radii = radius_map(np.linspace(distribution.lower, distribution.upper, 65))
-    require_fit(outline, float(radii.max()))
+    require_fit(outline, float(radii.max()), lattice=lattice)
     midpoint = np.round((radii.min() + radii.max()) * 10) / 20
-    return float(np.clip(midpoint, 0.1, 0.9 / reach(outline)))
+    return float(np.clip(midpoint, 0.1, 0.9 / reach(outline, lattice)))
 
 
 @dataclass(frozen=True)
@@ -171,17 +174,17 @@ def _sign_error(value: str) -> RefusedError:
 
 
 def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
-    """Move the nodes of a planar mesh of the cell [−1, 1]² to other radii of its particle.
+    """Move the nodes of a planar mesh of the cell to other radii of its particle.
 
     Nodes slide along rays from the centre. Inside the particle their distance grows with the
     radius. Outside, a node keeps its fraction of the way along its ray from the outline to the side
-    of the square. Midpoints of edges slide too, so edges bend. Only an edge across a diagonal of
-    the square, where sliding has a kink, stays straight, unless it lies on the outline.
+    of the cell. Midpoints of edges slide too, so edges bend. Only an edge across a ray to a corner,
+    where sliding has a kink, stays straight, unless it lies on the outline.
 
     Args:
         mesh: Six-node triangles at the radius `mesh.radius`, which is positive.
         radii: Radii in halves of the cell's side, shape (k,), positive and so small that the
-            particle fits into the square; this is not checked.
+            particle fits into the cell; this is not checked.
 
     Returns:
         Positions (x1, x2), shape (k, nodes, 2).
@@ -195,7 +198,8 @@ def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
     old_edge = mesh.radius * outline
     new_edge = radius * outline
     with np.errstate(divide="ignore", invalid="ignore"):  # at the centre, which is in the particle
-        side = distance / abs(mesh.points).max(axis=1)  # distance of the square's side on the ray
+        # Distance of the cell's side on the ray.
+        side = distance / abs(mesh.lattice.side_coordinates(mesh.points)).max(axis=1)
         stretch = (side - new_edge) / (side - old_edge)
         outer_scale = (new_edge + (distance - old_edge) * stretch) / distance
         scale = np.where(in_particle, radius / mesh.radius, outer_scale)
@@ -204,12 +208,13 @@ def nodes_at_radii(mesh: Triangulation, radii: Array) -> Array:
         scale = np.where(mesh.arc, radius * outline / distance, scale)
     points = mesh.points * scale[..., np.newaxis]
 
-    # An edge crosses the diagonal x = y where x − y has opposite signs at its ends, and x = −y
-    # where x + y has. The tolerance keeps edges that end on a diagonal from counting by round-off.
-    x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
-    crosses_first = (x - y).prod(axis=0) < -1e-12
-    crosses_second = (x + y).prod(axis=0) < -1e-12
-    is_straight = (crosses_first | crosses_second) & ~mesh.arc[mesh.vertices :]
+    # An edge crosses the line through two opposite corners where its ends are on both sides of it.
+    # The tolerance keeps edges that end on the line from counting by round-off.
+    corners = mesh.lattice.corners
+    first, second = corners[: len(corners) // 2].T
+    x, y = mesh.points[mesh.ends, np.newaxis].transpose(3, 1, 0, 2)
+    crosses = (x * second - y * first).prod(axis=0) < -1e-12
+    is_straight = crosses.any(axis=1) & ~mesh.arc[mesh.vertices :]
     straight = np.flatnonzero(is_straight)
     points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
     return np.asarray(points)

@@ -1,4 +1,4 @@
-"""Gmsh's triangles of the cell [−1, 1]² around its particle, opposite sides matching.
+"""Gmsh's triangles of the cell around its particle, opposite sides matching.
 
 Edge lengths of the planar cell: short near small particles, in gaps, and where outlines bend.
 """
@@ -18,7 +18,8 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints, Mask
 from alphacut.base.extras import extra_named
 from alphacut.base.user_cache import cached_arrays
-from alphacut.rve.cell.outline import Outline, bend_radii, extents, is_round
+from alphacut.rve.cell.lattice import SQUARE, Lattice
+from alphacut.rve.cell.outline import ANGLES, Outline, bend_radii, extents, is_round
 from alphacut.rve.interruption import uninterrupted
 
 Sizes = Callable[[float, float], float]
@@ -68,20 +69,22 @@ def triangles(
     *,
     near_particle: bool = False,
     refinement: float = 0.0,
+    lattice: Lattice = SQUARE,
 ) -> Triangles:
-    """Mesh the square [−1, 1]² around its particle by Gmsh, or take the mesh from the user's cache.
+    """Mesh a cell around its particle by Gmsh, or take the mesh from the user's cache.
 
-    The centre of the square is that of the particle. Opposite sides have the same nodes.
+    The centre of the cell is that of the particle. Opposite sides have the same nodes.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, positive.
         radius: Radius of the particle, in halves of the cell's side; 0 for none.
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle in
-            radians; it must fit into the square.
+            radians; it must fit into the cell.
         near_particle: Whether edges shorten near a small particle and in gaps between it and the
             sides; `radius` must then be positive.
         refinement: Divisor of the edge length at bends of the outline; 0 not to shorten edges
             there.
+        lattice: The cell, centred at 0.
 
     Returns:
         Vertices, shape (n, 2); vertices of each triangle, shape (m, 3); and phase of each triangle,
@@ -90,11 +93,11 @@ def triangles(
 
     Raises:
         MissingLibraryError: Gmsh is not installed, and the mesh is not in the cache.
-        Exception: Whatever Gmsh raises if it cannot mesh the square.
+        Exception: Whatever Gmsh raises if it cannot mesh the cell.
     """
     gradings: list[Sizes] = []
     if near_particle:
-        gradings.append(particle_grading(outline, radius))
+        gradings.append(particle_grading(outline, radius, lattice))
     if refinement:
         gradings.append(bend_grading(outline, radius, refinement))
 
@@ -103,15 +106,16 @@ def triangles(
         return size * min(1.0, min(grading(x, y) for grading in gradings))
 
     sizes = min_size if gradings else None
-    generate = partial(gmsh_triangles, size, radius, outline, sizes)
+    generate = partial(gmsh_triangles, size, radius, outline, sizes, lattice)
 
     # The key of the cache stands for all that Gmsh is given: the numbers, the outline at the points
     # of its spline, its bends, this file, and the version of Gmsh. `outline` is a function and
     # cannot be hashed, so its values are.
     angles: Array = np.asarray(np.linspace(0, 2 * np.pi, 4 * _spline_steps(outline) + 1), float)
-    numbers = np.array([size, radius, near_particle, refinement, *extents(outline)])
+    numbers = np.array([size, radius, near_particle, refinement, *extents(outline, lattice)])
     points, bends = bend_radii(outline)
-    shape = np.concatenate([numbers, outline(angles), points.ravel(), bends])
+    sides = lattice.normals.ravel()
+    shape = np.concatenate([numbers, sides, outline(angles), points.ravel(), bends])
     try:
         content = f"{version('gmsh')} {Path(__file__).read_text('utf-8')}".encode()
     except PackageNotFoundError:  # a Gmsh that does not say which it is
@@ -122,8 +126,14 @@ def triangles(
     )
 
 
-def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | None) -> Triangles:
-    """Mesh the square [−1, 1]² around its particle by Gmsh.
+def gmsh_triangles(
+    size: float,
+    radius: float,
+    outline: Outline,
+    sizes: Sizes | None,
+    lattice: Lattice = SQUARE,
+) -> Triangles:
+    """Mesh a cell around its particle by Gmsh.
 
     Args:
         size: Wanted edge length, in halves of the cell's side.
@@ -131,17 +141,18 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
         sizes: Edge length in halves of the cell's side as a function of x1 and x2, in place of
             `size`; None for `size` everywhere.
+        lattice: The cell, centred at 0.
 
     Returns:
         Vertices that triangles use, shape (n, 2); vertices of each triangle, shape (m, 3); and
         phase of each triangle, shape (m,): matrix 0, particle 1, particle first.
 
     Raises:
-        Exception: Whatever Gmsh raises if it cannot mesh the square, such as an outline that
+        Exception: Whatever Gmsh raises if it cannot mesh the cell, such as an outline that
             crosses itself or a side.
     """
     with open_gmsh() as gmsh:
-        phase_surfaces = surfaces(size, radius, outline)
+        phase_surfaces = surfaces(size, radius, outline, lattice)
         if sizes is not None:
             # Nothing else sets the edge lengths.
             gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
@@ -167,13 +178,16 @@ def gmsh_triangles(size: float, radius: float, outline: Outline, sizes: Sizes | 
     return Triangles(points, compact.reshape(-1, 3), np.concatenate(phases))
 
 
-def surfaces(size: float, radius: float, outline: Outline) -> dict[int, int]:
-    """Add the square [−1, 1]² and its particle to the current, empty Gmsh model.
+def surfaces(
+    size: float, radius: float, outline: Outline, lattice: Lattice = SQUARE
+) -> dict[int, int]:
+    """Add a cell and its particle to the current, empty Gmsh model.
 
     Args:
         size: Edge length of elements, in halves of the cell's side.
         radius: Radius of the particle, in halves of the cell's side; 0 for none.
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle.
+        lattice: The cell, centred at 0.
 
     Returns:
         Gmsh's tags of the surfaces by the number of the phase: particle 1 first, if there is one,
@@ -183,10 +197,10 @@ def surfaces(size: float, radius: float, outline: Outline) -> dict[int, int]:
 
     geo = gmsh.model.geo
     if not radius:
-        surface = geo.addPlaneSurface([_square_loop(geo, size)])
+        surface = geo.addPlaneSurface([_cell_loop(geo, size, lattice)])
         geo.synchronize()
         return {0: surface}
-    particle, matrix = _particle(geo, size, radius, outline)
+    particle, matrix = _particle(geo, size, radius, outline, lattice)
     return {1: particle, 0: matrix}
 
 
@@ -239,27 +253,31 @@ def open_gmsh() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _square_loop(geo: Any, size: float) -> int:
-    """Add the boundary of [−1, 1]² to the current Gmsh model; return the tag of its curve loop.
+def _cell_loop(geo: Any, size: float, lattice: Lattice) -> int:
+    """Add the boundary of a cell to the current Gmsh model; return the tag of its curve loop.
 
     Opposite sides are made periodic, so that Gmsh gives them the same nodes.
 
     Args:
         geo: Gmsh's built-in kernel of geometry, `gmsh.model.geo`.
         size: Edge length at the corners, in halves of the cell's side.
+        lattice: The cell.
     """
     import gmsh
 
-    corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    sides = [geo.addLine(corners[side], corners[(side + 1) % 4]) for side in range(4)]
+    corners = [geo.addPoint(x, y, 0, size) for x, y in lattice.corners]
+    count = len(corners)
+    sides = [geo.addLine(corners[side], corners[(side + 1) % count]) for side in range(count)]
     # The model knows curves of the kernel only after it is synchronised.
     geo.synchronize()
-    bottom, right, top, left = sides
-    for first, second, shift in ((left, right, (2, 0)), (bottom, top, (0, 2))):
+    # The last side, of a square the left one, belongs to the first half vector, the first side to
+    # the second half vector, and so on.
+    for side, half_vector in enumerate(lattice.half_vectors, start=-1):
         # Gmsh takes the map from the first side to the second as a matrix of 4 × 4, row by row.
         affine = np.eye(4)
-        affine[:2, 3] = shift
-        gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
+        affine[:2, 3] = 2 * np.array(half_vector)
+        opposite = sides[side + count // 2]
+        gmsh.model.mesh.setPeriodic(1, [opposite], [sides[side]], affine.ravel().tolist())
     return int(geo.addCurveLoop(sides))
 
 
@@ -278,7 +296,9 @@ def _spline_steps(outline: Outline) -> int:
     return int(np.clip(4 * np.ceil(largest_ratio), 16, 128))
 
 
-def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
+def _particle(
+    geo: Any, size: float, radius: float, outline: Outline, lattice: Lattice
+) -> tuple[int, int]:
     """Add a particle bounded by four curves, and the matrix around it, to the current Gmsh model.
 
     A circle is made of four arcs, any other outline of four splines between the axes.
@@ -289,6 +309,7 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
         radius: Radius of the particle, in halves of the cell's side, positive.
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle in
             radians.
+        lattice: The cell.
 
     Returns:
         Tags of the surfaces of the particle and of the matrix. The centre becomes a vertex of the
@@ -319,40 +340,47 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
             curves.append(geo.addSpline([poles[quarter], *inner, poles[(quarter + 1) % 4]]))
     loop = geo.addCurveLoop(curves)
     particle = geo.addPlaneSurface([loop])
-    matrix = geo.addPlaneSurface([_square_loop(geo, size), loop])
+    matrix = geo.addPlaneSurface([_cell_loop(geo, size, lattice), loop])
     geo.synchronize()
     gmsh.model.mesh.embed(0, [centre], 2, particle)
     return particle, matrix
 
 
-def particle_grading(outline: Outline, radius: float) -> Sizes:
+def particle_grading(outline: Outline, radius: float, lattice: Lattice = SQUARE) -> Sizes:
     """Return a function of x1 and x2 that shortens edges near a particle and in gaps.
 
     The function gives the wanted edge length over the nominal one, in (0, 1]: the smallest of 1,
     1.4 times the distance from the centre (at least that of the nearest point of the outline), and
-    four times the width of the gap to the sides of the square.
+    four times the width of the gap to the sides of the cell.
 
     Args:
         outline: Distance of the particle's edge over `radius`, as a function of the polar angle; it
-            must fit into the square [−1, 1]².
+            must fit into the cell.
         radius: Radius of the particle, in halves of the cell's side, positive.
+        lattice: The cell, centred at 0.
     """
-    unit = extents(outline)
-    half_width = radius * unit.half_width
-    half_height = radius * unit.half_height
-    min_distance = radius * unit.min_distance
+    min_distance = radius * float(outline(ANGLES).min())
+    # Of each pair of sides: the unit normal, the distance of a side from the centre, and how far
+    # the particle extends towards it.
+    distances = 1 / np.hypot(lattice.normals[:, 0], lattice.normals[:, 1])
+    normals = lattice.normals * distances[:, np.newaxis]
+    reaches = radius * np.array(extents(outline, lattice)) * distances
+    table = np.column_stack([normals, distances, reaches])
+    rows = [tuple(map(float, row)) for row in table]
 
     def over_nominal(x: float, y: float) -> float:
         """Return the edge length at a point over the nominal one, in (0, 1]."""
-        # Gmsh asks for a point at a time, where NumPy would be slower. The cell's sides are at ±1,
-        # and the outline's extents are symmetric.
-        x, y = abs(x), abs(y)
-        by_distance = PER_RADIUS * max(hypot(x, y), min_distance)
-        # Width of the gap to the cell's side. At the height y beside a circle of the radius a it is
-        # 1 − a + y²/(2 a) to second order, and the last term lets it grow inside the particle.
-        gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
-        gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)
-        return min(1.0, by_distance, 4 * gap_beside, 4 * gap_above)
+        # Gmsh asks for a point at a time, where NumPy would be slower.
+        smallest = min(1.0, PER_RADIUS * max(hypot(x, y), min_distance))
+        for n1, n2, distance, extent in rows:
+            # Coordinates across and along the side. Beside a circle of the radius a, which extends
+            # to a of the side's distance d, the gap at the height y is d − a + y²/(2 a) to second
+            # order, and the last term lets it grow inside the particle.
+            across = abs(n1 * x + n2 * y)
+            along = abs(n1 * y - n2 * x)
+            gap = distance - extent + along * along / (2 * extent) + max(0.0, extent - across)
+            smallest = min(smallest, 4 * gap)
+        return smallest
 
     return over_nominal
 

@@ -34,6 +34,7 @@ from alphacut.rve.cell.cell import (
     require_mesh_size,
     require_solve_arguments,
 )
+from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.cell.outline import Outline, circle, is_round, require_outline
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
@@ -45,7 +46,13 @@ from alphacut.rve.prism.modulus_basis import ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import FoldedMeshError, PrismProblem, Solved, solve_over_prisms
 from alphacut.rve.prism.slices import solve_sample
 from alphacut.rve.result.cell_model import CellModel, Resolution
-from alphacut.rve.result.checks import ROUND_OFF, checks_within_limits, mean, stress_checks
+from alphacut.rve.result.checks import (
+    ROUND_OFF,
+    checks_within_limits,
+    isotropy_check,
+    mean,
+    stress_checks,
+)
 from alphacut.rve.result.moduli import AVERAGES, AXES, axial_moduli
 from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies, StressCurve
 from alphacut.rve.series.model import SeriesModel
@@ -74,6 +81,7 @@ class PrismModel(CellModel):
         modulus_range: Smallest and largest Young's modulus of the particle, in Pa, between which
             samples of a map are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+        lattice: "square", "hexagonal", or the sides [a, b] of a rectangle; see `lattice_of`.
     """
 
     mesh_size: float = 0.15
@@ -84,6 +92,7 @@ class PrismModel(CellModel):
     estimate: bool = True
     modulus_range: tuple[float, float] | None = None
     outline: Outline = circle
+    lattice: Arrangement = "square"
     name: ClassVar[str] = "prism"
     convention: ClassVar[str] = AVERAGES[AXES]
 
@@ -93,12 +102,13 @@ class PrismModel(CellModel):
         Raises:
             RefusedError: `mesh_size` is outside (0, 1], `layers` is no whole number of 1 or more,
                 `petsc` is no table of options, `outline` is no function of an array of angles, or
-                `modulus_range` is not a pair of finite numbers. The order of the pair is not
-                checked.
+                `modulus_range` is not a pair of finite numbers, or there is no such lattice. The
+                order of the pair is not checked.
         """
         require_prisms(self.mesh_size, self.layers)
         require_petsc(self.petsc)
         require_outline(self.outline)
+        lattice_of(self.lattice)
         if self.modulus_range is not None:
             require_numbers("modulus_range", self.modulus_range)
             is_range = len(self.modulus_range) == 2
@@ -127,6 +137,7 @@ class PrismModel(CellModel):
             stiffness=resolution.whole_stiffness,
             estimate=resolution.estimate,
             outline=resolution.outline,
+            lattice=resolution.lattice,
         )
 
     @property
@@ -170,7 +181,8 @@ class PrismModel(CellModel):
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        cells = [Cell(matrix, inclusion, radius_map, self.outline) for inclusion in inclusions]
+        lattice = lattice_of(self.lattice)
+        cells = [Cell(matrix, one, radius_map, self.outline, lattice) for one in inclusions]
         return self._on_valid_grid(radius_map, lambda grid: self._solve_on(grid, cells))
 
     def _solve_on(self, grid: PrismGrid, cells: Sequence[Cell]) -> list[HomogenisedStiffness]:
@@ -212,14 +224,15 @@ class PrismModel(CellModel):
             result = prism_result(solved, cell.phases, loads, self.options)
             result = replace(result, cell=cell, seconds=perf_counter() - started)
             if self.estimate:
-                result = with_distance(result, _reference_result(cell))
+                result = with_distance(result, _reference_result(cell, self.lattice))
 
             # Bounds of the stiffness may be violated by the error of the mesh. Where no error is
             # declared, 0.1 h³ stands for it, which is tuned. Energies of quadratic triangles
             # converge with h⁴ where fields are smooth, so in finer meshes 0.1 h³ exceeds the error
             # by more.
             allowed = 2 * result.largest_error if result.errors else 0.1 * self.mesh_size**3
-            checks = checks_within_limits(result.checks, discretisation=ROUND_OFF + allowed)
+            checks = {**result.checks, **isotropy_check(result)}
+            checks = checks_within_limits(checks, discretisation=ROUND_OFF + allowed)
             results.append(replace(result, checks=checks))
             started = perf_counter()
         return results
@@ -253,7 +266,8 @@ class PrismModel(CellModel):
         """
         require_solve_arguments(radius_map, matrix, inclusions, isotropic=False)
         require(len(inclusions) == 1, "inclusions", len(inclusions), "one, for fields")
-        cell = Cell(matrix, inclusions[0], radius_map, self.outline)
+        lattice = lattice_of(self.lattice)
+        cell = Cell(matrix, inclusions[0], radius_map, self.outline, lattice)
         problem = self.problem(radius_map)
         return solved_fields(problem, cell.stiffness, self.loads(cell), self.options)
 
@@ -312,7 +326,8 @@ class PrismModel(CellModel):
             RefusedError: It is no radius map, or a radius does not fit into the cell.
             Exception: Whatever else the function raises, at once.
         """
-        radius = reference_radius(radius_map, self.outline)
+        lattice = lattice_of(self.lattice)
+        radius = reference_radius(radius_map, self.outline, lattice)
 
         grid = partial(
             cached_grid,
@@ -321,6 +336,7 @@ class PrismModel(CellModel):
             layers=self.layers,
             outline=self.outline,
             parallel=self.parallel,
+            lattice=lattice,
         )
         if is_round(self.outline):
             return function(grid(refinement=REFINEMENTS[0]))
@@ -453,7 +469,7 @@ def prism_result(
     )
 
 
-def _reference_result(cell: Cell) -> HomogenisedStiffness:
+def _reference_result(cell: Cell, lattice: Arrangement) -> HomogenisedStiffness:
     """Return the result of a model that is more accurate than prisms, for the same cell.
 
     It is the multipole series for a circle of isotropic phases, and triangles of order 4 at single
@@ -462,6 +478,7 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
 
     Args:
         cell: Two phases, the radius map and the outline of the particle.
+        lattice: Arrangement of the particles.
 
     Raises:
         RefusedError: The slices cannot mesh the cell (particles that nearly touch), or the map has
@@ -470,10 +487,10 @@ def _reference_result(cell: Cell) -> HomogenisedStiffness:
     """
     matrix = cell.matrix
     inclusion = cell.inclusion
-    if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
-        series = SeriesModel(accuracy=1e-9, energies=True)
+    if isinstance(matrix, Phase) and isinstance(inclusion, Phase) and is_round(cell.outline):
+        series = SeriesModel(accuracy=1e-9, energies=True, lattice=lattice)
         return series.solve(cell.radius_map, matrix, [inclusion])[0]
-    slices = SlicesModel(points=14, outline=cell.outline)
+    slices = SlicesModel(points=14, outline=cell.outline, lattice=lattice)
     return slices.solve(cell.radius_map, matrix, [inclusion])[0]
 
 

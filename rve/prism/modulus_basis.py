@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.rve.cell.cell import AREA, AnyPhase, Phase
+from alphacut.rve.cell.cell import AnyPhase, Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.prism.problem import SliceStrains, Solved
@@ -156,7 +156,9 @@ def modulus_basis(
     )
     # They are compared with the energy of the affine field in a cell of matrix alone: the scale of
     # the problem, which needs no solution.
-    affine_energies = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    affine_energies = grid.plane.lattice.area * np.einsum(
+        "li,ij,lj->l", strains, matrix.stiffness, strains
+    )
     return replace(basis, error=float((energies / affine_energies).max()))
 
 

@@ -15,6 +15,7 @@ from typing import ClassVar, cast
 
 from alphacut.base.errors import RefusedError, require
 from alphacut.rve.cell.cell import THREE_LOADS, AnyPhase, Phase, VoigtPhase, require_compressible
+from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.mesh.columns import from_first_rank
@@ -256,6 +257,8 @@ class LevelSetModel(_NamedModel):
         layers: Layers in θ, at least 1.
         petsc: PETSc options without their prefix `rve_`.
         parallel: Whether all MPI ranks work on one cell together.
+        lattice: The cell, "square", "hexagonal", or a rectangle of the sides [a, b]; see
+            `lattice_of`.
     """
 
     z: LevelFunction
@@ -263,10 +266,12 @@ class LevelSetModel(_NamedModel):
     layers: int = 12
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
+    lattice: Arrangement = "square"
 
     def __post_init__(self) -> None:
-        """RefusedError for a mesh size, a number of layers or options that are not allowed."""
+        """RefusedError for a mesh size, layers, options or a lattice that are not allowed."""
         require_prisms(self.mesh_size, self.layers)
+        lattice_of(self.lattice)
         require_petsc(self.petsc)
 
     def moved_problem(self, distribution: object) -> PrismProblem:
@@ -284,7 +289,11 @@ class LevelSetModel(_NamedModel):
         require_distribution(distribution)
         # A mesh without a particle serves all level sets.
         grid = cached_grid(
-            size=self.mesh_size, radius=0.0, layers=self.layers, parallel=self.parallel
+            size=self.mesh_size,
+            radius=0.0,
+            layers=self.layers,
+            parallel=self.parallel,
+            lattice=lattice_of(self.lattice),
         )
         problem = cached_problem(grid, parallel=self.parallel)
         problem.move(LevelSet(cast("ThetaDistribution", distribution), self.z))

@@ -19,7 +19,6 @@ from functools import lru_cache
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.cell.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc, basix, fem, mesh_of, ufl
 from alphacut.rve.mesh.prism_grid import NAMES, PrismGrid
 from alphacut.rve.mesh.wedge import (
@@ -121,8 +120,8 @@ class SliceMesh:
         interpolation: Matrix from nodal values of a layer of prisms to those at the nodes of
             `space`.
         rule: Nodes θ_s and weights w_s of the slices of all layers.
-        areas: Quadrature weights of the points of the cells in their slice, with sum 4 for each
-            slice, shape (layers, cells, points).
+        areas: Quadrature weights of the points of the triangles in their slice, whose sum is the
+            area of the cell, shape (layers, triangles, points).
     """
 
     def __init__(self, grid: PrismGrid) -> None:
@@ -373,7 +372,7 @@ class SliceProblem:
             values[:] = strains.T
             for number, field in enumerate(vectors):
                 values[..., field] += mesh.point_strains(displacements[number, layer])
-            areas = is_phase * mesh.areas[layer] / AREA
+            areas = is_phase * mesh.areas[layer] / mesh.grid.plane.lattice.area
             integrals.add(values, areas, mesh.slices(layer))
         return integrals
 
