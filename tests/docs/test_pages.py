@@ -13,7 +13,7 @@ import pytest
 from tests.alphacut.small import replaced
 
 ROOT = Path(__file__).parents[2]
-DEAR = ("bone", "own_law_and_outline", "product_space_cell", "rock")  # demos
+DEAR = ("bone", "mesh_bounds", "own_law_and_outline", "product_space_cell", "rock")  # demos
 QUICKER = {
     "bone": {"(24, 16, 16)": "(12, 8, 8)"},
     "data": {"range(1000)": "range(20)"},
