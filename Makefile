@@ -5,7 +5,7 @@
 # make benchmarks    numbers that others have published, beside those found here (needs the network)
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make relations   contradictions of problems said otherwise and of cases run otherwise (RELATIONS="--seed 7")
-# make test-wheels    tests of rve, export, report, scenes and matrices of other programs with the newest wheels of PyPI that pyproject.toml allows
+# make test-wheels    tests of rve, export, report, scenes, spectra and matrices of other programs with the newest wheels of PyPI that pyproject.toml allows
 # make findings    what packages of the field do that one would not guess, run anew (needs the network)
 # make docs, make lint    documentation, style and types
 # The environment is made on first use; make clean-env removes it.
@@ -74,6 +74,7 @@ relations:
 	$(IN) python -m benchmarks.relations $(RELATIONS)
 
 WHEELS = build/wheels/bin
+COMPARED = $(PUBLIC_DATA) eurocodepy==2027.0.12
 NEEDS = 'import tomllib; project = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	print(*project["dependencies"], *sum(project["optional-dependencies"].values(), []), sep="\n")'
 
@@ -81,10 +82,11 @@ test-wheels:
 	$(IN) python -m venv --clear build/wheels
 	$(IN) python -c $(NEEDS) > build/wheels/requirements.txt
 	$(IN) $(WHEELS)/pip install --quiet --requirement build/wheels/requirements.txt pyvista
+	$(IN) $(WHEELS)/pip install --quiet --no-deps $(COMPARED)
 	$(IN) $(WHEELS)/pip list
 	$(IN) env PATH=$(CURDIR)/$(WHEELS):/usr/bin:/bin python -m pytest -m "not slow" --timeout 400 $(PYTEST) \
 		tests/rve tests/alphacut/report tests/scenes tests/environment/test_versions.py \
-		tests/frame/structures/test_program_files.py
+		tests/frame/structures/test_program_files.py tests/frame/spectra
 
 findings:
 	@set -e; for finding in findings/*.sh; do echo "$$finding"; $(IN) bash "$$finding"; done

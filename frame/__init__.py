@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from alphacut.frame.analyses.probability import Probability, probability
     from alphacut.frame.analyses.sensitivity import Sensitivity, sensitivity
     from alphacut.frame.analyses.spectral_scaling import ScaledSuite, scale_suite
+    from alphacut.frame.analyses.spectrum_accuracy import SpectrumAccuracy, spectrum_accuracy
+    from alphacut.frame.analyses.spectrum_checks import (
+        SpectrumChecks,
+        drift_sensitivity,
+        spectrum_checks,
+    )
     from alphacut.frame.analyses.spectrum_response import SpectrumResponse, spectrum_response
     from alphacut.frame.analyses.suites import SuitePeaks, over_records
     from alphacut.frame.analyses.tolerances import Tolerances, tolerances
@@ -47,6 +53,7 @@ if TYPE_CHECKING:
     from alphacut.frame.spectra.eurocode8 import eurocode8_spectrum
     from alphacut.frame.spectra.response_spectrum import (
         RotatedSpectra,
+        record_spectrum,
         response_spectrum,
         rotated_spectra,
         spectral_acceleration,
@@ -67,14 +74,15 @@ __all__ = [
     "Identified", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LearnedInputs",
     "Limit", "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter",
     "Peak", "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
-    "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumResponse", "StoreyFrame",
-    "SuitePeaks", "TargetSpectrum", "Tolerances", "UnprovedError", "affine_terms",
-    "asce7_multi_period", "asce7_two_period", "damping_from_loss", "decide", "envelope",
-    "eurocode8_spectrum", "floor_spectrum", "fragility", "identify", "incremental",
-    "learned_envelope", "measured_mode", "over_angles", "over_records", "peaks", "pendulum",
-    "probability", "read_matrix", "read_modes", "read_record", "read_spectrum", "read_suite",
-    "read_unknowns", "require_envelope", "response_spectrum", "rotated_spectra", "scale_suite",
-    "sensitivity", "spectral_acceleration", "spectrum_response", "tolerances",
+    "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumAccuracy", "SpectrumChecks",
+    "SpectrumResponse", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
+    "UnprovedError", "affine_terms", "asce7_multi_period", "asce7_two_period", "damping_from_loss",
+    "decide", "drift_sensitivity", "envelope", "eurocode8_spectrum", "floor_spectrum", "fragility",
+    "identify", "incremental", "learned_envelope", "measured_mode", "over_angles", "over_records",
+    "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
+    "read_suite", "read_unknowns", "record_spectrum", "require_envelope", "response_spectrum",
+    "rotated_spectra", "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_accuracy",
+    "spectrum_checks", "spectrum_response", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -114,6 +122,8 @@ AT_FIRST_USE = {
     "ScaledPeaks": "analyses.incremental",
     "ScaledSuite": "analyses.spectral_scaling",
     "Sensitivity": "analyses.sensitivity",
+    "SpectrumAccuracy": "analyses.spectrum_accuracy",
+    "SpectrumChecks": "analyses.spectrum_checks",
     "SpectrumResponse": "analyses.spectrum_response",
     "StoreyFrame": "structures.storey",
     "SuitePeaks": "analyses.suites",
@@ -125,6 +135,7 @@ AT_FIRST_USE = {
     "asce7_two_period": "spectra.asce7",
     "damping_from_loss": "structures.material_damping",
     "decide": "analyses.decision",
+    "drift_sensitivity": "analyses.spectrum_checks",
     "envelope": "propagation",
     "eurocode8_spectrum": "spectra.eurocode8",
     "floor_spectrum": "analyses.floor_spectrum",
@@ -144,12 +155,15 @@ AT_FIRST_USE = {
     "read_spectrum": "spectra.target",
     "read_suite": "records.suite",
     "read_unknowns": "structures.read_matrix",
+    "record_spectrum": "spectra.response_spectrum",
     "require_envelope": "propagation",
     "response_spectrum": "spectra.response_spectrum",
     "rotated_spectra": "spectra.response_spectrum",
     "scale_suite": "analyses.spectral_scaling",
     "sensitivity": "analyses.sensitivity",
     "spectral_acceleration": "spectra.response_spectrum",
+    "spectrum_accuracy": "analyses.spectrum_accuracy",
+    "spectrum_checks": "analyses.spectrum_checks",
     "spectrum_response": "analyses.spectrum_response",
     "tolerances": "analyses.tolerances",
 }

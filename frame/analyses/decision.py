@@ -281,7 +281,7 @@ def decide(
         decisions[name] = _decide_limit(
             limit,
             found[limit.peak],
-            unit=output_units.get(limit.output) or Output(limit.output).unit,
+            unit=output_units.get(limit.output, Output(limit.output).unit),
             record=records.get(limit.peak, ""),
             input_units=input_units or {},
         )
@@ -335,7 +335,12 @@ def _decide_limit(
         possibility=possibility,
         necessity=necessity,
         margin=Ends(largest_allowed - max_peak.upper, largest_allowed - min_peak.lower),
-        verdict=_verdict(possibility, necessity, lowest_level, is_exceeded=bool(is_exceeded.any())),
+        # Cuts are nested: what holds on the lowest level holds on all.
+        verdict=_verdict(
+            is_excluded=bool(max_peak.upper[0] <= largest_allowed),
+            is_necessary=bool(min_peak.lower[0] > largest_allowed),
+            is_exceeded=bool(is_exceeded.any()),
+        ),
         from_level=lowest_level,
         nature=peak.nature,
         peak=peak,
@@ -378,42 +383,34 @@ def _decide_any(single: Sequence[LimitDecision]) -> LimitDecision:
     # The event leaves the smallest of the margins.
     lower, upper = np.min(margins, axis=0)
     lowest_level = single[0].from_level
-    is_exceeded = any(part.verdict in ("exceeded", "can be exceeded") for part in single)
+    verdicts = [part.verdict for part in single]
     return LimitDecision(
         output=ANY,
         is_event=True,
         possibility=possibility,
         necessity=necessity,
         margin=Ends(lower, upper),
-        verdict=_verdict(possibility, necessity, lowest_level, is_exceeded=is_exceeded),
+        verdict=_verdict(
+            is_excluded=set(verdicts) == {"not exceeded"},
+            is_necessary="exceeded" in verdicts,
+            is_exceeded="can be exceeded" in verdicts,
+        ),
         from_level=lowest_level,
         nature=Nature.weakest(part.nature for part in single),
     )
 
 
-def _verdict(
-    possibility: tuple[float, float],
-    necessity: tuple[float, float],
-    lowest_level: float,
-    *,
-    is_exceeded: bool,
-) -> str:
+def _verdict(*, is_excluded: bool, is_necessary: bool, is_exceeded: bool) -> str:
     """Return the verdict on the cuts from the lowest computed level on, as one of four texts.
 
-    "not exceeded" if no response of these cuts exceeds the limit, "exceeded" if all do, "can be
-    exceeded" if one is known that does, and else "undecided".
-
     Args:
-        possibility: Lower and upper bound of the degree to which exceeding the limit is possible.
-        necessity: Lower and upper bound of the degree to which it is necessary.
-        lowest_level: Lowest level α that was computed.
-        is_exceeded: Whether some response of a cut is known to exceed the limit.
+        is_excluded: Whether no response of these cuts exceeds the limit: "not exceeded".
+        is_necessary: Whether all do: "exceeded".
+        is_exceeded: Whether one is known that does: "can be exceeded"; else it is "undecided".
     """
-    # Nothing is known below the lowest level. If the possibility of exceeding the limit is at most
-    # this level, exceeding it is excluded on this level and on all higher ones.
-    if possibility[1] <= lowest_level:
+    if is_excluded:
         return "not exceeded"
-    if necessity[0] >= 1 - lowest_level:
+    if is_necessary:
         return "exceeded"
     if is_exceeded:
         return "can be exceeded"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, checked_number, require, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
+from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.bounds.spectrum_bounds import Combination, combined_bounds
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -52,13 +54,13 @@ class Modes:
         """Natural periods in s, shape (S, K)."""
         return np.asarray(2 * np.pi / self.omega)
 
-    def peaks(self, spectrum: TargetSpectrum) -> Array:
+    def peaks(self, accelerations: Array) -> Array:
         """Return the peaks of the outputs by each mode, with their signs, shape (S, K, m).
 
-        Raises:
-            RefusedError: A period lies outside the range of the spectrum.
+        Args:
+            accelerations: Spectral pseudo-acceleration of each mode, in m/s², shape (S, K).
         """
-        displacements = spectrum(self.periods) / self.omega**2
+        displacements = accelerations / self.omega**2
         return np.asarray(self.factors * displacements[..., np.newaxis])
 
 
@@ -106,8 +108,13 @@ class Method(Combination):
             factors=(participation[..., np.newaxis] * of_shapes)[:, kept],
         )
 
-    def combined(self, modes: Modes) -> Array:
+    def combined(self, modes: Modes, accelerations: Array | None = None) -> Array:
         """Return the combined peaks of the outputs, shape (S, m).
+
+        Args:
+            modes: The modes.
+            accelerations: Spectral accelerations of the modes in place of those of the spectrum, in
+                m/s², shape (S, K).
 
         Raises:
             RefusedError: A period lies outside the range of the spectrum, or CQC is to take the
@@ -121,7 +128,9 @@ class Method(Combination):
             allowed = "above 0 for CQC, as two modes without damping are correlated in no way"
             require(bool((ratios > 0).all()), "damping ratio", f"{ratios.min():g}", allowed)
             correlations = correlation(modes.omega, ratios)
-        return combined_peaks(modes.peaks(self.spectrum), correlations)
+        if accelerations is None:
+            accelerations = self.spectrum(modes.periods)
+        return combined_peaks(modes.peaks(accelerations), correlations)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -135,14 +144,17 @@ class SpectrumResponse(Answer):
         outputs: Names of the outputs.
         units: SI unit of each output.
         nominal: Combined peaks at the nominal inputs, shape (outputs,).
+        nominal_inputs: The nominal inputs by name, in SI units.
         attained: The smallest and the largest combined peak of each cut that some inputs have,
             shape (levels, outputs, 2).
+        attained_at: The inputs that have them on the lowest level, in SI units, shape
+            (outputs, 2, inputs).
         proved: Guaranteed bounds of the combined peaks of each cut, the same shape; 0 and ∞ where
             none are found.
         unproved: Why some bounds are not found; empty if all are.
     """
 
-    key = "spectrum_response"
+    key = "response_spectrum"
     title = "Which peaks does the response spectrum give?"
     method: Method
     alpha: Array
@@ -150,15 +162,48 @@ class SpectrumResponse(Answer):
     outputs: tuple[str, ...]
     units: tuple[str, ...]
     nominal: Array
+    nominal_inputs: dict[str, float]
     attained: Array
+    attained_at: Array
     proved: Array
     unproved: str = ""
 
     @property
     def modal_peaks(self) -> dict[str, Array]:
         """Peaks of each output by its modes at the nominal inputs, with their signs, (modes,)."""
-        peaks = self.modes.peaks(self.method.spectrum)[0]
+        peaks = self.modes.peaks(self.method.spectrum(self.modes.periods))[0]
         return dict(zip(self.outputs, peaks.T, strict=True))
+
+    def peak(self, output: str, side: Literal["", "min"] = "", factor: float = 1.0) -> Peak:
+        """Return the range of a combined peak as limits of outputs take it.
+
+        Args:
+            output: Name of the output.
+            side: "" if the peak must not be too large, "min" if it must not be too small.
+            factor: What the peak is multiplied by.
+
+        Raises:
+            ValueError: There is no such output.
+        """
+        k = self.outputs.index(output)
+        proved = factor * self.proved[:, k].T
+        attained = factor * self.attained[:, k].T
+        near, far = (1, 0) if side else (0, 1)
+        farthest_at = self.attained_at[k, far].tolist()
+        is_proved = bool(np.isfinite(proved).all())
+        ends = proved if is_proved else attained
+        return Peak(
+            alpha=self.alpha,
+            lower=ends[0],
+            upper=ends[1],
+            error=np.zeros(len(self.alpha)),
+            reached=attained[far],
+            least_lower=proved[near],
+            least_upper=attained[near],
+            nature=Nature.GUARANTEED if is_proved else Nature.ATTAINED,
+            side=side,
+            reached_at=dict(zip(self.nominal_inputs, farthest_at, strict=True)),
+        )
 
     @property
     def sufficient_modes(self) -> int | None:
@@ -179,7 +224,6 @@ class SpectrumResponse(Answer):
         """
         modes = self.modes
         sums = np.cumsum(modes.mass_fractions[0])
-        peaks = modes.peaks(self.method.spectrum)[0]
         rows = []
         for k, period in enumerate(modes.periods[0]):
             row = {
@@ -189,8 +233,8 @@ class SpectrumResponse(Answer):
                 "mass": percent_text(float(modes.mass_fractions[0, k])),
                 "sum": percent_text(float(sums[k])),
             }
-            for name, unit, peak in zip(self.outputs, self.units, peaks[k], strict=True):
-                row[name] = engineering(float(peak), unit)
+            for (name, peaks), unit in zip(self.modal_peaks.items(), self.units, strict=True):
+                row[name] = engineering(float(peaks[k]), unit)
             rows.append(row)
         return table_of(rows)
 
@@ -278,8 +322,7 @@ def spectrum_response(
     Args:
         structure: A linear structure. Its own base excitation and loads are not used.
         inputs: Fuzzy parameters by name, in SI units; a number is a crisp one.
-        spectrum: Pseudo-acceleration over the period. That of a record is
-            `TargetSpectrum(periods, response_spectrum(record, periods))`.
+        spectrum: Pseudo-acceleration over the period; that of a record is `record_spectrum`.
         combination: "CQC" or "SRSS".
         modes: Number of the lowest modes that are combined; all unless given.
         own_ratios: Whether CQC takes the damping ratio of each mode of the structure; else that
@@ -312,7 +355,7 @@ def spectrum_response(
     method = Method(spectrum, combination, modes, own_ratios)
     cuts = boxes(inputs, alpha)
     nominal_modes = method.modes_at(structure, cuts.names, cuts.nominal[np.newaxis])
-    attained = _attained(structure, cuts, method)
+    attained, attained_at = _attained(structure, cuts, method)
     proved, unproved = _proved(structure, cuts, method, attained)
     return SpectrumResponse(
         method=method,
@@ -321,17 +364,23 @@ def spectrum_response(
         outputs=tuple(map(str, structure.outputs)),
         units=tuple(structure.unit_of(name) for name in structure.outputs),
         nominal=method.combined(nominal_modes)[0],
+        nominal_inputs=dict(zip(cuts.names, map(float, cuts.nominal), strict=True)),
         attained=attained,
+        attained_at=attained_at,
         proved=proved,
         unproved=unproved,
     )
 
 
-def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> Array:
-    """Return the smallest and largest combined peaks found in each cut, (levels, outputs, 2).
+def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> tuple[Array, Array]:
+    """Return the smallest and largest combined peaks found in each cut, and where.
 
     They are those at the nominal inputs, at corners of the cut and at points inside. What a
     narrower cut attains is attained in the wider ones, too.
+
+    Returns:
+        The peaks, shape (levels, outputs, 2), and the inputs that have those of the lowest level,
+        shape (outputs, 2, inputs).
     """
     d = len(cuts.names)
     inside = quasi_random_points(d, SAMPLES)
@@ -339,13 +388,19 @@ def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> Array:
     if d <= CORNER_INPUTS:
         ends = corners(np.zeros(d), np.ones(d))
     fractions = np.vstack([inside, ends])
-    found = []
+    points = []
+    peaks = []
     for low, high in zip(cuts.lower, cuts.upper, strict=True):
-        points = np.vstack([cuts.nominal, np.clip(low + (high - low) * fractions, low, high)])
-        peaks = method.combined(method.modes_at(structure, cuts.names, points))
-        found.append(np.stack([-peaks.min(axis=0), peaks.max(axis=0)], axis=-1))
-    widest = np.maximum.accumulate(found[::-1])[::-1]
-    return np.asarray(widest * [-1.0, 1.0])
+        in_cut = np.clip(low + (high - low) * fractions, low, high)
+        points.append(np.vstack([cuts.nominal, in_cut]))
+        peaks.append(method.combined(method.modes_at(structure, cuts.names, points[-1])))
+    # Those of a level are over its own points and those of all higher levels.
+    smallest = np.minimum.accumulate([x.min(axis=0) for x in peaks[::-1]])[::-1]
+    largest = np.maximum.accumulate([x.max(axis=0) for x in peaks[::-1]])[::-1]
+    everywhere = np.vstack(peaks)
+    first = [everywhere.argmin(axis=0), everywhere.argmax(axis=0)]
+    at = np.vstack(points)[np.stack(first, axis=-1)]
+    return np.stack([smallest, largest], axis=-1), at
 
 
 def _proved(

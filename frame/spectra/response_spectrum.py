@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_numbers
 from alphacut.frame.records.history import Accelerogram
+from alphacut.frame.spectra.target import TargetSpectrum
 
 Complex = NDArray[np.complex128]
 READINGS = 40
@@ -21,26 +22,31 @@ MIN_PERIOD = 1e-3
 """Shortest period above 0, in s: the time rises as the step of the record over the period."""
 
 
-def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float = 0.05) -> Array:
+def response_spectrum(
+    ground: Accelerogram, periods: ArrayLike, damping: float = 0.05, *, readings: int = READINGS
+) -> Array:
     """Return the spectral pseudo-acceleration Sa = ω² max |u| of a record at many periods.
 
     The displacement u of a linear oscillator relative to the ground follows from
     u'' + 2 ζ ω u' + ω² u = -a(t), from rest. It is computed exactly for the piecewise linear record
     a(t) (Nigam, Jennings 1969), and one period of free vibration after the record is included. The
-    peak is read at 40 or more times a period, which misses at most 0.3 % of it.
+    peak is read at 40 or more times a period, which misses at most 0.3 % of it, and at the times of
+    all samples.
 
     Args:
         ground: Ground acceleration a(t), of which the samples count alone.
         periods: Undamped natural periods 2π/ω, in s, in any order and shape. At the period 0 the
             spectrum is the largest ground acceleration.
         damping: Damping ratio ζ, from 0 to 0.999.
+        readings: Least number n of readings in a period; the peak is too low by at most
+            1 - cos(π / n). With 0 it is read at the times of the samples alone, as by programs that
+            step through the record.
 
     Returns:
         Sa in m/s², in the shape of the periods.
 
     Raises:
-        RefusedError: A period is neither 0 nor from 0.001 s on, or the damping ratio is not such a
-            number.
+        RefusedError: A period is neither 0 nor from 0.001 s on, or another number is not as said.
 
     Example:
         >>> from alphacut.frame import Accelerogram, response_spectrum
@@ -49,15 +55,49 @@ def response_spectrum(ground: Accelerogram, periods: ArrayLike, damping: float =
         [3.0, 1.69, 0.17]
     """
     ratio = checked_number("damping", damping, least=0, most=0.999)
+    checked_number("readings", readings, least=0, whole=True)
     shaped = checked_periods(periods)
     oscillates = shaped != 0
     positive = shaped[oscillates]
     found = np.full(shaped.shape, ground.extremes[0])
     largest = np.zeros(len(positive))
-    for k, values in _pseudo_accelerations(ground, positive, ratio):
+    for k, values in _pseudo_accelerations(ground, positive, ratio, readings):
         largest[k] = max(largest[k], np.abs(values).max())
     found[oscillates] = largest
     return found
+
+
+def record_spectrum(
+    ground: Accelerogram, periods: ArrayLike, damping: float = 0.05, *, at_samples: bool = False
+) -> TargetSpectrum:
+    """Return the spectrum of a record for the response-spectrum method, linear between periods.
+
+    Args:
+        ground: Ground acceleration.
+        periods: Rising natural periods in s, two or more, such as those of the modes.
+        damping: Damping ratio ζ, from 0 to 0.999.
+        at_samples: Whether peaks are those at the times of the samples, as many programs and
+            textbooks take them. Else they are those at all times, too low by at most 1.3e-6.
+
+    Returns:
+        Pseudo-accelerations; the name says which kind of peaks they have.
+
+    Raises:
+        RefusedError: The periods do not rise or are fewer than two, or `response_spectrum` refuses
+            a number.
+    """
+    peaks = "at all times"
+    readings = 2000
+    if at_samples:
+        peaks = "at the record's instants"
+        readings = 0
+    return TargetSpectrum(
+        np.asarray(periods, float),
+        response_spectrum(ground, periods, damping, readings=readings),
+        name=f"spectrum of {ground.name or 'a record'}, peaks {peaks}",
+        clause=f"samples every {ground.step:g} s",
+        damping=damping,
+    )
 
 
 def checked_periods(periods: ArrayLike) -> Array:
@@ -187,9 +227,9 @@ class _Readings(NamedTuple):
 
 
 def _pseudo_accelerations(
-    ground: Accelerogram, periods: Array, ratio: float
+    ground: Accelerogram, periods: Array, ratio: float, readings: int = READINGS
 ) -> Iterator[_Readings]:
-    """Yield ω² u of oscillators with positive periods, at `READINGS` times a period or more.
+    """Yield ω² u of oscillators with positive periods, at samples and `readings` times a period.
 
     Oscillators and times follow in an order that depends on the step and the length of the record,
     the periods and the ratio alone.
@@ -213,7 +253,7 @@ def _pseudo_accelerations(
 
     scale = omega**2 / roots.imag
     for k, period in enumerate(periods):
-        substeps = int(np.ceil(READINGS * step / period))
+        substeps = max(1, int(np.ceil(readings * step / period)))
         for j in range(1, substeps + 1):
             part = _Advance.of(roots[[k]], j / substeps * step, step)
             inside = part.decay * states[:, k] - part.constant * starts - part.ramp * differences
