@@ -185,6 +185,12 @@ class CellContent(Section, defer_build=True):
         require_alone("radius", has_radius and is_computed, "stage microstructure")
         require_alone("radius", has_radius and has_fraction, "cell.fraction")
         require_alone("cell.fraction", has_fraction and is_computed, "stage microstructure")
+        if is_computed and self.particle_cell is not None:
+            # The radius of a particle is there over half the side of a square as large as its cell.
+            lattice = self.particle_cell.lattice
+            allowed = "square beside stage microstructure"
+            cure = "give [radius] or cell.fraction for other arrays"
+            require(lattice == "square", "cell.lattice", lattice, allowed, cure)
         # A model that cannot solve this cell is refused here, and not after the stages before it.
         if self.cell is not None:
             method = self.modulus.method

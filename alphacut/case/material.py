@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar, Literal, cast
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+import numpy as np
+from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag
 
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.types import (
@@ -29,6 +31,7 @@ from alphacut.case.types import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.cell.cell import Phase, VoigtPhase
+from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID
 from alphacut.rve.models import MODELS, fitting_models
@@ -195,6 +198,17 @@ SHAPES = (
 LOSSES = "matrix_loss", "inclusion_loss"
 
 
+def known_lattice(arrangement: Any) -> Arrangement:
+    """Return an arrangement of fibres that there is, an array as tuple, or refuse another one."""
+    try:
+        lattice_of(arrangement)
+    except RefusedError as error:
+        raise RefusedError("", arrangement, error.allowed, error.cure) from None
+    if isinstance(arrangement, list):
+        return tuple(arrangement)
+    return cast("Arrangement", arrangement)
+
+
 class RoundCell(Section):
     """The two elastic phases of the periodic cell, and the shape of its particle."""
 
@@ -202,6 +216,10 @@ class RoundCell(Section):
         default="cylinders",
         description=f"{SHAPES}; cylinders and ellipses in plane strain, spheres in a cubic array",
     )
+    lattice: Annotated[Arrangement, PlainValidator(known_lattice)] = "square"
+    """arrangement of fibres: "square", "hexagonal" (two neighbours along x), or the sides [a, b] of
+    a rectangle along x and y, whose ratio counts. Radii are over half the distance of the nearest
+    fibres"""
     matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
     matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
     inclusion_modulus: ModulusOrStiffness
@@ -214,8 +232,8 @@ class RoundCell(Section):
     inclusion_loss: Loss | None = None
     """loss factor of the particle's stiffness"""
     fraction: Radius | None = None
-    """area fraction, below π/4, or volume fraction of spheres, below π/6, of particles of one
-    size; in place of [radius]"""
+    """area fraction, below π/4 (in a hexagonal array π/√12), or volume fraction of spheres, below
+    π/6, of particles of one size; in place of [radius]"""
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
@@ -284,8 +302,10 @@ class RoundCell(Section):
 
     @property
     def shape(self) -> Shape:
-        """Kind of the particles, discs across fibres."""
-        return SPHERES if self.particles == "spheres" else DISCS
+        """Kind of the particles, discs across fibres, and how much of the cell they fill."""
+        if self.particles == "spheres":
+            return SPHERES
+        return replace(DISCS, factor=np.pi / lattice_of(self.lattice).area)
 
     @property
     def fraction_map(self) -> FractionMap | None:
@@ -327,12 +347,15 @@ class RoundCell(Section):
         is_solved = is_isotropic or self.particles != "spheres"
         allowed = "Young's modulus of spheres"
         require(is_solved, "cell.inclusion_modulus", "a plane stiffness", allowed)
-        # Let r be the radius divided by half the side of the cell. The largest coordinate on the
-        # outline is R r, with R = reach(outline). The particle touches the next cell at R r = 1,
-        # and would overlap its image beyond.
+        has_lattice = self.particles != "spheres" or self.lattice == "square"
+        require(has_lattice, "cell.lattice", self.lattice, '"square", the cubic array of spheres')
+        # Let r be the radius divided by half the side of the cell. The largest side coordinate on
+        # the outline, which is 1 at the sides, is R r, with R = reach(outline). The particle
+        # touches the next cell at R r = 1, and would overlap its image beyond.
         if self.fraction is not None:
             largest = self.fraction.support.upper
-            touching = float(self.shape.fractions(1 / reach(outline)))
+            widest = 1 / reach(outline, lattice_of(self.lattice))
+            touching = float(self.shape.fractions(widest))
             allowed = f"values below {touching:.6g}, where particles touch"
             require(largest < touching, "cell.fraction", f"{largest:g}", allowed)
         # A missing loss is not taken as 0: the loss of the cell would be too small unnoticed.

@@ -113,7 +113,8 @@ def export(problem: CellProblem, path: Path) -> Document:
         fields = MeshModel(mesh.file).fields(theta, cell.nominal_phases)
     else:
         nominal = problem.nominal
-        model = PrismModel(mesh.size, mesh.layers, outline=nominal.outline)
+        outline = nominal.outline
+        model = PrismModel(mesh.size, mesh.layers, outline=outline, lattice=cell.lattice)
         fields = model.fields(nominal.radius_map, nominal.matrix, [nominal.inclusion])
     with whole_file(path) as partial:
         nodes = fields.write(partial)

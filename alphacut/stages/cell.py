@@ -19,6 +19,7 @@ from alphacut.case.material import (
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import missing
 from alphacut.rve.cell.cell import Cell, Phase, Phases
+from alphacut.rve.cell.lattice import lattice_of
 from alphacut.rve.cell.outline import circle
 from alphacut.rve.models import fitting_models
 from alphacut.rve.result.cell_model import AnyModel, Resolution
@@ -122,7 +123,8 @@ class CellProblem:
         assert isinstance(self.cell, RoundCell)  # a mesh from a file may have any number of phases
         matrix, inclusion = self.cell.nominal_phases
         radius = cast("RadiusMap", self.nominal_radius)
-        return Cell(matrix, inclusion, radius, self.cell.outline or circle)
+        lattice = lattice_of(self.cell.lattice)
+        return Cell(matrix, inclusion, radius, self.cell.outline or circle, lattice)
 
     @property
     def average(self) -> str | None:
@@ -189,6 +191,7 @@ class CellProblem:
             mesh_size=self.mesh.size,
             layers=self.mesh.layers,
             outline=cell.outline or circle,
+            lattice=cell.lattice,
             # The average along the axes takes C11 + C12 and C33: C11 − C12 need not be solved for.
             whole_stiffness=self.average != AXES,
             energies=bool(cell.losses),

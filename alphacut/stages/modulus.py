@@ -218,6 +218,7 @@ def identity(problem: CellProblem) -> Document:
         "mesh_file": problem.mesh.file and file_digest(problem.mesh.file),
         "petsc": dict(problem.petsc),
         "particles": cell.particles,
+        "lattice": repr(getattr(cell, "lattice", None)),
         "inputs": {name: repr(x) for name, x in problem.numbers.items()},
         "theta": repr(getattr(problem.nominal_radius, "distribution", problem.nominal_radius)),
         "stiffness": repr(cell.model_dump(include={"inclusion_modulus", "phases"})),
