@@ -508,7 +508,7 @@ class Mesh(Section):
     """Discretisation of the product domain."""
 
     file: CaseFile | None = None
-    """mesh of Gmsh, prisms of 15 nodes over a parallelogram and θ, in place of size and
+    """mesh of Gmsh, prisms of 15 nodes over a parallelogram or hexagon and θ, in place of size and
     layers; its physical groups are the phases of [cell.phases]"""
     refine: bool = False
     """whether to refine the mesh of a file once, for a declared error"""

@@ -148,7 +148,7 @@ class MeshModel(_NamedModel):
     is that of the geometry that the file has.
 
     Args:
-        file: File of Gmsh; its cell is a parallelogram of any size and place.
+        file: File of Gmsh; its cell is a parallelogram or regular hexagon of any size and place.
         refine: Whether to refine the mesh once, for a declared error.
         petsc: PETSc options without their prefix `rve_`.
         parallel: Whether all MPI ranks work on one cell together.

@@ -159,6 +159,11 @@ def test_an_exported_hexagon_is_solved_as_a_mesh_of_one_s_own(tmp_path):
     [own] = model.solve(RISING, SOFT, [HARD])
     scale = own.stiffness[0, 0]
     np.testing.assert_allclose(found.stiffness, own.stiffness, rtol=0, atol=1e-9 * scale)
+    phases = {"matrix": SOFT, "inclusion": HARD}
+    bounds = exported.bounds(TruncatedNormal(), phases)
+    [finer] = MeshModel(tmp_path / "hexagon.msh", refine=True).solve(TruncatedNormal(), phases)
+    assert np.linalg.eigvalsh(bounds.upper - finer.stiffness)[0] > 0
+    assert np.linalg.eigvalsh(finer.stiffness - bounds.lower)[0] > 0
     lattice = read_grid(tmp_path / "hexagon.msh").plane.lattice
     np.testing.assert_allclose(
         lattice.half_vectors, lattice_of("hexagonal").half_vectors, atol=1e-8
