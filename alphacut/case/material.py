@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag
@@ -198,15 +198,14 @@ SHAPES = (
 LOSSES = "matrix_loss", "inclusion_loss"
 
 
-def known_lattice(arrangement: Any) -> Arrangement:
+def known_lattice(value: object) -> Arrangement:
     """Return an arrangement of fibres that there is, an array as tuple, or refuse another one."""
+    arrangement = cast("Arrangement", tuple(value) if isinstance(value, list) else value)
     try:
         lattice_of(arrangement)
     except RefusedError as error:
-        raise RefusedError("", arrangement, error.allowed, error.cure) from None
-    if isinstance(arrangement, list):
-        return tuple(arrangement)
-    return cast("Arrangement", arrangement)
+        raise RefusedError("", value, error.allowed, error.cure) from None
+    return arrangement
 
 
 class RoundCell(Section):
