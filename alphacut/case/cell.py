@@ -219,3 +219,4 @@ class CellCase(CellContent):
     decision: object = None
     tolerances: object = None
     fragility: object = None
+    floor_spectrum: object = None

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.cell import CellContent
+from alphacut.case.floors import FloorSpectrumSection
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
@@ -40,6 +41,7 @@ class Content(CellContent):
     decision: AtFirstUse[DecisionSection] | None = None
     tolerances: AtFirstUse[TolerancesSection] | None = None
     fragility: AtFirstUse[FragilitySection] | None = None
+    floor_spectrum: AtFirstUse[FloorSpectrumSection] | None = None
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
@@ -56,6 +58,14 @@ class Content(CellContent):
                 if self.structure is not None:
                     questions[section.key] = section.with_storeys(self.structure)
         return questions
+
+    @property
+    def answered(self) -> dict[str, QuestionSection | FloorSpectrumSection]:
+        """Return the sections that ask for an answer by key: the questions, and floor spectra."""
+        answered: dict[str, QuestionSection | FloorSpectrumSection] = dict(self.questions)
+        if self.floor_spectrum is not None:
+            answered[self.floor_spectrum.key] = self.floor_spectrum
+        return answered
 
     @property
     def incremental_question(self) -> FragilitySection | None:
@@ -201,8 +211,8 @@ class Content(CellContent):
 
         Refused are an accelerogram of the structure, a structure that no ground motion moves,
         components that are not those of the structure, and the sections [probability],
-        [tolerances], [identify] and [[study]]. They ask about one response, while a suite has one
-        for each record.
+        [tolerances], [floor_spectrum], [identify] and [[study]]. They ask about one response, while
+        a suite has one for each record.
 
         Args:
             records: The section; the case has it.
@@ -217,7 +227,7 @@ class Content(CellContent):
             section.require_pattern()
             self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
-        for key in ("probability", "tolerances", "identify", "study"):
+        for key in ("probability", "tolerances", "floor_spectrum", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
 
@@ -300,7 +310,7 @@ class Content(CellContent):
             names.append(study.name)
         has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
-        for section in self.questions.values():
+        for section in self.answered.values():
             section.require_answerable(structure)
         if self.identify is not None:
             is_framed = structure.model.floors > 0

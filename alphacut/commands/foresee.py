@@ -21,7 +21,7 @@ from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.pieces import Foreseen, pieces_of, sample_count
-from alphacut.frame import Probability
+from alphacut.frame import FloorSpectrum, Probability
 from alphacut.frame import envelope as frame_envelope
 from alphacut.frame.analyses.peaks import PEAK_ERROR
 from alphacut.frame.analyses.tolerances import scale_supports
@@ -440,7 +440,7 @@ def _records(
 def _answers(
     content: Content, structure: Structure, task: EnvelopeTask, pieces: Mapping[str, Foreseen]
 ) -> Iterator[Foreseen]:
-    """Yield what the questions [probability] and [tolerances] will take.
+    """Yield what [probability], [floor_spectrum] and [tolerances] will take.
 
     They compute responses of their own; all others follow from known peaks.
 
@@ -457,6 +457,9 @@ def _answers(
     if (section := content.questions.get("probability")) is not None:
         stage = answers.stage(Probability, section, Response(structure, task))
         yield pieces["probability"]._replace(seconds=begun_seconds(stage))
+    if content.floor_spectrum is not None:
+        floors = answers.stage(FloorSpectrum, content.floor_spectrum, Response(structure, task))
+        yield pieces["floor_spectrum"]._replace(seconds=begun_seconds(floors))
     if (section := content.questions.get("tolerances")) is not None:
         assert content.tolerances is not None
         # The largest scale is the widest box, whose envelope takes longest.

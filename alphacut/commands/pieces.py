@@ -67,6 +67,8 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     yield Foreseen("envelopes", len(studies), "studies")
     if "probability" in content.questions:
         yield Foreseen("probability", 1, "campaigns")
+    if content.floor_spectrum is not None:
+        yield Foreseen("floor_spectrum", len(content.floor_spectrum.all_periods), "periods")
     if "tolerances" in content.questions:
         # Two scales are tried first, then the interval between them is halved until it is a
         # hundredth of what it was.

@@ -172,7 +172,7 @@ class Pipeline:
             kinds += of_record * len(content.records.suite)
         elif "envelope" in content.stages:
             kinds += ["envelope"] * max(1, len(content.study))
-        kinds += content.questions
+        kinds += content.answered
         if content.shares:
             kinds.append("shares")
         if self.figures:
@@ -260,7 +260,7 @@ class Pipeline:
             peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
             response = Response(structure, task, peaks)
         for kind in ANSWERS:
-            if (question := content.questions.get(kind.key)) is not None:
+            if (question := content.answered.get(kind.key)) is not None:
                 stage = answers.stage(kind, question, response)
                 results.answers[kind.key] = self.store.take(stage).numbers
 

@@ -20,6 +20,7 @@ from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, WIDTH, Look
 from alphacut.frame import (
     Decision,
+    FloorSpectrum,
     Fragility,
     LearnedInputs,
     Probability,
@@ -327,6 +328,39 @@ def draw_spectra(scaled: ScaledSuite) -> Figure:
     return figure
 
 
+def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
+    """Draw the floor spectra over the period: bounds, attained values and the nominal curve.
+
+    Each floor has a panel. Bounds on each level are lines, down to which the nominal curve is
+    filled; guaranteed ones are solid. Attained values on the lowest level are dots.
+
+    Args:
+        answer: Floor spectra, of one level at least.
+    """
+    size = WIDTH, 0.6 + 2.6 * len(answer.outputs)
+    figure, panels = plt.subplots(len(answer.outputs), sharex=True, squeeze=False, figsize=size)
+    order = np.argsort(answer.periods)
+    periods = answer.periods[order]
+    colours = colormaps["viridis_r"](np.linspace(0.25, 0.85, len(answer.alpha)))
+    for k, axes in enumerate(panels[:, 0]):
+        nominal = answer.nominal[k, order] / STANDARD_GRAVITY
+        bounds = answer.bound[:, k, order] / STANDARD_GRAVITY
+        for alpha, bound, colour in zip(answer.alpha, bounds, colours, strict=True):
+            axes.fill_between(periods, nominal, bound, color=colour, alpha=0.15, lw=0)
+            axes.plot(periods, bound, color=colour, lw=1.2, label=f"bound, α = {alpha:g}")
+        attained = answer.attained[0, k, order] / STANDARD_GRAVITY
+        label = f"attained, α = {answer.alpha[0]:g}"
+        axes.plot(periods, attained, color=ORANGE, ls="none", marker="o", ms=3, label=label)
+        axes.plot(periods, nominal, color=INK, lw=1.2, label="nominal")
+        natures = " and ".join(dict.fromkeys(map(str, answer.natures[k])))
+        title = f"{answer.outputs[k]}, ζ = {answer.damping:.3g}; {natures} bounds"
+        axes.set(title=title, ylim=(0.0, None), xlim=(0.0, None))
+        axes.set_ylabel("floor spectrum Sa (g)")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.set_xlabel("period T (s)")
+    return figure
+
+
 def draw_incremental(answer: Fragility) -> Figure:
     """Draw the smallest and the largest peak found over the intensity measure of each record.
 
@@ -385,5 +419,6 @@ DRAWINGS: dict[str, Callable[[Any], Figure]] = {
     "decision": draw_decision,
     "tolerances": draw_tolerances,
     "fragility": draw_fragility,
+    "floor_spectrum": draw_floor_spectrum,
 }
 """Function that draws the answer to each question, by the question's key."""

@@ -21,7 +21,7 @@ from alphacut.base.number_text import (
     range_text,
     text_table,
 )
-from alphacut.frame import Peak, SuitePeaks, Tolerances
+from alphacut.frame import FloorSpectrum, Peak, SuitePeaks, Tolerances
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
@@ -576,7 +576,8 @@ def answers(parts: Parts) -> list[Row]:
 
     Returns:
         Rows of what is answered, the answer, and its guarantee, in the order of the report. The
-        admissible ranges of the inputs, of which a case may have many, share one row.
+        admissible ranges of the inputs, of which a case may have many, share one row. Of floor
+        spectra there is the largest value of each floor.
     """
     rows: list[Row] = []
     for answer in parts.answers:
@@ -587,6 +588,8 @@ def answers(parts: Parts) -> list[Row]:
             count = len(answer_rows) - 1  # one row for each input
             place = "table on the page and in tolerances.csv"
             answer_rows = [scale, ("ranges", f"of {count} inputs", place)]
+        if isinstance(answer, FloorSpectrum):
+            answer_rows = [answer_rows[k] for k in answer.largest_rows]
         for row in answer_rows:
             rows.append((f"{answer.key}: {row[0]}", row[1], row[2]))
     return rows

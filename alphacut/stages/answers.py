@@ -9,21 +9,24 @@ from typing import Any, TypedDict
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.progress_bar import Progress
+from alphacut.case.floors import FloorSpectrumSection
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
     ProbabilitySection,
-    QuestionSection,
     TolerancesSection,
 )
 from alphacut.case.structure import Structure
+from alphacut.case.types import Section
 from alphacut.frame import (
     Decision,
+    FloorSpectrum,
     Fragility,
     Probability,
     SuitePeaks,
     Tolerances,
     decide,
+    floor_spectrum,
     probability,
     tolerances,
 )
@@ -185,16 +188,44 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
     )
 
 
+def floor_spectra(
+    section: FloorSpectrumSection, response: Response, tick: Progress
+) -> FloorSpectrum:
+    """Return the answer to [floor_spectrum]: bounds of the spectra of floors.
+
+    Args:
+        section: Its accelerations, periods and damping ratio.
+        response: The structure, and the inputs, α-levels, duration and time step of its response.
+            Its peaks are not used.
+        tick: Called with the completed fraction of the work.
+
+    Raises:
+        RefusedError: The structure has no such spectra.
+        FailedError: A response could not be computed.
+    """
+    return floor_spectrum(
+        response.structure.model,
+        response.inputs,
+        section.outputs,
+        section.all_periods,
+        section.damping,
+        **response.times,
+        alpha=response.task.section.alpha,
+        progress=tick,
+    )
+
+
 ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
     Probability: probability_of,
     Decision: decision,
     Tolerances: tolerances_of,
     Fragility: fragility_answer,
+    FloorSpectrum: floor_spectra,
 }
 """Kinds of answers in the order of the report, each with its function of section and response."""
 
 
-def stage(kind: type[Answer], section: QuestionSection, response: Response) -> Stage[Answer]:
+def stage(kind: type[Answer], section: Section, response: Response) -> Stage[Answer]:
     """Return the stage of the answer of a kind to the question of a section."""
     # Answers are kept in the units and words of this package, so that its source counts as well.
     compute = partial(_computed, kind, section, response)
@@ -203,7 +234,7 @@ def stage(kind: type[Answer], section: QuestionSection, response: Response) -> S
 
 
 def _computed(
-    kind: type[Answer], section: QuestionSection, response: Response, context: StageContext
+    kind: type[Answer], section: Section, response: Response, context: StageContext
 ) -> StageResult[Answer]:
     """Answer the question of a section, reporting progress to the context."""
     return StageResult(ANSWERS[kind](section, response, context.tick))

@@ -15,6 +15,7 @@ from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.frame import (
     Decision,
+    FloorSpectrum,
     Fragility,
     LearnedInputs,
     Probability,
@@ -168,6 +169,7 @@ class Parts:
     decision: Decision | None = None
     tolerances: Tolerances | None = None
     fragility: Fragility | None = None
+    floor_spectrum: FloorSpectrum | None = None
     shares: ShareTable = field(default_factory=dict)
 
     @classmethod

@@ -75,7 +75,7 @@ class FloorSpectrum(Answer):
     def table(self) -> Table:
         """Return a table of texts with a row for each output and period, at the lowest level.
 
-        The columns are output and period, the bound, its guarantee, the attained value, and the
+        The columns are output with period, the bound, its guarantee, the attained value, and the
         value at the nominal inputs.
         """
         rows = []
@@ -85,10 +85,9 @@ class FloorSpectrum(Answer):
                 _, bound = rounded_ends(0.0, float(self.bound[0, k, p]), nature)
                 attained = float(self.attained[0, k, p])
                 row = {
-                    "floor": name,
+                    "spectrum of": f"{name}, T = {period:.4g} s",
                     f"Sa at α = {self.alpha[0]:g}": "not bounded",
                     "nature": self.nature_text(nature),
-                    "T": engineering(period, "s"),
                     "reached": "not known",
                     "nominal": engineering(float(self.nominal[k, p]), "m/s^2"),
                 }
@@ -98,6 +97,12 @@ class FloorSpectrum(Answer):
                     row["reached"] = engineering(attained, "m/s^2")
                 rows.append(row)
         return table_of(rows)
+
+    @property
+    def largest_rows(self) -> list[int]:
+        """Numbers of the rows of `table` with the largest bound of each output, from 0 on."""
+        count = len(self.periods)
+        return [k * count + int(self.bound[0, k].argmax()) for k in range(len(self.outputs))]
 
     def records(self) -> list[Record]:
         """Return a row for each output, level and period, in s and m/s²; None where unknown."""
@@ -184,7 +189,7 @@ def floor_spectrum(
     require(len(shaped) > 0, "periods", None, "one period or more")
     ratio = checked_number("damping", damping, least=0, most=0.999)
     cuts = boxes(inputs, alpha)
-    system = _observed(structure, names, cuts)
+    system = observed_accelerations(structure, names, inputs)
     floor = _Floor.of(system, cuts, ratio, duration=duration, step=step, error=error)
     columns: list[_Column] = []
     with progress_reporter(progress) as report:
@@ -207,8 +212,15 @@ def floor_spectrum(
     )
 
 
-def _observed(structure: StructureModel, names: Sequence[str], cuts: Boxes) -> LinearSystem:
-    """Return the structure with some absolute accelerations as its outputs.
+def observed_accelerations(
+    structure: StructureModel, outputs: Sequence[str], inputs: Mapping[str, FuzzyNumber | float]
+) -> LinearSystem:
+    """Return a structure with some absolute accelerations as its outputs.
+
+    Args:
+        structure: The structure.
+        outputs: Names of the accelerations.
+        inputs: Fuzzy parameters by name; without them the nominal ones are looked at.
 
     Raises:
         RefusedError: It is not linear, not at rest, under forces, or not moved by a record from
@@ -226,12 +238,16 @@ def _observed(structure: StructureModel, names: Sequence[str], cuts: Boxes) -> L
     require(is_plain, "ground", "a record that starts late, is held or has a sine", allowed)
     allowed = "one accelerogram of the ground alone"
     require(not structure.loads, "loads", f"{len(structure.loads)} forces", allowed)
-    system = structure.with_outputs(names)
-    values = dict(system.parameters) | dict(zip(cuts.names, cuts.probes.T, strict=True))
-    count = len(cuts.probes)
-    assembly = system.assembly(
-        {name: Jet.constant(np.full(count, value), 0) for name, value in values.items()}
-    )
+    system = structure.with_outputs(outputs)
+    points = {"": np.zeros(1)}
+    if inputs:
+        cuts = boxes(inputs)
+        points = dict(zip(cuts.names, cuts.probes.T, strict=True))
+    count = len(next(iter(points.values())))
+    parameters: dict[str, Jet] = {}
+    for name, value in system.parameters.items():
+        parameters[name] = Jet.constant(np.broadcast_to(points.get(name, value), count), 0)
+    assembly = system.assembly(parameters)
     is_at_rest = not (assembly.q0.value.any() or assembly.v0.value.any())
     require(is_at_rest, "structure", "displaced or in motion at the start", "one at rest")
     for k, name in enumerate(system.outputs):
@@ -316,7 +332,7 @@ class _Floor:
             system.outputs,
             duration=self.duration,
             step=step,
-            alpha=self.cuts.alpha.tolist(),
+            alpha=tuple(map(float, self.cuts.alpha)),
             error=self.error,
             progress=progress,
         )

@@ -133,7 +133,8 @@ def test_without_a_bound_of_the_steps_nothing_is_guaranteed(rng):
 def test_a_table_and_rows_tell_all(rng):
     inputs = {"k1": Interval(880.0, 920.0)}
     found = floor_spectrum(frame_of(record(rng)), inputs, "a2", [0.0, 0.3], alpha=[0, 1], **MOTION)
-    assert found.table().head[:3] == ("floor", "Sa at α = 0", "nature")
+    assert found.table().head[:3] == ("spectrum of", "Sa at α = 0", "nature")
+    assert found.table().rows[found.largest_rows[0]][0] == "a2, T = 0.3 s"
     rows = found.records()
     assert [row["period [s]"] for row in rows] == [0.0, 0.3] * 2
     assert rows[1]["bound [m/s^2]"] == found.bound[0, 0, 1]

@@ -1,0 +1,66 @@
+"""Section on floor spectra."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from alphacut.base.arrays import Array
+from alphacut.base.errors import RefusedError, require
+from alphacut.case.structure import Structure
+from alphacut.case.types import Names, OneOrMany, Quantity, Section, Time
+from alphacut.frame.spectra.response_spectrum import MIN_PERIOD
+
+Period = Annotated[float, Quantity("s", minimum=0)]
+RANGE = ("shortest", "longest", "count")
+
+
+class FloorSpectrumSection(Section):
+    """Spectra of light oscillators on floors, over the α-cuts of [envelope], with its time step."""
+
+    key: ClassVar[str] = "floor_spectrum"
+
+    outputs: Names
+    """absolute accelerations of the floors, as a4 of [frame]"""
+    damping: Annotated[float, Quantity(minimum=0, maximum=0.999)] = 0.05
+    """damping ratio of the oscillators"""
+    shortest: Time = 0.05
+    """shortest period; short ones take long"""
+    longest: Time = 2.0
+    """longest period"""
+    count: Annotated[int, Quantity(minimum=2, maximum=500, is_integer=True)] = 20
+    """number of periods in geometric progression, beside 0, the floor's largest acceleration"""
+    periods: OneOrMany[Period] = ()
+    """periods in place of these, as ["0 s", "0.2 s"]"""
+
+    def require_consistent(self) -> None:
+        """Refuse periods beside their range, too short ones, and a range without width."""
+        given = [name for name in RANGE if self.has_key(name)]
+        is_one = not (self.periods and given)
+        require(is_one, "floor_spectrum.periods", f"beside {', '.join(given)}", "one of them")
+        for name in ("periods", "shortest"):
+            smallest = min((x for x in np.atleast_1d(getattr(self, name)) if x), default=1.0)
+            allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
+            is_long = smallest >= MIN_PERIOD
+            require(is_long, f"floor_spectrum.{name}", f"{smallest:g} s", allowed)
+        allowed = f"more than floor_spectrum.shortest, {self.shortest:g} s"
+        is_range = self.shortest < self.longest
+        require(is_range, "floor_spectrum.longest", f"{self.longest:g} s", allowed)
+
+    @property
+    def all_periods(self) -> Array:
+        """The periods in s, shape (periods,)."""
+        if self.periods:
+            return np.array(self.periods)
+        return np.append(0.0, np.geomspace(self.shortest, self.longest, self.count))
+
+    def require_answerable(self, structure: Structure) -> None:
+        """Refuse a structure without floor spectra, and outputs that are no accelerations."""
+        from alphacut.frame.analyses.floor_spectrum import observed_accelerations  # takes time
+
+        try:
+            observed_accelerations(structure.model, self.outputs, {})
+        except RefusedError as error:
+            key = f"floor_spectrum: {error.key}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None

@@ -1,0 +1,97 @@
+"""Floor spectra of a case: its answer, figure and table, and what is refused."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from alphacut import main
+from alphacut.case.content import load
+from alphacut.figures.answers import draw_floor_spectrum
+from alphacut.figures.style import figure_style
+from alphacut.frame import FloorSpectrum, floor_spectrum
+from alphacut.io.typed_json import from_document
+from tests.alphacut.small import refusals, summary_of
+
+CASE = """
+title = "A floor under a record"
+stages = ["envelope"]
+shares = false
+[frame]
+stiffness = ["8 MN/m ± 4 %"]
+masses = ["20 t"]
+damping_ratio = "5 %"
+accelerogram = "record.csv"
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "1.5 s"
+step = "0.02 s"
+[floor_spectrum]
+outputs = "a1"
+periods = ["0 s", "0.3 s"]
+"""
+
+
+def written(folder, text=CASE):
+    samples = np.random.default_rng(5).normal(size=40)
+    rows = "".join(f"{0.02 * k:.2f},{x:.6f}\n" for k, x in enumerate(samples))
+    (folder / "record.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_path, capsys):
+    case, out = written(tmp_path), tmp_path / "out"
+    assert main(["run", str(case), "--out", str(out)]) == 0
+    assert "floor_spectrum: a1, T = 0.3 s: ≤" in capsys.readouterr().out
+    found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
+    structure = load(case).content.structure
+    expected = floor_spectrum(
+        structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], 0.05,
+        duration=1.5, step=0.02, alpha=[0, 1], progress=False,
+    )  # fmt: skip
+    assert found.bound == pytest.approx(expected.bound, rel=1e-9)
+    assert found.natures == expected.natures == (("guaranteed", "guaranteed"),)
+
+    assert (out / "figures/floor_spectrum.png").exists()
+    with figure_style():
+        (axes,) = draw_floor_spectrum(found).axes
+    lines = {line.get_label(): line.get_ydata() * 9.80665 for line in axes.lines}
+    assert lines["bound, α = 0"] == pytest.approx(found.bound[0, 0])
+    assert lines["nominal"] == pytest.approx(found.nominal[0])
+
+    assert main(["report", str(out), "--csv", str(tmp_path / "csv")]) == 0
+    rows = pd.read_csv(tmp_path / "csv/floor_spectrum.csv")
+    assert rows["period [s]"].tolist() == [0.0, 0.3] * 2
+    assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
+
+
+def test_periods_are_given_by_their_range(tmp_path):
+    text = CASE.replace('periods = ["0 s", "0.3 s"]', 'shortest = "0.1 s"\ncount = 3')
+    periods = load(written(tmp_path, text)).content.floor_spectrum.all_periods
+    assert periods == pytest.approx([0, 0.1, 0.2**0.5, 2])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"a1"', '"q1"', "floor_spectrum: output is q1; allowed: absolute accelerations, as a3"),
+        ('"a1"', '"a2"', "floor_spectrum: output is a2; allowed:"),
+        ('"0.3 s"]', '"0.3 s"]\ncount = 3', "floor_spectrum.periods is beside count; allowed"),
+        ('"0.3 s"]', '"0.1 ms"]', "floor_spectrum.periods is 0.0001 s; allowed: 0 s, and"),
+        ('periods = ["0 s", "0.3 s"]', 'longest = "10 ms"', "floor_spectrum.longest is 0.01 s"),
+        ('periods = ["0 s", "0.3 s"]', 'damping = "120 %"', "floor_spectrum.damping is 120 %"),
+        ('"5 %"', '"5 %"\ndisplacements = "1 mm"', "floor_spectrum: structure is displaced"),
+        ('"5 %"', '"5 %"\nyield_force = "30 kN"', "floor_spectrum: structure is StoreyFrame"),
+        (
+            'accelerogram = "record.csv"\n',
+            '[records]\nfiles = ["record.csv"]\n',
+            "floor_spectrum is beside [records]",
+        ),
+    ],
+)
+def test_what_has_no_floor_spectrum_is_one_line(tmp_path, old, new, message):
+    assert old in CASE
+    lines = refusals(written(tmp_path, CASE.replace(old, new)))
+    assert any(message in line for line in lines), lines
