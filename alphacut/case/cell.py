@@ -22,7 +22,7 @@ from alphacut.case.types import NotEmpty, Section, after, distinct, require_alon
 from alphacut.io.provenance import command_to_paste
 from alphacut.stochastic import FractionMap
 
-Stage = Literal["microstructure", "modulus", "envelope"]
+Stage = Literal["microstructure", "modulus", "envelope", "response_spectrum"]
 
 
 class CellContent(Section, defer_build=True):
@@ -220,3 +220,4 @@ class CellCase(CellContent):
     tolerances: object = None
     fragility: object = None
     floor_spectrum: object = None
+    response_spectrum: object = None

@@ -21,6 +21,7 @@ from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.parse import ParsedCase, parse
+from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import MaterialDamping, Structure, StructureSection
 from alphacut.case.structures import STRUCTURES, with_structures
 from alphacut.case.types import AtFirstUse, require_alone
@@ -42,6 +43,7 @@ class Content(CellContent):
     tolerances: AtFirstUse[TolerancesSection] | None = None
     fragility: AtFirstUse[FragilitySection] | None = None
     floor_spectrum: AtFirstUse[FloorSpectrumSection] | None = None
+    response_spectrum: AtFirstUse[ResponseSpectrumSection] | None = None
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
@@ -180,6 +182,8 @@ class Content(CellContent):
             self._require_records_alone(self.records)
         if "envelope" in self.stages and self.envelope is not None:
             self._require_response(self.envelope, self._one_structure())
+        if "response_spectrum" in self.stages and self.response_spectrum is not None:
+            self._require_spectrum(self.response_spectrum, self._one_structure())
 
     def _require_excitation(self) -> None:
         """Refuse a structure that starts at rest and has no loads.
@@ -191,6 +195,8 @@ class Content(CellContent):
             RefusedError: Nothing moves the structure. Its key names the initial displacements.
         """
         section = self.structure_section
+        if "response_spectrum" in self.stages and "envelope" not in self.stages:
+            return  # the spectrum moves it
         # Without loads a structure at rest stays at rest, and bounds of that look like results.
         if section is None or section.moves_by_itself:
             return
@@ -308,8 +314,7 @@ class Content(CellContent):
             is_first = study.name not in names
             require(is_first, f"study[{number}].name", study.name, "a name of its own")
             names.append(study.name)
-        has_modulus = self.has_stated_modulus or "modulus" in self.stages
-        require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
+        self._require_modulus()
         for section in self.answered.values():
             section.require_answerable(structure)
         if self.identify is not None:
@@ -332,16 +337,7 @@ class Content(CellContent):
             RefusedError: An input is unknown or crisp, an output is unknown, the duration is no
                 multiple of the time step, or a force begins only after the duration.
         """
-        # Stage modulus computes Young's modulus E and, from the loss factor of the material, the
-        # damping ratios: zeta of all modes, or zeta1, zeta2 … of each. They may be crisp in the
-        # stand-in and fuzzy in the run, so that their width is not judged here.
-        computed = "(?!)"  # which matches no name
-        if self.has_material_damping:
-            computed = r"E|zeta\d*"
-        elif "modulus" in self.stages:
-            computed = "E"
-        stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
-        structure.inputs(stated, f"{key}.fuzzy")
+        self._require_inputs(key, study.fuzzy, structure)
         for output in study.figures:
             require_choice(f"{key}.figures", output, structure.outputs)
         envelope.require_steps(f"{key}.duration", study.duration)
@@ -354,6 +350,44 @@ class Content(CellContent):
             value = f"from {history.start:g} s"
             allowed = f"a start below {key}.duration"
             require(acts, f"force[{number}].history", value, allowed)
+
+    def _require_inputs(self, key: str, names: Sequence[str], structure: Structure) -> None:
+        """Refuse inputs of a section that are unknown or crisp.
+
+        Args:
+            key: The section, for messages.
+            names: Names of its fuzzy inputs.
+            structure: The structure. Inputs that a stage will make fuzzy may still be crisp in it.
+        """
+        # Stage modulus computes Young's modulus E and, from the loss factor of the material, the
+        # damping ratios: zeta of all modes, or zeta1, zeta2 … of each. They may be crisp in the
+        # stand-in and fuzzy in the run, so that their width is not judged here.
+        computed = "(?!)"  # which matches no name
+        if self.has_material_damping:
+            computed = r"E|zeta\d*"
+        elif "modulus" in self.stages:
+            computed = "E"
+        stated = [name for name in names if not re.fullmatch(computed, name)]
+        structure.inputs(stated, f"{key}.fuzzy")
+
+    def _require_spectrum(self, section: ResponseSpectrumSection, structure: Structure) -> None:
+        """Refuse inputs, limits and a structure that the response-spectrum method cannot take."""
+        allowed = "without [identify], whose set is no box"
+        require(self.identify is None, section.key, "beside [identify]", allowed)
+        suite = () if self.records is None else self.records.suite
+        has_single = all(len(components) == 1 for components in suite)
+        allowed = "records of one component, beside [response_spectrum]"
+        require(has_single, "records.files", "of several components", allowed)
+        is_linear = structure.linear is not None and not yields(structure.model)
+        require(is_linear, "response_spectrum", "of another structure", "linear structures")
+        self._require_inputs(section.key, section.fuzzy, structure)
+        self._require_modulus()
+        section.require_answerable(structure)
+
+    def _require_modulus(self) -> None:
+        """Refuse columns whose modulus no stage computes."""
+        has_modulus = self.has_stated_modulus or "modulus" in self.stages
+        require(has_modulus, "frame.modulus", None, "a modulus, or stage modulus")
 
 
 Case = ParsedCase[Content]

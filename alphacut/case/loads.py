@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, radians
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo
 
 from alphacut.base.errors import RefusedError, is_number, require, require_choice
+from alphacut.case.spectrum import SpectrumSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import (
     AtFirstUse,
     NotEmpty,
     OneOrMany,
-    Quantity,
     Section,
     Time,
     after,
@@ -27,10 +27,6 @@ from alphacut.case.types import (
 )
 from alphacut.frame import (
     History,
-    TargetSpectrum,
-    asce7_multi_period,
-    eurocode8_spectrum,
-    read_spectrum,
 )
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
@@ -331,61 +327,6 @@ def _parse_angle(value: object, _: ValidationInfo) -> float:
 
 
 Files = Annotated[tuple[tuple[Recording, ...], ...], text(_read_suite)]
-
-
-def _read_spectrum(value: object, info: ValidationInfo) -> TargetSpectrum:
-    """Return the spectrum in a file that the case names."""
-    return read_spectrum(case_file(value, info))
-
-
-class SpectrumSection(Section):
-    """Target spectrum to which the records are scaled, of a code or from a file.
-
-    The elastic spectrum of EN 1998-1 has `ground_acceleration` and `ground_type`, the multi-period
-    spectrum of ASCE 7-22 `values`, a spectrum of one's own `file`.
-    """
-
-    ground_acceleration: Annotated[float, Quantity("m/s^2", above=0)] | None = None
-    """design ground acceleration a_g = γI a_gR, as "0.25 g", of EN 1998-1"""
-    ground_type: str = ""
-    """A to E, of EN 1998-1"""
-    type: Literal[1, 2] = 1
-    """type of the spectrum of EN 1998-1"""
-    values: tuple[Annotated[float, Quantity("m/s^2", above=0)], ...] = ()
-    """the site's 22 accelerations of ASCE 7-22, 11.4.5.1, from 0 to 10 s"""
-    file: Annotated[TargetSpectrum, text(_read_spectrum)] | None = None
-    """CSV file with the head period [s],acceleration [g]"""
-    damping: Annotated[float, Quantity(minimum=0, below=1)] = 0.05
-    """damping ratio of the target, for which spectra of the records are taken"""
-    fit: Literal["record", "suite", "period"] = "record"
-    """a factor of each record or of the suite, by least squares; or the target's value at T1"""
-    over: tuple[float, float] = (0.2, 2.0)
-    """range of periods that are fitted, over T1"""
-
-    @property
-    def target(self) -> TargetSpectrum:
-        """The target spectrum.
-
-        Raises:
-            RefusedError: The ground type is unknown, or there are not 22 values.
-        """
-        if self.file is not None:
-            return replace(self.file, damping=self.damping)
-        if self.ground_acceleration is None:
-            return replace(asce7_multi_period(np.array(self.values)), damping=self.damping)
-        return eurocode8_spectrum(
-            self.ground_acceleration,
-            self.ground_type,
-            spectrum_type=self.type,
-            damping=self.damping,
-        )
-
-    def require_consistent(self) -> None:
-        """Refuse none or several targets, and one that is no spectrum."""
-        stated = [x for x in ("ground_acceleration", "values", "file") if self.has_key(x)]
-        allowed = "one of ground_acceleration, values and file"
-        require(len(stated) == 1, "records.spectrum", f"with {' and '.join(stated)}", allowed)
-        _ = self.target
 
 
 def _require_one_ground(first: Recording, other: Recording) -> None:

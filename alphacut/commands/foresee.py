@@ -35,7 +35,7 @@ from alphacut.rve.image.study import (
     Phases,
     solve_study,
 )
-from alphacut.stages import answers, envelope, identify, microstructure, modulus, suite
+from alphacut.stages import answers, envelope, identify, microstructure, modulus, spectrum, suite
 from alphacut.stages.answers import Response
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import FOLLOWERS, EnvelopeTask
@@ -81,6 +81,13 @@ def foresee(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
             yield pieces["modulus"]._replace(number=number, seconds=seconds)
     if "envelope" in content.stages and content.envelope is not None:
         yield from _motion(content, content.envelope, material, pieces)
+    section = content.response_spectrum
+    if "response_spectrum" in content.stages and section is not None:
+        start = perf_counter()
+        lowest = section.model_copy(update={"alpha": section.alpha[:1]})  # takes longest
+        spectrum.stage(lowest, _structure(content, material)).compute(StageContext())
+        seconds = (perf_counter() - start) * len(section.alpha)
+        yield pieces["response_spectrum"]._replace(seconds=seconds)
 
 
 def whole_seconds(run: Callable[[float], float], *, fewest: int = 1) -> float:

@@ -50,6 +50,8 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
             yield Foreseen("modulus", None, "samples")  # of a radius map that is not known yet
         else:
             yield Foreseen("modulus", sample_count(CellProblem.of(content, petsc)), "samples")
+    if "response_spectrum" in content.stages and content.response_spectrum is not None:
+        yield Foreseen("response_spectrum", len(content.response_spectrum.alpha), "levels")
     section = content.envelope
     if "envelope" not in content.stages or section is None:
         return

@@ -35,6 +35,7 @@ from alphacut.stages import (
     microstructure,
     modulus,
     shares,
+    spectrum,
     suite,
 )
 from alphacut.stages.answers import ANSWERS, Response
@@ -132,8 +133,9 @@ class Pipeline:
     def run(self) -> Results:
         """Compute every stage of the case that `stages` names, and what follows from them.
 
-        The order is microstructure, modulus, envelope with the answers to questions, and the shares
-        of inputs. Results are kept in the store and added to `results`, which is returned.
+        The order is microstructure, modulus, envelope with the answers to questions, response
+        spectrum, and the shares of inputs. Results are kept in the store and added to `results`,
+        which is returned.
 
         Raises:
             RefusedError: A stage lacks what it needs.
@@ -153,6 +155,8 @@ class Pipeline:
             self.compute_modulus()
         if "envelope" in stages:
             self._compute_motion()
+        if "response_spectrum" in stages:
+            self._compute_spectrum()
         if self.content.shares:
             self._compute_shares()
         return results
@@ -238,15 +242,7 @@ class Pipeline:
         content = self.content
         section = self.content.envelope
         assert section is not None  # of stage envelope
-        # α-cuts of the material become fuzzy numbers of the structure. Without a stage the case has
-        # stated them.
-        material = results.modulus or results.image
-        structure = content.structure
-        if material is not None:
-            young = fuzzy_modulus(material.arrays)
-            loss = fuzzy_loss(material.arrays)
-            structure = content.structure_of(young, loss)
-        assert structure is not None
+        structure = self._structure()
         if content.identify is not None:
             results.learned, structure = identify.identify_inputs(
                 content.identify, structure, section.alpha
@@ -263,6 +259,46 @@ class Pipeline:
             if (question := content.answered.get(kind.key)) is not None:
                 stage = answers.stage(kind, question, response)
                 results.answers[kind.key] = self.store.take(stage).numbers
+
+    def _structure(self) -> Structure:
+        """Return the structure with the material that stage modulus found, if there is one."""
+        # α-cuts of the material become fuzzy numbers of the structure. Without a stage the case has
+        # stated them.
+        material = self.results.modulus or self.results.image
+        structure = self.content.structure
+        if material is not None:
+            young = fuzzy_modulus(material.arrays)
+            loss = fuzzy_loss(material.arrays)
+            structure = self.content.structure_of(young, loss)
+        assert structure is not None
+        return structure
+
+    def _compute_spectrum(self) -> None:
+        """Compute combined peaks under a response spectrum, and what follows from them.
+
+        These are the verdicts on limits and, where a suite of records stands beside the section,
+        the errors of the method under each record. All are put into the answers of `results`.
+
+        Raises:
+            RefusedError: An input, output or limit does not fit the structure.
+            FailedError: A peak under a record is not bounded.
+        """
+        content = self.content
+        section = content.response_spectrum
+        assert section is not None  # of stage response_spectrum
+        structure = self._structure()
+        self.results.structure = structure
+        kept = self.results.answers
+        found = self.store.take(spectrum.stage(section, structure)).numbers
+        kept[found.key] = found
+        if section.has_checks:
+            checks = spectrum.checks_of(section, structure, found)
+            kept[checks.key] = checks
+        if content.records is not None and content.envelope is not None:
+            step = content.envelope.step
+            records = suite.suite_records(content.records, content.envelope, structure)
+            stage = spectrum.accuracy_stage(section, structure, found, records, step)
+            kept[stage.name] = self.store.take(stage).numbers
 
     def _compute_envelopes(self, structure: Structure, section: EnvelopeSection) -> None:
         """Compute the envelopes of all studies into `results`, and check their errors.

@@ -46,6 +46,11 @@ def require_runnable(content: Content) -> Built:
         study_of_image = _require_material(content)
     if "envelope" in content.stages:
         records = _require_motion(content)
+    section = content.response_spectrum
+    if "response_spectrum" in content.stages and section is not None and content.structure:
+        from alphacut.stages.spectrum import require_possible
+
+        require_possible(section, content.structure)
     return Built(study_of_image, records)
 
 

@@ -25,6 +25,8 @@ from alphacut.frame import (
     LearnedInputs,
     Probability,
     ScaledSuite,
+    SpectrumAccuracy,
+    SpectrumResponse,
     Tolerances,
 )
 from alphacut.frame.analyses.decision import LimitDecision, degree_text
@@ -414,11 +416,51 @@ def draw_demands(axes: Axes, answer: Fragility, names: Sequence[str]) -> None:
         line.set_gid(f"{style.HOVER}{record}")
 
 
+def draw_response_spectrum(answer: SpectrumResponse) -> Figure:
+    """Draw the spectrum, and on it the modes at the nominal inputs.
+
+    The area of a mode's point is proportional to the fraction of the mass that it moves.
+    """
+    spectrum = answer.method.spectrum
+    periods = answer.modes.periods[0]
+    fractions = answer.modes.mass_fractions[0]
+    figure, axes = plt.subplots()
+    first = float(spectrum.periods[0])
+    last = float(spectrum.periods[-1])
+    # At 600 periods a curve of this width is smooth; the corners are added.
+    grid = np.linspace(first, min(last, max(1.5 * float(periods[0]), 1.0)), 600)
+    corners = np.concatenate([spectrum.periods, spectrum.falls_from])
+    grid = np.union1d(grid, corners[corners < grid[-1]])
+    axes.plot(grid, spectrum(grid) / STANDARD_GRAVITY, color=INK, lw=1.2)
+    sizes = 10 + 190 * fractions
+    axes.scatter(periods, spectrum(periods) / STANDARD_GRAVITY, s=sizes, color=BLUE, alpha=0.7)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("period [s]; points: the modes, by the mass that they move")
+    axes.set_ylabel("spectral acceleration [g]")
+    return figure
+
+
+def draw_accuracy(answer: SpectrumAccuracy) -> Figure:
+    """Draw the error of the response-spectrum method under each record, a row for each output."""
+    rows = np.arange(len(answer.outputs), dtype=float)[::-1]
+    figure, axes = plt.subplots(figsize=(WIDTH, 0.9 + 0.36 * len(rows)))
+    for row, errors in zip(rows, 100 * answer.errors.mean(axis=-1).T, strict=True):
+        axes.plot(errors, np.full_like(errors, row), "o", color=BLUE, alpha=0.6, ms=5)
+    axes.axvline(0.0, color=INK, lw=0.8)
+    axes.set_ylim(-0.6, rows[0] + 0.6)
+    axes.set_yticks(rows, list(answer.outputs))
+    axes.set_xlabel("combined peak over the peak under the record, less 1 [%]")
+    return figure
+
+
 DRAWINGS: dict[str, Callable[[Any], Figure]] = {
     "probability": draw_probability,
     "decision": draw_decision,
     "tolerances": draw_tolerances,
     "fragility": draw_fragility,
     "floor_spectrum": draw_floor_spectrum,
+    "response_spectrum": draw_response_spectrum,
+    "spectrum_checks": draw_decision,
+    "spectrum_accuracy": draw_accuracy,
 }
 """Function that draws the answer to each question, by the question's key."""

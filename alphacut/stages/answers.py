@@ -23,6 +23,9 @@ from alphacut.frame import (
     FloorSpectrum,
     Fragility,
     Probability,
+    SpectrumAccuracy,
+    SpectrumChecks,
+    SpectrumResponse,
     SuitePeaks,
     Tolerances,
     decide,
@@ -222,7 +225,9 @@ ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
     Fragility: fragility_answer,
     FloorSpectrum: floor_spectra,
 }
-"""Kinds of answers in the order of the report, each with its function of section and response."""
+"""Kinds of answers to questions, each with its function of section and response."""
+KINDS: tuple[type[Answer], ...] = (*ANSWERS, SpectrumResponse, SpectrumChecks, SpectrumAccuracy)
+"""Kinds of all answers of a run, in the order of the report."""
 
 
 def stage(kind: type[Answer], section: Section, response: Response) -> Stage[Answer]:

@@ -19,6 +19,9 @@ from alphacut.frame import (
     Fragility,
     LearnedInputs,
     Probability,
+    SpectrumAccuracy,
+    SpectrumChecks,
+    SpectrumResponse,
     StoreyFrame,
     SuitePeaks,
     Tolerances,
@@ -31,7 +34,7 @@ from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
 from alphacut.io.results import COMPLETE, RUN_AGAIN, PlainName, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document
-from alphacut.stages.answers import ANSWERS
+from alphacut.stages.answers import KINDS
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
@@ -170,6 +173,9 @@ class Parts:
     tolerances: Tolerances | None = None
     fragility: Fragility | None = None
     floor_spectrum: FloorSpectrum | None = None
+    response_spectrum: SpectrumResponse | None = None
+    spectrum_checks: SpectrumChecks | None = None
+    spectrum_accuracy: SpectrumAccuracy | None = None
     shares: ShareTable = field(default_factory=dict)
 
     @classmethod
@@ -254,7 +260,7 @@ class Parts:
         limits: list[LimitResult] = []
         if self.probability is not None:
             limits += reversed(self.probability.events.values())
-        for answer in (self.fragility, self.decision):
+        for answer in (self.spectrum_checks, self.fragility, self.decision):
             if answer is not None:
                 limits += reversed(answer.limits.values())
         for limit in limits:
@@ -265,7 +271,7 @@ class Parts:
     @property
     def answers(self) -> list[Answer]:
         """The answers to all questions of the case, in the order of the report."""
-        answers = (getattr(self, kind.key) for kind in ANSWERS)
+        answers = (getattr(self, kind.key) for kind in KINDS)
         return [answer for answer in answers if answer is not None]
 
 

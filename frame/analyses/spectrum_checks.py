@@ -58,6 +58,7 @@ def spectrum_checks(
     base_shear_floor: float | None = None,
     theta: Mapping[str, Peak] | None = None,
     largest_theta: float = LARGEST_THETA,
+    input_units: Mapping[str, str] | None = None,
 ) -> SpectrumChecks:
     """Return whether limits are kept by the combined peaks of a response spectrum.
 
@@ -71,6 +72,8 @@ def spectrum_checks(
             the equivalent lateral force procedure of ASCE 7-22, 12.9.1.4.1.
         theta: Sensitivity coefficients of storeys by name, as `drift_sensitivity` returns them.
         largest_theta: Limit of each: 0.1, 0.2 or 0.3 by EN 1998-1, 4.4.2.2.
+        input_units: SI units by the name of the input, for the text that names inputs by which a
+            limit is refuted.
 
     Raises:
         RefusedError: There is nothing to check, a limit is not one of a magnitude of an output, the
@@ -103,7 +106,8 @@ def spectrum_checks(
         floor = Limit("base_shear", base_shear_floor, largest=False)
         asked.append(floor)
         peaks[floor.peak] = found.peak("base_shear", "min")
-    decision = decide(peaks, asked, units=units | dict.fromkeys(theta or (), ""))
+    units |= dict.fromkeys(theta or (), "")
+    decision = decide(peaks, asked, units=units, input_units=input_units)
     notes = []
     if displacement_factor != 1:
         what = "Displacements and drifts are those of the spectrum times"

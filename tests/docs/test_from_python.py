@@ -82,7 +82,7 @@ def has_the_radius_map_of_the_case(names):
 def moves_as_the_structure_of_the_case(names):
     """Whether matrices move as those of cases/plane-frame.toml under its first record."""
     content = load(str(ROOT / "cases/plane-frame.toml")).content
-    ground = content.records.recordings[0].accelerogram(content.records.baseline)
+    ground = content.records.suite[0][0].accelerogram(content.records.baseline)
     model = replace(content.structure.model.with_outputs(("roof",)), ground=ground)
     times = {"duration": 2.0, "step": 0.02, "alpha": (0,)}
     of_case = envelope(model, {"ks": Interval(0.75, 1.25)}, **times)

@@ -24,7 +24,14 @@ def sections(kind):
 
 def test_the_page_has_every_section_of_the_models():
     page = (ROOT / "docs/case-format.md").read_text(encoding="utf-8")
-    bases = {"CellContent", "CellCase", "QuestionSection", "StructureSection", "Structures"}
+    bases = {
+        "CellContent",
+        "CellCase",
+        "QuestionSection",
+        "CodeSpectrumSection",
+        "StructureSection",
+        "Structures",
+    }
     own = {x.__name__ for x in sections(Section) if x.__module__.startswith("alphacut.")}
     for name in own - bases:
         assert f".{name}\n" in page
