@@ -269,7 +269,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f" inside {row.inside} work {row.work:.0e}",
             flush=True,
         )
-    rows.write([asdict(row) for row in found], options.out / "mesh_bounds.csv")
+    rows.write(
+        [{"seed": options.seed, **asdict(row)} for row in found], options.out / "mesh_bounds.csv"
+    )
     for corners in (False, True):
         own = [row.ratio for row in found if row.corners == corners]
         if own:

@@ -264,8 +264,8 @@ def _at_points(fields: PrismFields, prisms: Ints, slopes: Array, mean_stress: Ar
 
     def gradient(values: Array) -> tuple[Array, Array]:
         """Return det J times the derivatives along x1 and x2, shape (prisms, points, 2, loads)."""
-        flat = values[prisms].reshape(len(prisms), 15, -1)
         shape = *determinant.shape, *values.shape[2:]
+        flat = values[prisms].reshape(len(prisms), 15, shape[-2] * shape[-1])
         first, second = [(of_axis @ flat).reshape(shape) for of_axis in slopes]
         along_x1 = first * across[1][..., 1] - second * across[0][..., 1]
         along_x2 = second * across[0][..., 0] - first * across[1][..., 0]

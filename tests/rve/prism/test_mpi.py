@@ -134,3 +134,26 @@ def test_only_one_rank_prints_and_the_command_shares_a_cell():
     one = PrismModel(0.4, 4, estimate=False).solve(radius, Phase(20e9), [Phase(80e9)])[0]
     assert two["E_GPa"] == pytest.approx(one.modulus / 1e9, rel=1e-10)
     assert two["unknowns"] == one.unknowns
+
+
+BOUNDS = """
+import json
+from mpi4py import MPI
+from alphacut.rve import MeshModel, Phase
+from alphacut.stochastic import TruncatedNormal
+
+phases = {"matrix": Phase(20e9), "inclusion": Phase(80e9)}
+model = MeshModel("meshes/paper-coarse.msh", parallel=True)
+found = model.bounds(TruncatedNormal(-3, 3), phases)
+bounds = [found.lower.tolist(), found.upper.tolist()]
+"""
+
+
+@pytest.mark.slow
+def test_bounds_of_a_mesh_are_the_same_on_ranks_without_prisms_of_some_layers():
+    names = {}
+    exec(BOUNDS, names)
+    printed = run(3, "-c", f"{BOUNDS}\nif MPI.COMM_WORLD.rank == 0:\n    print(json.dumps(bounds))")
+    for ours, others in zip(names["bounds"], json.loads(printed), strict=True):
+        for row, other in zip(ours, others, strict=True):
+            assert other == pytest.approx(row, rel=1e-7, abs=1e-7 * ours[0][0])
