@@ -11,7 +11,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.number_text import MINUS, Table
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, table_of
-from alphacut.frame.analyses.spectrum_response import Method, SpectrumResponse
+from alphacut.frame.analyses.spectrum_response import SpectrumResponse
 from alphacut.frame.analyses.suites import GroundMotion, ScaledRecord, record_peaks, scaled_records
 from alphacut.frame.spectra.response_spectrum import response_spectrum
 from alphacut.frame.structures.linear import LinearSystem
@@ -153,7 +153,7 @@ def accuracy_of(
         of_outputs = [by_name[name] for name in found.outputs]
         peaks.append([(x.reached[0], x.upper[0] + x.error[0]) for x in of_outputs])
         natures += [x.nature for x in of_outputs]
-        combined.append(_combined(found.method, found, record))
+        combined.append(_combined(found, record))
     return SpectrumAccuracy(
         rule=found.method.rule,
         outputs=found.outputs,
@@ -165,7 +165,7 @@ def accuracy_of(
     )
 
 
-def _combined(method: Method, found: SpectrumResponse, record: ScaledRecord) -> Array:
+def _combined(found: SpectrumResponse, record: ScaledRecord) -> Array:
     """Return the combined peaks at the nominal inputs by the spectrum of a record, shape (m,)."""
     modes = found.modes
     pairs = zip(modes.periods[0].tolist(), modes.ratios[0].tolist(), strict=True)
@@ -173,7 +173,7 @@ def _combined(method: Method, found: SpectrumResponse, record: ScaledRecord) -> 
         float(response_spectrum(record.ground, period, ratio, readings=2000))
         for period, ratio in pairs
     ]
-    return np.asarray(method.combined(modes, np.array([accelerations]))[0])
+    return np.asarray(found.method.combined(modes, np.array([accelerations]))[0])
 
 
 def _range_text(errors: Array) -> str:

@@ -9,16 +9,17 @@ from typing import Literal
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, checked_number, require, require_choice
+from alphacut.base.errors import RefusedError, checked_number, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak
-from alphacut.frame.bounds.spectrum_bounds import Combination, combined_bounds
+from alphacut.frame.bounds.spectrum_bounds import combined_bounds
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.spectra.modal_combination import COMBINATIONS, combined_peaks, correlation
+from alphacut.frame.modes.spectral_modes import spectral_modes
+from alphacut.frame.spectra.modal_combination import COMBINATIONS, Combination, SpectralModes
 from alphacut.frame.spectra.target import TargetSpectrum
-from alphacut.frame.structures.linear import LinearSystem, evaluate, undamped_modes
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.model import Dynamics, StructureModel
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
@@ -30,107 +31,6 @@ SAMPLES = 200
 """Points inside of each cut at which peaks are computed (tuned)."""
 CORNER_INPUTS = 8
 """Most inputs for which all corners of a cut are tried."""
-
-
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """The lowest K modes of a structure at S parameter sets, for m outputs.
-
-    Args:
-        omega: Angular frequencies ω in rad/s, rising, shape (S, K).
-        ratios: Damping ratios φᵀ D φ / (2 ω), with φᵀ M φ = 1, shape (S, K).
-        mass_fractions: Effective masses over the mass that moves with the ground, shape (S, K).
-        factors: Participation factor φᵀ M ι times the output of the mode shape, shape (S, K, m).
-            Times the spectral displacement it is the peak of the output by this mode.
-    """
-
-    omega: Array
-    ratios: Array
-    mass_fractions: Array
-    factors: Array
-
-    @property
-    def periods(self) -> Array:
-        """Natural periods in s, shape (S, K)."""
-        return np.asarray(2 * np.pi / self.omega)
-
-    def peaks(self, accelerations: Array) -> Array:
-        """Return the peaks of the outputs by each mode, with their signs, shape (S, K, m).
-
-        Args:
-            accelerations: Spectral pseudo-acceleration of each mode, in m/s², shape (S, K).
-        """
-        displacements = accelerations / self.omega**2
-        return np.asarray(self.factors * displacements[..., np.newaxis])
-
-
-@dataclass(frozen=True)
-class Method(Combination):
-    """A variant of the response-spectrum method, at parameter sets."""
-
-    def modes_at(self, system: LinearSystem, names: Sequence[str], points: Array) -> Modes:
-        """Return the modes of a structure at S parameter sets.
-
-        Args:
-            system: The structure.
-            names: Names of d parameters; others keep their nominal values.
-            points: Their values in SI units, shape (S, d).
-
-        Raises:
-            RefusedError: An output takes velocities or accelerations, or a stiffness is not
-                positive definite.
-        """
-        matrices, rows = evaluate(system, names, points, derivatives=False)
-        mass = matrices.mass.value
-        squares, shapes = undamped_modes(mass, matrices.stiffness.value)
-        what = "one that lets the structure drift"
-        require(bool((squares > 0).all()), "stiffness", what, "a positive definite one")
-        n = squares.shape[1]
-        of_motion = [np.abs(matrices.accelerated), np.abs(rows.value[..., n:]).max(axis=0)]
-        moving = np.flatnonzero(np.hstack(of_motion).any(axis=1))
-        wrong = ", ".join(system.outputs[k] for k in moving)
-        allowed = "displacements, drifts and forces, which a spectrum of displacements gives"
-        require(not wrong, "output", wrong, allowed)
-
-        omega = np.sqrt(squares)
-        influence = matrices.rigid[:, 0]
-        moved = mass @ influence
-        participation = (shapes.swapaxes(1, 2) @ moved[..., np.newaxis])[..., 0]
-        of_shapes = (rows.value[..., :n] @ shapes).swapaxes(1, 2)
-        damping = np.sum(shapes * (matrices.damping.value @ shapes), axis=1)
-        # The mass that moves with the ground is positive, unless the ground moves nothing.
-        total = np.maximum(moved @ influence, 1e-300)
-        kept = slice(self.modes)
-        return Modes(
-            omega=omega[:, kept],
-            ratios=(damping / (2 * omega))[:, kept],
-            mass_fractions=(participation**2 / total[:, np.newaxis])[:, kept],
-            factors=(participation[..., np.newaxis] * of_shapes)[:, kept],
-        )
-
-    def combined(self, modes: Modes, accelerations: Array | None = None) -> Array:
-        """Return the combined peaks of the outputs, shape (S, m).
-
-        Args:
-            modes: The modes.
-            accelerations: Spectral accelerations of the modes in place of those of the spectrum, in
-                m/s², shape (S, K).
-
-        Raises:
-            RefusedError: A period lies outside the range of the spectrum, or CQC is to take the
-                damping ratio of a mode that has none.
-        """
-        correlations = np.eye(modes.omega.shape[1])
-        if self.rule == "CQC":
-            ratios = np.full_like(modes.ratios, self.spectrum.damping)
-            if self.own_ratios:
-                ratios = modes.ratios
-            allowed = "above 0 for CQC, as two modes without damping are correlated in no way"
-            require(bool((ratios > 0).all()), "damping ratio", f"{ratios.min():g}", allowed)
-            correlations = correlation(modes.omega, ratios)
-        if accelerations is None:
-            accelerations = self.spectrum(modes.periods)
-        return combined_peaks(modes.peaks(accelerations), correlations)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -156,9 +56,9 @@ class SpectrumResponse(Answer):
 
     key = "response_spectrum"
     title = "Which peaks does the response spectrum give?"
-    method: Method
+    method: Combination
     alpha: Array
-    modes: Modes
+    modes: SpectralModes
     outputs: tuple[str, ...]
     units: tuple[str, ...]
     nominal: Array
@@ -352,9 +252,9 @@ def spectrum_response(
         raise RefusedError("structure", "one that is not linear", "a linear structure", cure)
     if modes is not None:
         checked_number("modes", modes, positive=True, whole=True)
-    method = Method(spectrum, combination, modes, own_ratios)
+    method = Combination(spectrum, combination, modes, own_ratios)
     cuts = boxes(inputs, alpha)
-    nominal_modes = method.modes_at(structure, cuts.names, cuts.nominal[np.newaxis])
+    nominal_modes = spectral_modes(structure, cuts.names, cuts.nominal[np.newaxis], modes)
     attained, attained_at = _attained(structure, cuts, method)
     proved, unproved = _proved(structure, cuts, method, attained)
     return SpectrumResponse(
@@ -372,7 +272,7 @@ def spectrum_response(
     )
 
 
-def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> tuple[Array, Array]:
+def _attained(structure: LinearSystem, cuts: Boxes, method: Combination) -> tuple[Array, Array]:
     """Return the smallest and largest combined peaks found in each cut, and where.
 
     They are those at the nominal inputs, at corners of the cut and at points inside. What a
@@ -393,7 +293,8 @@ def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> tuple[Arr
     for low, high in zip(cuts.lower, cuts.upper, strict=True):
         in_cut = np.clip(low + (high - low) * fractions, low, high)
         points.append(np.vstack([cuts.nominal, in_cut]))
-        peaks.append(method.combined(method.modes_at(structure, cuts.names, points[-1])))
+        at_points = spectral_modes(structure, cuts.names, points[-1], method.modes)
+        peaks.append(method.combined(at_points))
     # Those of a level are over its own points and those of all higher levels.
     smallest = np.minimum.accumulate([x.min(axis=0) for x in peaks[::-1]])[::-1]
     largest = np.maximum.accumulate([x.max(axis=0) for x in peaks[::-1]])[::-1]
@@ -404,7 +305,7 @@ def _attained(structure: LinearSystem, cuts: Boxes, method: Method) -> tuple[Arr
 
 
 def _proved(
-    structure: LinearSystem, cuts: Boxes, method: Method, attained: Array
+    structure: LinearSystem, cuts: Boxes, method: Combination, attained: Array
 ) -> tuple[Array, str]:
     """Return guaranteed bounds of the combined peaks of each cut, and why some are missing.
 

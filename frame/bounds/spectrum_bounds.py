@@ -29,8 +29,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
-from alphacut.frame.spectra.modal_combination import correlation_range
-from alphacut.frame.spectra.target import TargetSpectrum
+from alphacut.frame.spectra.modal_combination import Combination, correlation_range
 from alphacut.frame.structures.linear import LinearSystem
 
 GAP = 0.01
@@ -68,21 +67,13 @@ class _Correlations(NamedTuple):
     largest: Array
 
 
-@dataclass(frozen=True)
-class Combination:
-    """What is combined: the spectrum, the rule, and the number of modes.
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """A structure, the names of its inputs, and what is combined."""
 
-    Args:
-        spectrum: Pseudo-acceleration over the period.
-        rule: "SRSS" or "CQC".
-        modes: Number of the lowest modes that are combined; None for all.
-        own_ratios: Whether CQC takes the damping ratio of each mode; else that of the spectrum.
-    """
-
-    spectrum: TargetSpectrum
-    rule: str
-    modes: int | None
-    own_ratios: bool
+    system: LinearSystem
+    names: Sequence[str]
+    combination: Combination
 
     def squares(self, groups: Sequence[ModeGroup]) -> Squares:
         """Return bounds of the squares of the combined peaks as Taylor models, shape (m,).
@@ -92,7 +83,7 @@ class Combination:
                 may be zero with CQC.
         """
         periods = np.array([group.period_range for group in groups])
-        first, last = self.spectrum.periods[[0, -1]]
+        first, last = self.combination.spectrum.periods[[0, -1]]
         if periods.min() < first * (1 - 1e-9) or periods.max() > last * (1 + 1e-9):
             raise UnprovedError("a period may lie outside the spectrum", "give a longer spectrum")
         correlations = self._correlations(groups, periods)
@@ -136,11 +127,11 @@ class Combination:
             UnprovedError: A damping ratio may be zero.
         """
         count = len(groups)
-        if self.rule == "SRSS":
+        if self.combination.rule == "SRSS":
             return _Correlations(np.zeros((count, count)), np.zeros((count, count)))
-        equal: Array = np.full(count, self.spectrum.damping)
+        equal: Array = np.full(count, self.combination.spectrum.damping)
         damping = (equal, equal)
-        if self.own_ratios:
+        if self.combination.own_ratios:
             low, high = np.transpose([group.ratio_range for group in groups])
             damping = (low, high)
             if low.min() <= 0:
@@ -166,14 +157,14 @@ class Combination:
         longest = float(periods[1])
         if not group.is_whole:
             # S(λ) is at most the largest acceleration over λ.
-            acceleration = max_acceleration(self.spectrum, shortest, longest)
+            acceleration = max_acceleration(self.combination.spectrum, shortest, longest)
             of_outputs = np.maximum(sums.output_squares_over_eigenvalue.bounds()[1], 0.0)
             of_ground = np.maximum(sums.source_squares_over_eigenvalue.bounds()[1], 0.0)
             squared = acceleration**2 * of_outputs * of_ground * (1 + 1e-12)
             magnitudes = sums.products.like(squared)
             return _Peaks(sums.products * 0.0, np.sqrt(squared) * (1 + 1e-15), magnitudes)
         # S(λ) = constant + slope/λ ± error
-        chord = displacement_chord(self.spectrum, shortest, longest)
+        chord = displacement_chord(self.combination.spectrum, shortest, longest)
         slope = 4 * np.pi**2 * chord.slope
         constant = chord.value - chord.slope * chord.midpoint
         # The rounding of both numbers changes S by far less than this.
@@ -197,15 +188,6 @@ class Combination:
             squared_magnitudes=squared_magnitudes,
         )
 
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """A structure, the names of its inputs, and what is combined."""
-
-    system: LinearSystem
-    names: Sequence[str]
-    combination: Combination
-
     def parts(self, low: Array, high: Array, depth: int) -> Iterator[_Part]:
         """Yield parts of a box, each with its modes.
 
@@ -221,9 +203,7 @@ class _Problem:
             groups, along = mode_groups(
                 over_box(self.system, self.names, low, high), self.combination.modes
             )
-            yield _Part(
-                low, high, groups, self.combination.squares(groups), along, is_enclosed=True
-            )
+            yield _Part(low, high, groups, self.squares(groups), along, is_enclosed=True)
             return
         except UnprovedError as error:
             if not depth:
@@ -279,7 +259,7 @@ class _Part:
             for group in self.groups:
                 own = [next(moved) for _ in group.models]
                 groups.append(group.with_models(own))
-            halves.append(_Part(*half, groups, problem.combination.squares(groups)))
+            halves.append(_Part(*half, groups, problem.squares(groups)))
         return halves
 
     def _bisected_input(self, output: int) -> int:

@@ -2,15 +2,92 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.errors import require
+from alphacut.frame.spectra.target import TargetSpectrum
 
 COMBINATIONS = {
     "SRSS": "square root of the sum of squares",
     "CQC": "complete quadratic combination",
 }
 """Rules of combination, by their names in the literature."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpectralModes:
+    """The lowest K modes of a structure at S parameter sets, for m outputs.
+
+    Args:
+        omega: Angular frequencies ω in rad/s, rising, shape (S, K).
+        ratios: Damping ratios φᵀ D φ / (2 ω), with φᵀ M φ = 1, shape (S, K).
+        mass_fractions: Effective masses over the mass that moves with the ground, shape (S, K).
+        factors: Participation factor φᵀ M ι times the output of the mode shape, shape (S, K, m).
+            Times the spectral displacement it is the peak of the output by this mode.
+    """
+
+    omega: Array
+    ratios: Array
+    mass_fractions: Array
+    factors: Array
+
+    @property
+    def periods(self) -> Array:
+        """Natural periods in s, shape (S, K)."""
+        return np.asarray(2 * np.pi / self.omega)
+
+    def peaks(self, accelerations: Array) -> Array:
+        """Return the peaks of the outputs by each mode, with their signs, shape (S, K, m).
+
+        Args:
+            accelerations: Spectral pseudo-acceleration of each mode, in m/s², shape (S, K).
+        """
+        displacements = accelerations / self.omega**2
+        return np.asarray(self.factors * displacements[..., np.newaxis])
+
+
+@dataclass(frozen=True)
+class Combination:
+    """What is combined: the spectrum, the rule, and the number of modes.
+
+    Args:
+        spectrum: Pseudo-acceleration over the period.
+        rule: "SRSS" or "CQC".
+        modes: Number of the lowest modes that are combined; None for all.
+        own_ratios: Whether CQC takes the damping ratio of each mode; else that of the spectrum.
+    """
+
+    spectrum: TargetSpectrum
+    rule: str
+    modes: int | None
+    own_ratios: bool
+
+    def combined(self, modes: SpectralModes, accelerations: Array | None = None) -> Array:
+        """Return the combined peaks of the outputs, shape (S, m).
+
+        Args:
+            modes: The modes.
+            accelerations: Spectral accelerations of the modes in place of those of the spectrum, in
+                m/s², shape (S, K).
+
+        Raises:
+            RefusedError: A period lies outside the range of the spectrum, or CQC is to take the
+                damping ratio of a mode that has none.
+        """
+        correlations = np.eye(modes.omega.shape[1])
+        if self.rule == "CQC":
+            ratios = np.full_like(modes.ratios, self.spectrum.damping)
+            if self.own_ratios:
+                ratios = modes.ratios
+            allowed = "above 0 for CQC, as two modes without damping are correlated in no way"
+            require(bool((ratios > 0).all()), "damping ratio", f"{ratios.min():g}", allowed)
+            correlations = correlation(modes.omega, ratios)
+        if accelerations is None:
+            accelerations = self.spectrum(modes.periods)
+        return combined_peaks(modes.peaks(accelerations), correlations)
 
 
 def correlation(frequencies: Array, ratios: Array) -> Array:

@@ -12,9 +12,9 @@ from alphacut.frame import (
     eurocode8_spectrum,
     spectrum_response,
 )
-from alphacut.frame.analyses.spectrum_response import Method
+from alphacut.frame.modes.spectral_modes import spectral_modes
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
-from alphacut.frame.spectra.modal_combination import correlation, correlation_range
+from alphacut.frame.spectra.modal_combination import Combination, correlation, correlation_range
 from alphacut.frame.structures.linear import evaluate
 from alphacut.fuzzy import Interval, RefusedError
 
@@ -160,9 +160,9 @@ def test_no_sample_of_a_cut_lies_outside_guaranteed_bounds(number, rng):
     found = spectrum_response(
         structure, inputs, spectrum, combination=rule, own_ratios=own_ratios, alpha=[0.0]
     )
-    method = Method(spectrum, rule, None, own_ratios)
+    method = Combination(spectrum, rule, None, own_ratios)
     points = rng.uniform(*np.transpose(ends), (400, len(names)))
-    samples = method.combined(method.modes_at(structure, names, points))
+    samples = method.combined(spectral_modes(structure, names, points, method.modes))
     low, high = found.proved[0].T
     assert found.unproved == ""
     assert (samples >= low).all()
@@ -196,8 +196,8 @@ def test_peaks_of_modes_that_cross_lie_within_guaranteed_bounds(link, modes, rul
     found = spectrum_response(chains, cut, SPECTRUM, combination=rule, modes=modes, alpha=[0.0])
     points = rng.uniform(3.7e7, 4.3e7, (1000, 1))
     points[:100] = 4e7 + rng.uniform(-1e3, 1e3, (100, 1))  # about the crossing
-    method = Method(SPECTRUM, rule, modes, False)
-    samples = method.combined(method.modes_at(chains, ["k"], points))
+    method = Combination(SPECTRUM, rule, modes, False)
+    samples = method.combined(spectral_modes(chains, ["k"], points, method.modes))
     low, high = found.proved[0].T
     assert found.unproved == ""
     assert (samples >= low).all()
