@@ -22,9 +22,11 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.response.filtered_record import filtered_record
 from alphacut.frame.spectra.response_spectrum import checked_periods
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.model import Dynamics, StructureModel
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.result import Nature
@@ -155,7 +157,7 @@ def floor_spectrum(
     the frequency of a mode.
 
     Args:
-        structure: A linear structure at rest, moved by one accelerogram of the ground.
+        structure: A linear structure at rest, moved by the ground alone.
         inputs: Fuzzy parameters by name, in SI units; a number is a crisp one.
         outputs: Names of absolute accelerations, one or more: "a3" of a storey frame.
         periods: Periods in s, 0 or from 0.001 s on. At 0 the spectrum is the floor's largest
@@ -169,8 +171,8 @@ def floor_spectrum(
             nothing.
 
     Raises:
-        RefusedError: The structure is not linear, not at rest, under forces, or not moved by one
-            plain record; an output is no absolute acceleration; or an argument is not as said.
+        RefusedError: The structure is not linear, not at rest, under forces, or not moved by plain
+            records; an output is no absolute acceleration; or an argument is not as said.
         FailedError: A step is too long, or no bounds are found.
 
     Example:
@@ -230,14 +232,14 @@ def observed_accelerations(
     is_linear = structure.dynamics is Dynamics.LINEAR and isinstance(structure, LinearSystem)
     require(is_linear, "structure", type(structure).__name__, allowed)
     assert isinstance(structure, LinearSystem)
-    ground = structure.ground
-    require(ground is not None, "ground", None, "an accelerogram, which moves the structure")
-    assert ground is not None
-    is_plain = not (ground.start or ground.frequency or ground.is_held)
-    allowed = "samples from t = 0 on alone"
-    require(is_plain, "ground", "a record that starts late, is held or has a sine", allowed)
-    allowed = "one accelerogram of the ground alone"
-    require(not structure.loads, "loads", f"{len(structure.loads)} forces", allowed)
+    grounds = grounds_of(structure)
+    for ground in grounds:
+        is_plain = not (ground.start or ground.frequency or ground.is_held)
+        allowed = "samples from t = 0 on alone"
+        require(is_plain, "ground", "a record that starts late, is held or has a sine", allowed)
+    forces = [force for force in structure.loads if not force.is_inertial]
+    allowed = "accelerograms of the ground alone"
+    require(not forces, "loads", f"{len(forces)} forces", allowed)
     system = structure.with_outputs(outputs)
     points = {"": np.zeros(1)}
     if inputs:
@@ -256,6 +258,21 @@ def observed_accelerations(
         is_acceleration = bool(assembly.accelerated[k].any() and not row.any())
         require(is_acceleration, "output", name, "absolute accelerations, as a3 of a frame")
     return system
+
+
+def grounds_of(structure: LinearSystem) -> list[Accelerogram]:
+    """Return the accelerograms of all components of the ground motion.
+
+    Raises:
+        RefusedError: A component has none.
+    """
+    grounds = [structure.ground]
+    if isinstance(structure, MatrixStructure):
+        grounds += [ground for ground, _ in structure.components]
+    found = [ground for ground in grounds if ground is not None]
+    is_complete = len(found) == len(grounds)
+    require(is_complete, "ground", None, "an accelerogram of each direction, which moves it")
+    return found
 
 
 class _Column(NamedTuple):
@@ -287,8 +304,9 @@ class _Floor:
         duration: Length of the simulation, in s.
         step: Largest distance of the time nodes, in s.
         error: Error that is aimed at, as a fraction of each value.
-        gain: Bounds in 1/s of the accelerations for a unit of the integral of that of the ground,
-            shape (outputs,); None where no bound is known, for the reason `unproved`.
+        gain: Bounds in 1/s of the accelerations for a unit of the integral of each component of
+            that of the ground, shape (components, outputs); None where no bound is known, for the
+            reason `unproved`.
     """
 
     system: LinearSystem
@@ -315,7 +333,10 @@ class _Floor:
         gain = None
         unproved = ""
         try:
-            gain = acceleration_gain(system, cuts, duration)
+            influences: list[Array | None] = [None]
+            if isinstance(system, MatrixStructure):
+                influences += [influence for _, influence in system.components]
+            gain = np.array([acceleration_gain(system, cuts, duration, x) for x in influences])
         except UnprovedError as reason:
             unproved = str(reason)
         return cls(system, cuts, damping, duration, step, error, gain, unproved)
@@ -361,25 +382,27 @@ class _Floor:
             The structure; the peaks of its outputs at the nominal inputs, shape (outputs,); and the
             bounds of their errors by the steps of the response, the same shape, None if not known.
         """
-        ground = self.system.ground
-        assert ground is not None
+        grounds = grounds_of(self.system)
         if not period:
             return self.system, self._nominal(self.system, step), np.zeros(len(self.system.outputs))
         phase = PHASE_WITHOUT_PROOF if self.gain is None else FIRST_PHASE
-        substeps = ceil(2 * np.pi / period * ground.step / phase)
+        substeps = ceil(2 * np.pi / period * grounds[0].step / phase)
         while True:
-            filtered = filtered_record(
-                ground, period, self.damping, substeps=substeps, duration=self.duration
-            )
-            system = self.system.moved_by(filtered.record)
+            found = [
+                filtered_record(
+                    ground, period, self.damping, substeps=substeps, duration=self.duration
+                )
+                for ground in grounds
+            ]
+            system = self.system.moved_by(*(x.record for x in found))
             nominal = self._nominal(system, step)
             if self.gain is None:
                 return system, nominal, None
-            error = self.gain * filtered.integral_error
+            error = np.array([x.integral_error for x in found]) @ self.gain
             # The error falls with the cube of the step.
             excess = float((error / np.maximum(nominal, 1e-300)).max()) / STEP_ERROR
             finer = substeps * max(2, ceil(excess ** (1 / 3)))
-            if excess <= 1 or self.duration * finer > MAX_SAMPLES * ground.step:
+            if excess <= 1 or self.duration * finer > MAX_SAMPLES * grounds[0].step:
                 return system, nominal, error
             substeps = finer
 

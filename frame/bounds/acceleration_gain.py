@@ -26,7 +26,7 @@ Unknowns without mass are condensed, which makes K no larger than its part on th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,13 +44,17 @@ ROUNDING = 1 + 1e-9
 """Covers the rounding of some dozen operations on bounds."""
 
 
-def acceleration_gain(system: LinearSystem, boxes: Boxes, duration: float) -> Array:
+def acceleration_gain(
+    system: LinearSystem, boxes: Boxes, duration: float, influence: Array | None = None
+) -> Array:
     """Return bounds of accelerations over a box, for one unit of the ground's integrated one.
 
     Args:
         system: The structure; its outputs take absolute accelerations alone.
         boxes: Boxes of its inputs; the widest one counts.
         duration: Time in s up to which the bounds hold.
+        influence: ι of a further component of the ground motion, shape (unknowns,); that of the
+            structure unless given.
 
     Returns:
         Bounds in 1/s, shape (outputs,): times the largest |∫₀ᵗ δ dτ| they bound the outputs of all
@@ -60,7 +64,10 @@ def acceleration_gain(system: LinearSystem, boxes: Boxes, duration: float) -> Ar
         UnprovedError: Neither bound is known to hold.
     """
     low, high = boxes.lower[0], boxes.upper[0]
-    parts = _Parts.of(system.assembly(parameters_over_box(system, boxes.names, low, high)))
+    assembly = system.assembly(parameters_over_box(system, boxes.names, low, high))
+    if influence is not None:
+        assembly = replace(assembly, pattern=influence)
+    parts = _Parts.of(assembly)
     try:
         return parts.by_modes() * ROUNDING
     except UnprovedError as reason:

@@ -22,6 +22,7 @@ from alphacut.frame.modes.geometric_mean import geometric_mean
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.loads import adds_at_once
 
 EQUAL = 1e-6
 """Relative distance of two eigenvalues below which they count as equal: series of modes that are
@@ -106,8 +107,9 @@ class DampedStructure:
             right_sides = M.like((full.accelerated @ basis).T)
             over_mass = factors * solve(M, right_sides).T
             rows = rows - concatenate([over_mass @ K, over_mass @ D], -1)
-            if full.forces is not None:
-                feeds = over_mass @ (basis.T @ full.forces)
+            at_once = adds_at_once(full.loads)
+            if full.forces is not None and at_once.any():
+                feeds = over_mass @ (basis.T @ full.forces) * at_once
         return cls(
             mass=M,
             damping=D,

@@ -305,8 +305,8 @@ def read_response(source: str, sigma: Array, G: Array) -> Array:
 
     ρ is the Duhamel integral of the source, exp(σ t) for an initial state, and ν the order of the
     derivative by time. e = −Im G/ω for "load", an acceleration a of the ground, which acts as −M ι
-    a; Im G/ω for "force1", …, and "velocity"; and Re G + (g/ω) Im G for "start", an initial
-    displacement.
+    a; Im G/ω for "force1", …, "velocity", and "component2", …, which are −M ι times an acceleration
+    of the ground; and Re G + (g/ω) Im G for "start", an initial displacement.
 
     Args:
         source: One of these names.

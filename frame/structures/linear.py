@@ -8,7 +8,7 @@ S parameter sets of jets, and for nothing of Taylor models.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Generic, NamedTuple, Self, TypeGuard, TypeVar, cast
 
@@ -20,7 +20,7 @@ from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import Accelerogram, History
-from alphacut.frame.structures.loads import Force, distinct_histories
+from alphacut.frame.structures.loads import Force, adds_at_once, distinct_histories, history_keys
 from alphacut.frame.structures.model import Dynamics, StructureModel
 
 Number = TypeVar("Number", Jet, TaylorModel)
@@ -84,14 +84,11 @@ class Assembly(Generic[Number]):
         alone. Over parameter sets the result is a jet (values with derivatives), and … counts the
         sets; over a box it is a Taylor model (polynomials with error bounds), without the axis ….
         """
-        histories = distinct_histories(self.loads)
-        belongs = np.zeros((len(self.loads), len(histories)))
-        for row, force in zip(belongs, self.loads, strict=True):
-            # Histories are compared by their values, since equal ones are often made twice. One
-            # column for both halves the work of a response.
-            if force.history is not None:
-                row[:] = [force.history.identity == history.identity for history in histories]
-        return self._summed(belongs)
+        # Forces with equal histories share a column, which halves the work of a response.
+        keys = history_keys(self.loads)
+        distinct = [key for key in dict.fromkeys(keys) if key is not None]
+        belongs = np.array([[key == other for other in distinct] for key in keys], float)
+        return self._summed(belongs.reshape(len(keys), len(distinct)))
 
     @property
     def static(self) -> Number | None:
@@ -210,14 +207,17 @@ def histories(system: LinearSystem) -> dict[str, History]:
     """Return the histories of all loads by name.
 
     The base acceleration comes first and is named "load". The histories of the forces follow as
-    "force1", "force2" … in the order of their first use; equal histories appear once. Impulses have
-    no history. A structure without loads gives an empty dictionary.
+    "force1", "force2" … in the order of their first use; equal histories appear once. Those of the
+    inertia forces of further components of the ground motion are "component2" …, numbered as they
+    stand among all. Impulses have no history. A structure without loads gives an empty dictionary.
     """
     named: dict[str, History] = {}
     if system.ground is not None:
         named["load"] = system.ground
-    for number, history in enumerate(distinct_histories(system.loads), start=1):
-        named[f"force{number}"] = history
+    loads = system.loads
+    of_loads = zip(distinct_histories(loads), adds_at_once(loads), strict=True)
+    for number, (history, is_force) in enumerate(of_loads, start=1):
+        named[f"force{number}" if is_force else f"component{number + 1}"] = history
     return named
 
 
@@ -239,6 +239,8 @@ class Matrices:
         forces: Force under a unit of each history, shape (S, n, H); None without one.
         static: Force under which the structure rests at the start, shape (S, n, 1), if any.
         impulse: Impulse at t = 0, shape (S, n, 1), if any.
+        at_once: Whether each history is that of a force, which adds to absolute accelerations at
+            once; not that of an inertia force. Shape (H,).
     """
 
     mass: Jet
@@ -251,6 +253,7 @@ class Matrices:
     forces: Jet | None = None
     static: Jet | None = None
     impulse: Jet | None = None
+    at_once: Mask = field(default_factory=lambda: np.zeros(0, bool))
 
     @cached_property
     def inverse_mass(self) -> Jet:
@@ -305,14 +308,14 @@ class Matrices:
         """Feedthrough: what a unit of each force history adds to the outputs at once.
 
         A force adds M⁻¹ b to accelerations at the moment at which it acts, and so to outputs that
-        observe these. The shape is (S, outputs, histories) over S parameter sets, with derivatives
-        by the parameters (a jet). It is None if no output observes an acceleration, or no force has
-        a history.
+        observe these; inertia forces add nothing to absolute ones. The shape is (S, outputs,
+        histories) over S parameter sets, with derivatives by the parameters (a jet). It is None if
+        no output observes an acceleration, or no force has a history.
         """
-        if self.forces is None or not self.accelerated.any():
+        if not self.at_once.any() or not self.accelerated.any():
             return None
         fed: Jet = self.accelerated @ self.pushes(ground=False)
-        return fed
+        return fed * self.at_once
 
 
 def evaluate(
@@ -388,6 +391,7 @@ def evaluate(
         forces=_rows_of(full.forces, a),
         static=_rows_of(full.static, a),
         impulse=_rows_of(full.impulse, a),
+        at_once=adds_at_once(full.loads),
     )
     if full.accelerated.any():
         # the absolute acceleration is q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f, whose last term

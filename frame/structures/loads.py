@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from alphacut.base.arrays import Array
+import numpy as np
+
+from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require, require_sequence
 from alphacut.frame.records.history import Accelerogram, History
 
@@ -33,10 +35,40 @@ class Force:
     is_inertial: bool = False
 
 
+def history_keys(forces: Sequence[Force]) -> list[tuple[object, bool] | None]:
+    """Return of each force a hashable key of its history and of whether it is an inertia force.
+
+    It is None of impulses, which have no history. Histories are compared by their values, since
+    equal ones are often made twice. A force and an inertia force have different keys, because only
+    the former adds to absolute accelerations at once.
+    """
+    keys: list[tuple[object, bool] | None] = []
+    for force in forces:
+        history = force.history
+        keys.append(None if history is None else (history.identity, force.is_inertial))
+    return keys
+
+
 def distinct_histories(forces: Sequence[Force]) -> list[History]:
-    """Return the histories of forces, each once, in the order of their first use."""
-    histories = {force.history.identity: force.history for force in forces if force.history}
+    """Return the histories of forces, each once, in the order of their first use.
+
+    One is twice in the list if a force and an inertia force have it, see `history_keys`.
+    """
+    histories: dict[object, History] = {}
+    for key, force in zip(history_keys(forces), forces, strict=True):
+        if force.history is not None:
+            histories.setdefault(key, force.history)
     return list(histories.values())
+
+
+def adds_at_once(forces: Sequence[Force]) -> Mask:
+    """Return which of the distinct histories add to absolute accelerations at once, in their order.
+
+    A force b f(t) adds M⁻¹ b f. An inertia force −M ι a of a ground acceleration a moves relative
+    to the ground, whose part ι a of the absolute acceleration just cancels it.
+    """
+    keys = dict.fromkeys(key for key in history_keys(forces) if key is not None)
+    return np.array([not is_inertial for _, is_inertial in keys], bool)
 
 
 def require_loads(ground: object, forces: Sequence[object]) -> None:

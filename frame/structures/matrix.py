@@ -56,8 +56,8 @@ class MatrixStructure(LinearSystem):
         stiffness: The same, in N/m.
         observed: Rows by output name (an `Output` gives its unit), each (n,) acting on
             displacements, (2n,) on displacements and velocities, or (3n,) on these and absolute
-            accelerations q̈ + ι a, those of the ground included. What is taken of accelerations
-            has no row factor, is of unknowns with mass, and of one component of ground motion.
+            accelerations q̈ + Σ ι a, those of the ground included. What is taken of accelerations
+            has no row factor and is of unknowns with mass.
         damping: The same, in N s/m.
         q0: Initial displacements, shape (n,), in m; zero when None.
         v0: Initial velocities, shape (n,), in m/s; zero when None.
@@ -79,7 +79,7 @@ class MatrixStructure(LinearSystem):
             factor names no parameter, an array is not symmetric, the mass of unknowns that have
             mass is not positive definite, one without mass has a damper, a force or no stiffness,
             or a ratio is outside [0, 1); or an output takes accelerations of unknowns
-            without mass, under several components, or has a factor of them.
+            without mass, or has a factor of them.
 
     Example:
         >>> import numpy as np
@@ -212,8 +212,7 @@ class MatrixStructure(LinearSystem):
         """Raise RefusedError if an output takes accelerations that the structure cannot give.
 
         Unknowns without mass follow the others, so that their acceleration depends on that of the
-        ground at once. Inertia forces of further components give accelerations relative to them. A
-        factor would be one of what forces add to accelerations at once as well.
+        ground at once. A factor would be one of what forces add to accelerations at once as well.
         """
         for k, name in enumerate(self.observed):
             row = self._rows[k, 2 * self.size :]
@@ -223,8 +222,6 @@ class MatrixStructure(LinearSystem):
             missing = self.massless[np.flatnonzero(row[self.massless])]
             value = f"accelerations of unknowns {missing}"
             require(not len(missing), key, value, "accelerations of unknowns that have mass")
-            value = f"accelerations under {len(self.components) + 1} components"
-            require(not self.components, key, value, "accelerations under one component")
             factor = self.row_factors.get(name, 1.0)
             if isinstance(factor, Monomial):
                 factor = factor.simplest

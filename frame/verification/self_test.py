@@ -140,7 +140,7 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
             record=record,
             record_step=record_step,
             forces=forces,
-            feeds=matrices.accelerated @ np.linalg.solve(M, forces),
+            feeds=matrices.accelerated @ np.linalg.solve(M, forces) * matrices.at_once,
             histories=histories,
         )
         motions.append(motion)

@@ -122,6 +122,28 @@ def test_matrices_and_coupled_damping_have_floor_spectra(rng):
     assert a.nominal == pytest.approx(b.nominal, rel=1e-6)
 
 
+def test_components_of_the_ground_motion_add_up(rng):
+    """A component along the same direction is a part of the ground motion."""
+    first, second = record(rng), record(rng)
+    both = replace(first, samples=first.samples + 0.5 * second.samples)
+    plan = MatrixStructure(
+        {"k": 900.0},
+        mass=[(1.0, np.diag(MASSES))],
+        stiffness=[("k", np.array([[1.4, -0.4], [-0.4, 0.4]]))],
+        observed={"top": np.eye(6)[5]},
+        ratios=[0.05],
+        ground=both,
+    )
+    apart = replace(plan, ground=first, components=[(second, np.full(2, 0.5))])
+    inputs = {"k": Interval(880.0, 920.0)}
+    a, b = (
+        floor_spectrum(x, inputs, "top", [0.0, 0.3], alpha=[0], **MOTION) for x in (plan, apart)
+    )
+    assert b.natures == (("guaranteed",) * 2,)
+    assert b.nominal == pytest.approx(a.nominal, rel=1e-3)
+    assert b.bound == pytest.approx(a.bound, rel=1e-2)
+
+
 def test_without_a_bound_of_the_steps_nothing_is_guaranteed(rng):
     dashpots = {"dampers": (3.0, 1.0), "damper_placement": "storey"}
     frame = frame_of(record(rng), **dashpots)
@@ -160,7 +182,7 @@ def test_what_has_no_floor_spectrum_is_one_line(rng):
     refuses(pendulum(), "structure is LagrangianSystem; allowed: a linear structure")
     refuses(frame_of(None), "ground is missing; allowed: an accelerogram")
     refuses(frame_of(replace(ground, start=0.5)), "ground is a record that starts late")
-    refuses(frame_of(ground, loads=(force,)), "loads is 1 forces; allowed: one accelerogram")
+    refuses(frame_of(ground, loads=(force,)), "loads is 1 forces; allowed: accelerograms")
     refuses(frame_of(ground, q0=(0.1, 0.0)), "structure is displaced or in motion at the start")
     refuses(frame, "displaced or in motion", inputs={"q1_0": Interval(-0.1, 0.1)})
     refuses(frame, "output is q2; allowed: absolute accelerations, as a3", outputs="q2")

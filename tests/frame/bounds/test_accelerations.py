@@ -52,7 +52,7 @@ def test_bounds_of_accelerations_hold_with_fuzzy_masses_and_weights(rng):
 
 @pytest.fixture
 def plan(rng):
-    """A floor on two columns and a roof, under the ground and a force, with three outputs."""
+    """A floor on two columns and a roof, under two components of the ground and a force."""
     springs = np.array([[3.0, -1.0, 0.2], [-1.0, 1.0, 0.0], [0.2, 0.0, 0.7]])
     rows = np.eye(9)
     return MatrixStructure(
@@ -63,6 +63,8 @@ def plan(rng):
         ratios=[0.05],
         ground=Accelerogram(0.04, rng.normal(size=26)),
         loads=[Force(np.array([0, 1.0, 0]), 0.8, History(0.05, rng.normal(size=20)))],
+        pattern=np.array([1.0, 1.0, 0.0]),
+        components=[(Accelerogram(0.04, rng.normal(size=26)), np.array([0.3, 0.0, 1.0]))],
     )
 
 
@@ -79,7 +81,7 @@ def test_bounds_of_outputs_on_matrices_hold(plan, rng, method):
     require_inside(motions, found)
     size = np.abs(motions).max(axis=(0, 1))
     slack = np.abs(found.upper[0] - motions.max(axis=0)).max(axis=0)
-    assert (slack < 0.1 * size).all()
+    assert (slack < 0.25 * size).all()
 
 
 def test_a_mixture_of_displacements_and_accelerations_is_left_to_branch_and_bound(plan, rng):

@@ -18,7 +18,11 @@ PLAN = MatrixStructure(
     {"m": 2.0, "k": 90.0},
     mass=[("m", np.eye(3)), (0.3, np.diag([1.0, 1.0, 0.0]))],
     stiffness=[("k", TORSION)],
-    observed={"corner": np.array([1.0, 0, -0.8]), "speed": np.array([0.0, 0, 0, 0, 1.0, 0.6])},
+    observed={
+        "corner": np.array([1.0, 0, -0.8]),
+        "speed": np.array([0.0, 0, 0, 0, 1.0, 0.6]),
+        "acceleration": np.array([0.0] * 6 + [0.7, 1.0, 0.6]),
+    },
     ratios=[0.04],
     ground=X,
     pattern=EAST,

@@ -95,10 +95,6 @@ MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q
             "observed: a is accelerations times a factor; allowed: accelerations as they are",
         ),
         (
-            {"observed": {"a": np.eye(6)[4]}, "components": [(None, EYE[0])]},
-            "observed: a is accelerations under 2 components; allowed: accelerations under one",
-        ),
-        (
             {"observed": {"a": np.eye(6)[5]}, "mass": [("m", np.diag([1.0, 0.0]))]},
             r"observed: a is accelerations of unknowns \[1\]; allowed: .* that have mass",
         ),
