@@ -382,13 +382,22 @@ class Frame(StructureSection):
             yield f"frame.lengths has a storey of {tallest:g} m: is its unit right, m or mm?"
             return
         yield from self._size_warnings(tallest or 5.0)  # m, a guess where no height is known
+        of_columns = ("shear", "base_shear", "overturning_moment")
+        shears = [x for x in self.outputs or () if x.rstrip("0123456789") in of_columns]
+        if shears and any(any(damper.support) for damper in self.dampers):
+            yield (
+                f"{', '.join(shears)}: forces of the columns, without those of the dampers,"
+                " which act on storeys and foundation, too"
+            )
         if self.gravity or self.lengths is None or structure is None:
             return
         # The coefficients are the largest in the supports of all parameters: if they are small,
         # the weights may be left out at every value that the inputs may have.
         frame = cast("StoreyFrame", structure.model)
         ends = {name: number.support for name, number in structure.numbers.items()}
-        yield from self._weight_warnings(frame.stability_coefficients(ends))
+        coefficients = frame.stability_coefficients(ends)
+        yield from self._weight_warnings(coefficients)
+        yield from self._hardening_warnings(coefficients)
 
     def _size_warnings(self, height: float) -> Iterator[str]:
         """Yield a sentence for each start, yield drift, yield force or gravity of an unusual size.
@@ -435,6 +444,22 @@ class Frame(StructureSection):
             if coefficient > 0.1:  # up to which EN 1998-1, 4.4.2.2, neglects P-Delta
                 what = f"weight over stiffness and height of storey {z} is up to {coefficient:.2g}"
                 yield f'{what}: say frame.gravity = "1 g", so that drifts grow by it (P-Delta)'
+
+    def _hardening_warnings(self, coefficients: Array) -> Iterator[str]:
+        """Yield a sentence for each storey of which the weight takes much of the hardening.
+
+        Args:
+            coefficients: Weight over stiffness and height of each storey, shape (floors,), the
+                largest that the inputs allow.
+        """
+        numbers = zip(coefficients, self.per_floor(self.hardening), strict=False)
+        for z, (coefficient, hardening) in enumerate(numbers, start=1):
+            left = hardening.support.lower
+            if left < 1 and coefficient > left / 4:  # tuned: drifts may grow by a third
+                yield (
+                    f"storey {z} yields to {left:.2g} of its stiffness, and its weight takes up to"
+                    f' {coefficient:.2g} (P-Delta): say frame.gravity = "1 g"'
+                )
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
         """Return one value for each floor; a single one holds for all of them."""

@@ -247,6 +247,8 @@ class Pipeline:
             results.learned, structure = identify.identify_inputs(
                 content.identify, structure, section.alpha
             )
+            if results.learned.is_refuted:
+                say(f"warning: {results.learned.refuted}; what follows has the inputs of the case")
         results.structure = structure
         (task,) = envelope.tasks(section, ())  # of [envelope] itself
         if content.records is not None:

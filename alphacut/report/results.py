@@ -586,8 +586,10 @@ def answers(parts: Parts) -> list[Row]:
             # The console has no room for a row of each input; page and CSV file have all.
             scale = answer_rows[0]
             count = len(answer_rows) - 1  # one row for each input
-            place = "table on the page and in tolerances.csv"
-            answer_rows = [scale, ("ranges", f"of {count} inputs", place)]
+            place = "table on the page and, by report --csv, in tolerances.csv"
+            inputs = "input" if count == 1 else "inputs"
+            answer_rows = [(scale[0], f"{scale[1]}; {scale[3]}", scale[2])]
+            answer_rows.append(("ranges", f"of {count} {inputs}", place))
         if isinstance(answer, FloorSpectrum):
             answer_rows = [answer_rows[k] for k in answer.largest_rows]
         for row in answer_rows:

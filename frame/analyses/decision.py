@@ -211,6 +211,12 @@ class Decision(Answer):
             " does, and it can be exceeded if a response is known that does. Attained bounds show"
             " what is possible and exclude nothing."
         )
+        if any(part.verdict == "undecided" for part in self.limits.values()):
+            text += (
+                " It is undecided where its bounds lie on both sides of the limit and no response"
+                " beyond it was found: a smaller time step, narrower inputs, or method auto may"
+                " decide."
+            )
         if any(part.side == "mean" for part in self.limits.values()):
             text += (
                 " The guaranteed bound of a mean over records is the mean of the largest peaks of"

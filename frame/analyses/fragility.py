@@ -115,6 +115,8 @@ class CriticalMeasures:
         for end in ("low", "low_reached", "high_reached", "high", "crossed"):
             values = getattr(self, end)
             object.__setattr__(self, end, np.where(np.isnan(values), np.inf, values))
+        if np.isnan(self.largest):
+            object.__setattr__(self, "largest", np.inf)
         # Ends that agree but for rounding are accepted. They are checked because results are read
         # back from files, too.
         reached = np.stack([self.low_reached, self.high_reached])

@@ -227,7 +227,7 @@ class LimitResult:
         was not stated in words, or was stated as a percentage, as a ratio or as a plain number.
         """
         # A number followed by a unit; fractions ("1/200") and percentages have no unit.
-        number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/].*)"
+        number_and_unit = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([^\d\s%/.].*)"
         match = re.fullmatch(number_and_unit, self.stated.replace(MINUS, "-"))
         if match is None or not self.limit or not float(match[1]):
             return None

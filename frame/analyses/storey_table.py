@@ -66,7 +66,16 @@ def assumptions(frame: StoreyFrame) -> list[str]:
     if frame.ratios:
         ratios = ", ".join(percent_text(ratio) for ratio in frame.ratios.values())
         sentences.append(f"The damping ratio of the modes is {ratios}.")
-    has_dashpots = any(frame.dampers) or any(frame.rayleigh)
-    if not frame.ratios and not has_dashpots:
+    if any(frame.dampers):
+        where = "between the storeys"
+        if frame.damper_placement == "ground":
+            where = "from the floors to the ground"
+        sentences.append(
+            f"Dashpots {where} damp the motion, too. Shears, the base shear and the overturning"
+            " moment are those of the columns, without the dashpots."
+        )
+    if any(frame.rayleigh):
+        sentences.append("Rayleigh damping is added.")
+    if not (frame.ratios or any(frame.dampers) or any(frame.rayleigh)):
         sentences.append("Nothing damps the motion.")
     return sentences

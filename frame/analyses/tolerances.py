@@ -85,6 +85,10 @@ class Tolerances(Answer):
         scale = "none"
         if self.kept is not None:
             scale = f"up to {rounded(self.kept, 'upper', Nature.ATTAINED):.4g}"
+            if self.kept == self.most:
+                scale += ", the largest tried"
+        elif self.passed == 0:
+            scale = "none: the nominal inputs exceed a limit"
         rows = [self._row("scale of all ranges", kept=scale, beside=self._exceeded_text())]
         for name, support in self.supports.items():
             text = "–"

@@ -65,7 +65,7 @@ class YieldingFlow(Flow):
 
     Raises:
         RefusedError: The frame is elastic or a force is harmonic; of trajectories: a force yields a
-            storey before the start, or a storey collapses under its weight when it yields.
+            storey before the start, or a storey collapses under its weight.
     """
 
     system: StoreyFrame
@@ -139,7 +139,8 @@ class YieldingFlow(Flow):
 
         Raises:
             RefusedError: A static force yields a storey before the start, or a storey collapses
-                under its weight and `takes_collapse` is false.
+                under its weight and `takes_collapse` is false: it yields beyond the drift at which
+                its columns could hold the weight at rest.
             StepError: A substep has more than 1000 events, or the balance of energy is off by more
                 than 1e-9 of all energies exchanged at the end.
         """
@@ -235,7 +236,7 @@ class YieldingFlow(Flow):
         if end.status == COLLAPSED:
             where = self._point_words(point)
             value = f"collapsing under its weight at t = {end.time:.6g} s at {where}"
-            allowed = "hardening times stiffness above weight over height where it yields"
+            allowed = "drifts at which its columns hold the weight at rest"
             cure = "take more hardening, a larger yield force or a weaker load"
             raise RefusedError(f"storey {end.storey + 1}", value, allowed, cure)
         if end.status == FAILED:
@@ -355,6 +356,13 @@ def _march(
     for z in range(n):
         d = _drift(q, z)
         plastic[z] = d - min(max(d, -yield_drift[z]), yield_drift[z])
+    # Where the weight softens a yielding storey by more than it hardens, columns hold the weight up
+    # to a drift at which their force and its own are equal: (1 − a) k d_y = (s − a k) d.
+    last_drift = np.full(n, np.inf)
+    for z in range(n):
+        if softening[z] > hardening[z] * k[z]:
+            excess = softening[z] - hardening[z] * k[z]
+            last_drift[z] = (1 - hardening[z]) * k[z] * yield_drift[z] / excess
     before = _energy(storeys, q, v, plastic)
     works = np.zeros(2)
     node = 0
@@ -388,7 +396,9 @@ def _march(
                 constant[i] = (1 - hardening[i]) * k[i] * spring
                 tangent[i] = fraction * k[i] - softening[i]
             terms = _expand(inverse_mass, damping, tangent, constant, load, rise, h, q, v, series)
-            at, z = _first_event(series, terms, plastic, direction, yield_drift, hardening)
+            at, z = _first_event(
+                series, terms, plastic, direction, yield_drift, hardening, last_drift
+            )
             _add_works(damping, load, rise, series, terms, at, h, works)
             # move the state to the event (or to the end); the plastic drift of a yielding storey
             # follows its drift, and what it dissipates is the yield force of its plastic spring
@@ -406,12 +416,11 @@ def _march(
             h *= 1 - at
             if z < 0:
                 break
-            # A yielding storey turns elastic. An elastic one begins to yield, and collapses if its
-            # tangent stiffness is not positive then: nothing would turn it.
+            # A yielding storey turns elastic, or has collapsed. An elastic one begins to yield.
             if direction[z] != 0:
+                if direction[z] * _drift(q, z) >= (1 - 1e-9) * last_drift[z]:
+                    return MotionEnd(COLLAPSED, edges[e + 1] - h, z, 0.0)
                 direction[z] = 0.0
-            elif softening[z] > 0 and hardening[z] * k[z] <= softening[z]:
-                return MotionEnd(COLLAPSED, edges[e + 1] - h, z, 0.0)
             else:
                 direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
             # damping forces jump at the event, velocities do not
@@ -506,12 +515,13 @@ def _expand(
 @compiled
 def _first_event(
     series: Array, terms: int, plastic: Array, direction: Array, yield_drift: Array,
-    hardening: Array,
+    hardening: Array, last_drift: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """Return τ at the first event of a substep, and its storey; 1 and −1 where there is none.
 
     An elastic storey yields where |drift − plastic drift| exceeds the yield drift; a yielding one
-    turns elastic where the velocity of its drift changes its sign.
+    turns elastic where the velocity of its drift changes its sign, and collapses where its drift
+    passes the last one at which it holds its weight.
 
     Args:
         series: Coefficients by powers of τ, τ in [0, 1] the fraction of the substep that has
@@ -524,6 +534,7 @@ def _first_event(
         yield_drift: Yield drift of each storey, in m, shape (n,).
         hardening: Stiffness after yielding over the initial one, shape (n,); a storey of 1 never
             yields.
+        last_drift: Drift at which a storey that yields outwards collapses, in m, shape (n,).
     """
     first = 1.0
     storey = -1
@@ -537,13 +548,19 @@ def _first_event(
             variation += (term if sign != 0 else 1) * abs(drifts[z, term])
         # Σ |c_k| bounds the variation of a polynomial Σ c_k τ^k: mostly there is no event
         if sign != 0:
-            # the velocity of the drift cannot change its sign within the substep
-            if 2 * sign * drifts[z, 1] > variation:
-                continue
-            for term in range(1, terms):
-                margin[term - 1] = sign * term * drifts[z, term]
-            margin[0] += EVENT_ROUNDING * variation
-            at = _first_root(margin, terms - 1, first)
+            at = first
+            # `variation` also bounds that of the drift
+            if sign * drifts[z, 0] + variation > last_drift[z]:
+                for term in range(terms):
+                    margin[term] = -sign * drifts[z, term]
+                margin[0] += last_drift[z]
+                at = min(at, _first_root(margin, terms, at))
+            # unless the velocity of the drift cannot change its sign within the substep
+            if 2 * sign * drifts[z, 1] <= variation:
+                for term in range(1, terms):
+                    margin[term - 1] = sign * term * drifts[z, term]
+                margin[0] += EVENT_ROUNDING * variation
+                at = min(at, _first_root(margin, terms - 1, at))
         # a storey whose hardening is 1 never yields
         elif abs(elastic) + variation < yield_drift[z] or hardening[z] == 1:
             continue

@@ -161,7 +161,7 @@ class LearnedInputs(Answer):
             row = _record(
                 name, self.units[name], before=self.prior[name], after=self._learned(name)
             )
-            rows.append(row | {"narrowed by": self.narrowed[name]})
+            rows.append(row | {"fraction of the width": self.narrowed[name]})
         for mode in self.held_out:
             measured = (mode.measured, mode.measured)
             row = _record(f"mode {mode.mode}", "Hz", before=measured, after=mode.predicted)
@@ -184,8 +184,8 @@ def _record(
 ) -> Record:
     """Return a row of numbers about a parameter or a mode that was held out.
 
-    The last two columns are left None and empty. The caller fills in "narrowed by" of a parameter
-    and "inside" of a mode.
+    The last two columns are left None and empty. The caller fills in "fraction of the width" of a
+    parameter and "inside" of a mode.
 
     Args:
         name: Name of the parameter, or "mode 2" and so on.
@@ -200,7 +200,7 @@ def _record(
         "before or measured, to": before[1],
         "from": after[0],
         "to": after[1],
-        "narrowed by": None,
+        "fraction of the width": None,
         "inside": "",
     }
 

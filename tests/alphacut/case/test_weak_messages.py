@@ -2,6 +2,7 @@
 
 import pytest
 
+from alphacut import main
 from tests.alphacut.small import refusals
 
 CASE = """
@@ -66,3 +67,28 @@ def test_one_line_names_the_key_and_the_cure(tmp_path, old, new, words):
     (line,) = refusals(tmp_path / "t.toml")
     for word in words:
         assert word in line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'outputs = ["drift1"]',
+            'dampers = "1 MN s/m"\ndamper_placement = "storey"\noutputs = ["shear2"]',
+            "warning: shear2: forces of the columns, without those of the dampers",
+        ),
+        (
+            "outputs",
+            f'lengths = ["3 m", "3 m"]\nhardening = ["0 %", "5 %"]\n{YIELDS}',
+            "warning: storey 1 yields to 0 of its stiffness, and its weight takes up to 0.022",
+        ),
+    ],
+)
+def test_check_warns_of_what_a_model_leaves_out(tmp_path, capsys, old, new, words):
+    case = tmp_path / "case.toml"
+    case.write_text(CASE, encoding="utf-8")
+    assert main(["check", str(case)]) == 0
+    assert words not in " ".join(capsys.readouterr().out.split())
+    case.write_text(CASE.replace(old, new, 1), encoding="utf-8")
+    assert main(["check", str(case)]) == 0
+    assert words in " ".join(capsys.readouterr().out.split())

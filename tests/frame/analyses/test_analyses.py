@@ -19,6 +19,7 @@ from alphacut.frame import (
     probability,
     tolerances,
 )
+from alphacut.frame.analyses.limits import about_limit
 from alphacut.frame.analyses.peaks import loose_peaks, tightest
 from alphacut.fuzzy import Crisp, Interval, Nature, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points
@@ -347,3 +348,13 @@ def test_the_table_of_a_decision_has_a_row_for_each_limit_and_one_for_any_of_the
     assert all(text.endswith("%") for text in gaps[:-1])  # of single peaks
     assert (rows[-1][0], gaps[-1], rows[-1][head.index("bound of peak")]) == (ANY, "", "")
     assert all(row[head.index("verdict")] == "not exceeded" for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("stated", "unit"),
+    [("1.5 %", None), ("62.5 %", None), ("1/200", None), ("2.5", None), ("1.5 mm", "mm")],
+)
+def test_a_percentage_has_no_unit_of_its_own(stated, unit):
+    result = about_limit(Limit("drift1", 0.02, stated=stated), "m")
+    shown = result.stated_unit
+    assert (shown and shown.label) == unit

@@ -1,17 +1,19 @@
 """Damage states: fits against SciPy, ranges against exact motions, names and limits, Pelicun."""
 
 import csv
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from alphacut.frame import Accelerogram, Limit, StoreyFrame, fragility
+from alphacut.frame import Accelerogram, Fragility, Limit, StoreyFrame, fragility
 from alphacut.frame.analyses.damage_states import fits_between, lognormal_fit
 from alphacut.frame.analyses.fragility import CriticalMeasures
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.fuzzy import RefusedError, Triangular
+from alphacut.io.typed_json import from_document, to_document
 from tests.frame.motions import exact_motions, random_points
 
 FRAME = StoreyFrame([2e4, 2e4], stiffness=[8e6, 6e6], damping_ratio=0.05)
@@ -131,6 +133,8 @@ def test_the_table_of_pelicun_has_its_columns_and_the_fits_in_g(found, tmp_path)
         ends = found.limits[state].lognormal_median
         assert medians[1:] == pytest.approx([ends.lower[0], ends.upper[0]])
         assert ends.lower[1] <= medians[0] <= ends.upper[1]
+    document = json.loads(json.dumps(to_document(found)))
+    assert from_document(Fragility, document).pelicun() == found.pelicun()  # of a report
     with pytest.raises(RefusedError, match="hyphens"):
         found.pelicun("my-frame")
     with pytest.raises(RefusedError, match="scale"):

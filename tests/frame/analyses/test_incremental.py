@@ -37,15 +37,17 @@ def of_scales(frame, inputs, ground, limit, **changes):
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_a_steady_push_exceeds_a_ductility_at_the_closed_form(gravity, rng):
-    # elastic, perfectly plastic under a step m a: μ = 1 / (2 (1 − m a / fy)); under its weight
-    # it collapses once 2 m a / (k − m g / l) is the yield drift fy / k
+    # elastic, perfectly plastic under a step m a: μ = 1 / (2 (1 − m a / fy)); with its weight,
+    # x = m g / (k l), energies give 2 m a / fy = 2 − 1/μ − x μ, and at μ = x^-½ it collapses
     limit = rng.uniform(1.2, 6)
     yield_force = Triangular(*rng.uniform([8, 10, 11], [9, 10, 13]))
     spring = {"stiffness": [90.0], "yield_force": [10.0], "lengths": [3.0], "gravity": gravity}
     inputs, of_limit = {"fy1": yield_force}, Limit("ductility1", limit)
     times = {"duration": 6.0, "step": 0.1}
     sets = of_scales(StoreyFrame([2.0], **spring), inputs, STEADY, of_limit, **times).critical
-    factor = 1 - 2 * gravity / 3 / 90 if gravity else 2 - 1 / limit
+    x = 2 * gravity / 3 / 90
+    reached = min(limit, x**-0.5) if x else limit
+    factor = 2 - 1 / reached - x * reached
     lowest, highest = np.array([yield_force.cut(x) for x in ALPHA]).T / 4 * factor
     for before, after, exact in (
         (sets.low, sets.low_reached, lowest),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from alphacut.frame import (
@@ -139,14 +140,46 @@ def test_events_and_not_steps_decide_and_energy_is_balanced(rng, monkeypatch):
             assert (np.abs(finer - found).max(0) <= 1e-9 * np.abs(found).max(0)).all()
 
 
-def test_collapse_under_weight_is_said_with_its_time():
+@pytest.mark.parametrize("speed", [1.0, 5.0])
+def test_weight_on_a_soft_yielding_storey_turns_it_or_brings_it_down(speed):
+    """Phases by an independent integrator; at a residual drift or at collapse, with its time."""
     frame = StoreyFrame(
-        [5e4], stiffness=[1e7], lengths=[3.0], gravity=9.81, v0=[1.0], yield_drift=[0.01],
-        hardening=[0.01], damping_ratio=0.02,
+        [5e4], stiffness=[1e7], lengths=[3.0], gravity=9.81, v0=[speed], yield_drift=[0.01],
+        hardening=[0.01], damping_ratio=0.02, outputs=("drift1", "residual1"),
     )  # fmt: skip
-    with pytest.raises(RefusedError, match=r"storey 1 .*collapsing .*t = 0\.01\d+ s"):
-        motion(frame, 1.0, 0.1)
-    assert np.isfinite(motion(replace(frame, hardening=[0.02]), 1.0, 0.1)).all()
+    softening = 5e4 * 9.81 / 3
+    damping = 2 * 0.02 * np.sqrt((1e7 - softening) * 5e4)
+    last = 0.99 * 1e5 / (softening - 1e5)  # where columns and weight are equal
+
+    def phase(state, spring, force, event):
+        """A phase with the columns' force, spring · drift + force, until an event of the state."""
+
+        def rates(_, y):
+            return [y[1], -((spring - softening) * y[0] + force + damping * y[1]) / 5e4]
+
+        def end(_, y):
+            return event(y)
+
+        end.terminal = True
+        return solve_ivp(rates, (0, 1), state, "DOP853", events=end, rtol=1e-11, atol=1e-13)
+
+    elastic = phase([0.0, speed], 1e7, 0.0, lambda y: y[0] - 0.01)
+    ends = (lambda y: y[1]) if speed == 1 else (lambda y: y[0] - last)
+    yields = phase(elastic.y[:, -1], 1e5, 0.99e5, ends)
+    time = elastic.t[-1] + yields.t[-1]
+    if speed == 5:
+        with pytest.raises(RefusedError, match=rf"storey 1 .*collapsing .*t = {time:.6g} s"):
+            motion(frame, 1.0, 0.1)
+        return
+    peak = yields.y[0, -1]
+    plastic = peak - 0.01
+    flow = make_flow(frame, (), 3.0, 0.05, "exact")
+    found, peaks_found = flow.values_and_peaks(np.zeros((1, 0)))
+    assert peaks_found[0, 0] == pytest.approx(peak, rel=1e-9)
+    assert 0.1 < peak < last
+    rest = 0.99 * 1e7 * plastic / (1e7 - softening)  # farther out than the plastic drift
+    assert found[0, -1, 1] == pytest.approx(rest, rel=1e-9)
+    assert found[0, -1, 0] == pytest.approx(rest, rel=0.02)
 
 
 def test_peaks_are_searched_and_proofs_are_refused(rng):

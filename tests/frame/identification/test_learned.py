@@ -32,7 +32,11 @@ def test_ends_are_rounded_outwards_in_the_table():
 
 def test_records_have_exact_numbers():
     parameter, mode = LEARNED.records()
-    assert [parameter[x] for x in ("from", "to", "narrowed by")] == [1.23456e6, 1.65432e6, 0.21]
+    assert [parameter[x] for x in ("from", "to", "fraction of the width")] == [
+        1.23456e6,
+        1.65432e6,
+        0.21,
+    ]
     assert [mode[x] for x in ("from", "to", "inside")] == [4.1111, 4.5222, "inside"]
     assert parameter.keys() == mode.keys()
     rows = io.StringIO()
