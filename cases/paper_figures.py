@@ -41,6 +41,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, PiecewiseLinear, Trapezoidal
 from alphacut.io.provenance import NESTED
 from alphacut.rve.cell.cell import Cell
+from alphacut.rve.cell.lattice import SQUARE, Lattice, lattice_of
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.prism_grid import PrismGrid, reference_radius
 from alphacut.stages.cell import GPA, CellProblem
@@ -88,7 +89,9 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     content, modulus = results.content, results.modulus
     if content.radius_map is not None:
         yield "fig13-p-box", p_box(content.radius_map)
-        yield "fig14-cone", cone(content.radius_map)
+        section = content.particle_cell
+        lattice = SQUARE if section is None else lattice_of(section.lattice)
+        yield "fig14-cone", cone(content.radius_map, lattice)
     if modulus is not None:
         if content.particle_cell is not None and content.modulus.method == "prism":
             cell, mesh = CellProblem.of(content).nominal, content.mesh
@@ -136,7 +139,9 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     corners = middle[grid.plane.triangles[:, :3], :2]
     for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
         plane.add_collection(PolyCollection(list(corners[mask]), facecolor=colour, ec=INK, lw=0.25))
-    plane.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal", xlabel="x$_1$/a", ylabel="x$_2$/a")
+    right, top = cell.lattice.corners.max(axis=0)
+    plane.set(xlim=(-right, right), ylim=(-top, top), aspect="equal")
+    plane.set(xlabel="x$_1$/a", ylabel="x$_2$/a")
     plane.set_title(f"physical domain, θ = {middle[0, 2]:g}")
     plane.grid(visible=False)
     law, layer_ends = cell.radius_map.distribution, levels[:, 0, 2]
@@ -152,8 +157,9 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> tuple[PrismGrid, Array]:
     """Mesh of the product domain, `size` in half sides, and its corners (levels of θ, nodes, 3)."""
-    radius = reference_radius(cell.radius_map, cell.outline)
-    grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
+    shape: Any = {"outline": cell.outline, "lattice": cell.lattice}
+    radius = reference_radius(cell.radius_map, **shape)
+    grid = extrude(size=size, radius=radius, layers=layers, **shape)
     points = grid.positions(cell.radius_map)
     # corner nodes come first, level by level of θ
     return grid, points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
@@ -170,12 +176,14 @@ def _draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
     cone = faces_on(grid.plane.arc)  # over edges between nodes on the particle
     axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
     thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
-    for on_side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
+    across = grid.plane.lattice.side_coordinates(plane)
+    for on_side in (across[:, 1] <= -1 + 1e-9, across[:, 0] >= 1 - 1e-9):
         axes.add_collection3d(Poly3DCollection(faces_on(on_side), **thin))
     bottom = levels[0][triangles[~grid.plane.inside]]
     axes.add_collection3d(Poly3DCollection(bottom, facecolor=MATRIX, ec=INK, lw=0.15))
     axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
+    right, top = grid.plane.lattice.corners.max(axis=0)
+    axes.set(xlim=(-right, right), ylim=(-top, top), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
     axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
     axes.view_init(elev=25, azim=-55)
     axes.set_title(f"product domain, {len(grid.cells):,} prisms")
@@ -202,7 +210,8 @@ def draw_mesh(cell: Cell, size: float, layers: int) -> Figure:
     # one collection, so that farther polygons are drawn first whatever their phase
     look: Look = {"edgecolors": "#54402c", "lw": 0.4}
     axes.add_collection3d(Poly3DCollection(polygons, facecolors=fills, **look))
-    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
+    right, top = grid.plane.lattice.corners.max(axis=0)
+    axes.set(xlim=(-right, right), ylim=(-top, top), zlim=(levels[0, 0, 2], levels[-1, 0, 2]))
     axes.set_box_aspect((1, 1, 1.6), zoom=1.0)
     axes.view_init(elev=25, azim=-55)
     axes.axis("off")
@@ -338,7 +347,7 @@ def p_box(section: RadiusMapSection) -> Figure:
     return figure
 
 
-def cone(section: RadiusMapSection) -> Figure:
+def cone(section: RadiusMapSection, lattice: Lattice = SQUARE) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     figure = plt.figure(figsize=(5.0, 5.4))
     axes: Any = figure.add_subplot(projection="3d")
@@ -347,11 +356,12 @@ def cone(section: RadiusMapSection) -> Figure:
     x, y = radius(theta) * np.cos(angle), radius(theta) * np.sin(angle)
     axes.plot_surface(x, y, np.broadcast_to(theta, (80, 80)), color=PURPLE, alpha=0.65, lw=0)
     low, high = section.theta
+    ring = np.concatenate([lattice.corners, lattice.corners[:1]]).T
     for level in np.linspace(low, high, 5):
-        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=GREY, lw=0.8)
+        axes.plot(*ring, level, color=GREY, lw=0.8)
         x, y = radius(level) * np.cos(angle), radius(level) * np.sin(angle)
         axes.plot(x, y, level, color=INK, lw=0.8)
-    for x, y in itertools.product((-1, 1), (-1, 1)):
+    for x, y in lattice.corners:
         axes.plot([x, x], [y, y], [low, high], color=GREY, lw=0.8)
     axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes.set_box_aspect((1, 1, 1.3), zoom=0.88)

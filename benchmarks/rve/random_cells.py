@@ -1,10 +1,12 @@
 """Random cells by finite elements: declared against true errors of all that a result holds.
 
     ./enter python -m benchmarks.rve.random_cells --cells 150 --seed 1
+    ./enter python -m benchmarks.rve.random_cells --cells 150 --seed 1 --lattices
 
 Round cells of isotropic phases (contrasts of 1e-3 to 1e3, Poisson's ratios of 0 to 0.45 in either
 phase, random maps with radii to nearly touching) are judged by the multipole series; ellipses and
-orthotropic particles (`--any`) by prisms and slices against one another. Each result has a random
+orthotropic particles (`--any`) by prisms and slices against one another. With `--lattices` the
+cells are hexagons and rectangles in place of the square. Each result has a random
 resolution. Prints by quantity how many numbers lie outside their declared errors, and the median of
 declared over true; exit status 1 if one lies outside
 or a median of E, ν, moduli or stresses is above 10.
@@ -22,6 +24,7 @@ import numpy as np
 
 from alphacut.base.errors import FailedError, RefusedError
 from alphacut.rve.cell.cell import Cell, Phase, VoigtPhase
+from alphacut.rve.cell.lattice import Arrangement
 from alphacut.rve.cell.outline import Ellipse, circle
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import FoldedMeshError
@@ -96,6 +99,14 @@ def any_cell(rng: np.random.Generator) -> Cell:
     return Cell(Phase(20e9, 0.3), particle, random_map(rng, 0.66), outline)
 
 
+def random_lattice(rng: np.random.Generator) -> Arrangement:
+    """The hexagonal array, or a rectangle of a ratio of sides up to 4."""
+    if rng.random() < 0.4:
+        return "hexagonal"
+    sides = [1.0, float(rng.uniform(1, 4))]
+    return sides if rng.random() < 0.5 else sides[::-1]
+
+
 def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
     """Prisms at a random resolution."""
     size, layers = float(rng.uniform(0.2, 0.5)), int(rng.choice([1, 2, 4, 6]))
@@ -161,19 +172,27 @@ def solved(model: PrismModel, cell: Cell) -> HomogenisedStiffness:
         return solved(replace(model, mesh_size=model.mesh_size / 2), cell)
 
 
-def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
-    """All numbers of one cell by prisms and slices; empty where a model refuses."""
+def judge(cell: Cell, rng: np.random.Generator, lattice: Arrangement = "square") -> list[Judgement]:
+    """All numbers of one cell by prisms and slices; empty where a model refuses.
+
+    Args:
+        cell: Its phases, radius map and outline.
+        rng: For the resolution of both.
+        lattice: The arrangement that it stands in.
+    """
     parts = cell.radius_map, cell.matrix, [cell.inclusion]
     try:
-        prism, slices = draw_prism(rng, cell), draw_slices(rng, cell)
+        prism = replace(draw_prism(rng, cell), lattice=lattice)
+        slices = replace(draw_slices(rng, cell), lattice=lattice)
         results = [solved(prism, cell), slices.solve(*parts)[0]]
     except (FailedError, RefusedError) as refusal:
         print(f"refused: {refusal}", flush=True)
         return []
     if cell.square:
-        truth = SeriesModel(accuracy=1e-12, energies=True).solve(*parts)[0]
+        truth = SeriesModel(accuracy=1e-12, energies=True, lattice=lattice).solve(*parts)[0]
     else:
-        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline).solve(*parts)[0]
+        fine = SlicesModel(0.15, 16, cell.outline, lattice)
+        truth = fine.solve(*parts)[0]
     return [one for result in results for one in judged(result, truth)]
 
 
@@ -183,11 +202,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cells", type=int, default=150)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--any", action="store_true", help="ellipses and orthotropic particles")
+    help_text = "hexagonal and rectangular cells"
+    parser.add_argument("--lattices", action="store_true", help=help_text)
     options = parser.parse_args(arguments)
     draw, rows = any_cell if options.any else round_cell, defaultdict(list)
     for number in range(options.cells):
         rng = np.random.default_rng([options.seed, number])
-        for one in judge(draw(rng), rng):
+        cell = draw(rng)
+        lattice = random_lattice(rng) if options.lattices else "square"
+        for one in judge(cell, rng, lattice):
             rows[one.quantity].append(one)
             if not one.covered:
                 print(f"cell {number}: {one}", flush=True)

@@ -9,13 +9,16 @@ FEW = 1
 
 
 @pytest.mark.parametrize(
-    ("draw", "cells"),
+    ("draw", "cells", "has_lattices"),
     [
-        ("round_cell", FEW),
-        *(pytest.param(*x, marks=pytest.mark.slow) for x in (("round_cell", 30), ("any_cell", 8))),
+        ("round_cell", FEW, False),
+        ("round_cell", FEW, True),
+        pytest.param("round_cell", 30, False, marks=pytest.mark.slow),
+        pytest.param("round_cell", 20, True, marks=pytest.mark.slow),
+        pytest.param("any_cell", 8, False, marks=pytest.mark.slow),
     ],
 )
-def test_declared_errors_of_random_cells_cover(draw, cells):
+def test_declared_errors_of_random_cells_cover(draw, cells, has_lattices):
     pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.rve import random_cells
 
@@ -23,7 +26,9 @@ def test_declared_errors_of_random_cells_cover(draw, cells):
     table = Calibration(f"{draw}: declared over true", seed)
     for number in range(cells):
         rng = np.random.default_rng([seed, number])
-        for one in random_cells.judge(getattr(random_cells, draw)(rng), rng):
+        cell = getattr(random_cells, draw)(rng)
+        lattice = random_cells.random_lattice(rng) if has_lattices else "square"
+        for one in random_cells.judge(cell, rng, lattice):
             least = random_cells.NOISE
             table.estimated(one.quantity, one.declared, one.true, least=least, case=number)
     table.judge()

@@ -1,6 +1,7 @@
 """Figures that the paper alone needs, drawn by cases/paper_figures.py beside those of a run."""
 
 import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from alphacut import main
 from alphacut.fuzzy import Triangular
 from alphacut.io.results import ResultsFolder
 from alphacut.rve import Cell, Phase
+from alphacut.rve.cell.lattice import HEXAGONAL
 from alphacut.stochastic import HermiteMap
 from tests.alphacut.small import CELL, FRAME, written
 
@@ -38,6 +40,9 @@ def test_a_mesh_and_six_cuts_are_those_of_the_case(paper):
     assert "3 layers" in density.get_title()
     assert len(prisms.collections) == 4
     assert len(opened.get_facecolor()) > 100
+    hexagon = replace(cell, lattice=HEXAGONAL)
+    assert paper.domains(hexagon, 0.5, 3).axes[0].get_ylim()[1] == pytest.approx(2 / np.sqrt(3))
+    assert paper.draw_mesh(hexagon, 0.5, 3).axes[0].get_xlim()[1] == pytest.approx(1, abs=0.1)
     _, count = paper.edges_of(np.array([[0, 1, 2], [2, 1, 3]]))
     assert count.tolist() == [1, 1, 2, 1, 1]  # the third edge is inside: no face of it is drawn
     assert plane.get_title() == "physical domain, θ = -1"
