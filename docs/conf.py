@@ -119,15 +119,20 @@ def default(field: FieldInfo) -> str:
     values = field.default if isinstance(field.default, tuple) else (field.default,)
     if any(value is None or hasattr(value, "model_fields") for value in values):
         return ""
+    if field.default_factory is not None:
+        return ""
     return ", ".join(_in_words(value) for value in values if value != {})
 
 
 def _in_words(value: object) -> str:
+    from alphacut.case.loads import Scale
     from alphacut.case.motion import Tolerance
     from alphacut.fuzzy import FuzzyNumber
 
     if isinstance(value, FuzzyNumber):
         return f"{value.nominal:g}"
+    if isinstance(value, Scale):
+        return f"{value.value:g}"
     return f"{value.value:g} {value.unit}" if isinstance(value, Tolerance) else str(value)
 
 

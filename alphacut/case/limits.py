@@ -211,7 +211,11 @@ def parse_limit(value: object) -> CaseLimit:
         else:
             number = quantity.parse_number(text, unit)
     except ValueError as error:
-        raise RefusedError("", value, allowed, str(error)) from None
+        cure = str(error)
+        if has_reference and re.fullmatch(r"\d*\.?\d+", text):
+            of = "the weight" if name == BASE_SHEAR else "the storey's height"
+            cure += f", or % of {of}, as {100 * float(text):g} %"
+        raise RefusedError("", value, allowed, cure) from None
     # A magnitude is never below 0, while values of an output may be negative.
     require(number > 0 or side in ("max", "min"), "", value, allowed)
     return CaseLimit(cast("Side", side or ""), name, number, is_relative, str(value))

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_args
+from typing import Any, Generic, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -256,7 +256,8 @@ def apply_changes(
         model: Class of the content, for the known keys.
         table: The parsed case. Sections that a key needs are added.
         changes: Texts "KEY=VALUE" with full keys such as "cell.matrix_modulus". VALUE is TOML,
-            words separated by commas, or a text without quotes. Keys of [[study]] cannot be
+            words separated by commas, or a text without quotes. Of a table whose names the case
+            chooses, entries are changed, as "matrices.parameters.E". Keys of [[study]] cannot be
             changed.
 
     Raises:
@@ -266,13 +267,14 @@ def apply_changes(
         return ()
     # Studies are entries of an array, which a key without an index does not tell apart.
     full_keys = [key for key in _names_of(model) if not key.startswith("study.")]
+    tables = tuple(f"{x}." for x, info, _ in _walk_keys("", model) if _has_free_names(info))
     keys: list[str] = []
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
         # For a key without its section the first section that has it is suggested; for any other
         # unknown key the known one that is spelt most alike.
-        if key not in full_keys:
+        if key not in full_keys and not key.startswith(tables):
             close = [full for full in full_keys if full.endswith(f".{key}")]
             cure = suggestion(key, full_keys) or "docs/case-format.md has all keys"
             if close:
@@ -354,6 +356,13 @@ def _walk_keys(
         yield name, info, bool(models)
         for inner in models:
             yield from _walk_keys(f"{name}.", inner, described=described)
+
+
+def _has_free_names(info: FieldInfo) -> bool:
+    """Return whether a key takes a table whose names the case chooses."""
+    return any(
+        get_origin(x) is dict for x in (info.annotation, *_annotation_parts(info.annotation))
+    )
 
 
 def quantity_of(info: FieldInfo) -> Quantity | None:

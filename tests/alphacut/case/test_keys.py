@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from alphacut import main
 from alphacut.case.content import Content
 from alphacut.case.parse import allowed_values, keys_of
 from alphacut.case.structures import with_structures
@@ -43,3 +44,11 @@ def test_allowed_values_of_a_key_are_told_in_words():
     assert "midpoint" in allowed_values(keys["envelope.integrator"])
     assert allowed_values(keys["envelope.method"]).split(", ") == list(METHODS)
     assert allowed_values(keys["title"]) == ""
+
+
+def test_entries_of_tables_with_free_names_are_changed_and_others_suggested(capfd):
+    case = "cases/plane-frame.toml"
+    assert main(["check", case, "--set", 'matrices.parameters.Ec="1.2 ± 5 %"']) == 0
+    assert "matrices.parameters.Ec                     1.14 … 1.26" in capfd.readouterr().out
+    assert main(["check", case, "--set", "matrices.parametrs.Ec=1.2"]) == 2
+    assert "did you mean matrices.parameters?" in capfd.readouterr().err
