@@ -23,6 +23,7 @@ mesh size where the fields are smooth.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -48,6 +49,8 @@ ROTATION = np.array([[0.0, -1, 0], [-1, 0, 0], [0, 0, 0.5]])
 """2 ε12² − 2 ε11 ε22 as a quadratic form of (ε11, ε22, 2 ε12)."""
 ROUNDING = 1e-8
 """Relative margin for places of partners on opposite sides, which are checked to 1e-8, and sums."""
+CHUNK = 2048
+"""Prisms whose fields are evaluated at once (tuned), to bound the memory: about 100 MB."""
 
 
 class Energies(NamedTuple):
@@ -142,15 +145,19 @@ def _mean_energies(
             along_theta = 0 if is_upright else 4
             degree = 2 * (2 + along_theta) + along_theta * inverse.degree
             heights = start + chebyshev_points(degree) * (end - start)
-            energies = np.zeros((len(heights), *total.shape[1:]))
             triangle, weights = basix.make_quadrature(
                 basix.CellType.triangle, 4 + 2 * inverse.degree
             )
-            weights /= problem.grid.plane.lattice.area
+            energies = np.zeros((len(heights), *total.shape[1:]))
             for k, z in enumerate(heights):
                 slopes = planar_slopes(np.column_stack([triangle, np.full(len(triangle), z)]))
-                points = _at_points(fields, prisms, slopes, fields.mean_stress_at(z)[layer])
-                energies[k] = points.energies(of_prisms[prisms], inverse, weights, factor)
+                mean_stress = fields.mean_stress_at(z)[layer]
+                for chunk in np.array_split(np.arange(len(prisms)), len(prisms) // CHUNK + 1):
+                    chosen = prisms[chunk]
+                    of_chunk = replace(inverse, ends=inverse.ends[:, chunk])
+                    points = _at_points(fields, chosen, slopes, mean_stress)
+                    energies[k] += points.energies(of_prisms[chosen], of_chunk, weights, factor)
+            energies /= problem.grid.plane.lattice.area
             problem.comm.Allreduce(MPI.IN_PLACE, energies)
             ends = low + start * (high - low), low + end * (high - low)
             total += mean_over_theta(law, *ends, energies)
