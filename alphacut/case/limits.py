@@ -85,7 +85,7 @@ class CaseLimit:
 
         A relative limit, such as "drift1 <= 1 %", has a fraction as its `value`. For the base shear
         it is a fraction of the weight of all floors, for any other output of the height of the
-        storey.
+        storey, unless the output is a ratio itself.
 
         Args:
             structure: The structure, for its weight, heights and the units of its outputs.
@@ -97,6 +97,9 @@ class CaseLimit:
         """
         if not self.is_relative:
             return self._value_in_unit_of_output(structure, key)
+        # A structure from matrices may have a drift over its height as an output.
+        if self.output in structure.outputs and not structure.unit(self.output):
+            return self.value
         if self.output == BASE_SHEAR:
             allowed = "a share of the weight beside [frame], or a force, as 90 kN"
             # A fuzzy weight or height enters with the lower end of its support: the limit is then
@@ -124,11 +127,11 @@ class CaseLimit:
         Raises:
             RefusedError: The limit is in another unit, or in none.
         """
-        is_known_before = Output(self.output).unit != "SI"  # "SI": the name tells no unit
-        if is_known_before or self.output not in structure.outputs:
+        if self.output not in structure.outputs:
             return self.value
         unit = structure.unit(self.output)
-        if unit not in quantity.QUANTITIES:
+        is_read = unit == Output(self.output).unit  # by which the limit was converted
+        if is_read or unit not in quantity.QUANTITIES:
             return self.value
         dimension = quantity.QUANTITIES[unit]
         try:

@@ -378,6 +378,28 @@ second = { upper = "2.x", lower = "1.x", height = "2.5 m" }"""
     assert np.abs(exact[:, 0]).max() > 1
 
 
+def with_limits(folder, limits):
+    """A case with two drift ratios and an acceleration of unusual names, and limits of them."""
+    outputs = """{ upper = "1.x", height = "2.5 m" }
+drift1 = { upper = "1.x", height = "2.5 m" }
+q1 = { row = { "1.x" = 1.0 }, of = "acceleration" }"""
+    path = changed(folder, ROOF, outputs)
+    path.write_text(path.read_text() + f"[decision]\nlimits = {limits}\n")
+    return path
+
+
+def test_limits_are_in_the_units_of_the_outputs_of_matrices(folder):
+    """A drift ratio has no height beside it, and a name that means a floor has its own unit."""
+    limits = ["roof <= 0.5 %", "drift1 <= 1 %", "max drift1 <= 1/200"]
+    content = load(with_limits(folder, limits)).content
+    found = content.questions["decision"].limits_of(content.structure)
+    assert [limit.value for limit in found] == pytest.approx([0.005, 0.01, 0.005])
+    (line,) = refusals(with_limits(folder, ["drift1 <= 10 mm"]))
+    assert "decision.limits is drift1 <= 10 mm; allowed: number" in line
+    (line,) = refusals(with_limits(folder, ["q1 <= 10 mm"]))
+    assert "decision.limits is q1 <= 10 mm; allowed: acceleration" in line
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
