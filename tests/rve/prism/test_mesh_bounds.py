@@ -9,14 +9,11 @@ import pytest
 pytest.importorskip("alphacut.rve.fenicsx")
 
 from alphacut.fuzzy import FailedError
-from alphacut.rve import MeshModel, Phase, SeriesModel, VoigtPhase
-from alphacut.rve.fenicsx import MPI
+from alphacut.rve import MeshModel, Phase, PrismModel, SeriesModel, VoigtPhase
 from alphacut.rve.mesh.file import write
-from alphacut.rve.mesh.prism_grid import reference_radius
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism import mesh_bounds as module
 from alphacut.rve.prism.mesh_bounds import ROTATION, mesh_bounds
-from alphacut.rve.prism.model import cached_grid
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.prism.stress_functions import solved_fields_of_bounds
 from alphacut.rve.prism.theta_means import mean_over_theta
@@ -132,14 +129,13 @@ def test_a_laminate_has_its_own_stiffness(tmp_path, rng, amplitude):
     assert abs(bounds.upper - bounds.lower).max() < 1e-5 * exact.max()
 
 
-def test_the_cone_of_the_paper_holds_the_series():
+@pytest.mark.parametrize("lattice", ["square", "hexagonal", [1.0, 1.2]])
+def test_bounds_of_a_cone_hold_the_series(lattice):
     """Of the mesh of a map, whose radii are those of the cone at the levels."""
     radii = HermiteMap(0.3, 0.0, 0.6, 0.0, LAW)
-    grid = cached_grid(size=0.25, radius=reference_radius(radii), layers=4, parallel=False)
-    problem = PrismProblem(grid, MPI.COMM_SELF)
-    problem.move(radii)
+    problem = PrismModel(0.25, 4, lattice=lattice).problem(radii)
     bounds = mesh_bounds(problem, [SOFT.stiffness, HARD.stiffness], SolverOptions())
-    [series] = SeriesModel().solve(radii, SOFT, [HARD])
+    [series] = SeriesModel(lattice=lattice).solve(radii, SOFT, [HARD])
     assert excess(bounds.upper, series.stiffness) > 0
     assert excess(series.stiffness, bounds.lower) > 0
     assert bounds.width < 5e-3
