@@ -57,7 +57,7 @@ class FloorSpectrumSection(Section):
 
     def require_answerable(self, structure: Structure) -> None:
         """Refuse a structure without floor spectra, and outputs that are no accelerations."""
-        from alphacut.frame.analyses.floor_spectrum import observed_accelerations  # takes time
+        from alphacut.frame.analyses.floor_oscillators import observed_accelerations  # takes time
 
         try:
             observed_accelerations(structure.model, self.outputs, {})
