@@ -45,7 +45,7 @@ def displacement_chord(spectrum: TargetSpectrum, low: float, high: float) -> Cho
 
     smallest = np.inf
     largest = -np.inf
-    for first, last in pairwise(ends.tolist()):
+    for first, last in pairwise(map(float, ends)):
         before = [corner for corner in spectrum.falls_from if corner <= first]
         sides = np.interp([first, last], spectrum.periods, spectrum.accelerations)
         rise = (sides[1] - sides[0]) / (last - first) if last > first else 0.0

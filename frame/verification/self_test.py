@@ -79,9 +79,8 @@ def with_motions_tested(
     count = int(np.clip(len(cuts.alpha) * 67.0 / states, 24, 240))
     if members is None:
         points = motion_inputs(envelope, cuts, count)
-        highest = np.full(len(points), len(cuts.alpha) - 1)
-    else:
-        points, highest = members[0][:count], members[1][:count]
+        members = points, np.full(len(points), len(cuts.alpha) - 1.0)
+    points, highest = members[0][:count], members[1][:count]
     facts = {**envelope.facts, "motions_tested": len(points)}
     if not len(points):
         return replace(envelope, facts=facts)
