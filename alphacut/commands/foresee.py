@@ -16,12 +16,13 @@ import numpy as np
 
 from alphacut.base.arrays import Ints
 from alphacut.case.content import Content
+from alphacut.case.floors import FloorSpectrumSection
 from alphacut.case.material import ImageCell, RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
 from alphacut.case.structure import Structure
 from alphacut.commands.pieces import Foreseen, pieces_of, sample_count
-from alphacut.frame import FloorSpectrum, Probability
+from alphacut.frame import Probability, floor_spectrum
 from alphacut.frame import envelope as frame_envelope
 from alphacut.frame.analyses.peaks import PEAK_ERROR
 from alphacut.frame.analyses.tolerances import scale_supports
@@ -444,6 +445,47 @@ def _records(
         yield Foreseen("fragility", motions, "motions", sum(time for _, time in foreseen))
 
 
+def _floor_spectrum_seconds(
+    section: FloorSpectrumSection, structure: Structure, task: EnvelopeTask
+) -> float:
+    """Return about how many seconds floor spectra take, from one period over short durations.
+
+    Args:
+        section: Accelerations, periods and damping ratio.
+        structure: The structure.
+        task: The response of [envelope].
+
+    Raises:
+        RefusedError: The structure has no such spectra.
+        FailedError: A response could not be computed.
+    """
+    periods = section.all_periods
+    inputs = structure.inputs(task.fuzzy)
+    # The time of a period grows with the time nodes in it, and so with 1/T: the harmonic mean of
+    # the periods takes the mean time.
+    typical = 0.0
+    if periods.any():
+        typical = 1 / float(np.mean(1 / periods[periods > 0]))
+
+    def run(fraction: float) -> float:
+        """Bound one spectrum over about a fraction of the duration; return the fraction."""
+        part, done = shortened(task, fraction)
+        floor_spectrum(
+            structure.model,
+            inputs,
+            section.outputs,
+            [typical],
+            section.damping,
+            duration=part.duration,
+            step=part.section.step,
+            alpha=part.section.alpha,
+            progress=False,
+        )
+        return done
+
+    return len(periods) * whole_seconds(run)
+
+
 def _answers(
     content: Content, structure: Structure, task: EnvelopeTask, pieces: Mapping[str, Foreseen]
 ) -> Iterator[Foreseen]:
@@ -465,8 +507,8 @@ def _answers(
         stage = answers.stage(Probability, section, Response(structure, task))
         yield pieces["probability"]._replace(seconds=begun_seconds(stage))
     if content.floor_spectrum is not None:
-        floors = answers.stage(FloorSpectrum, content.floor_spectrum, Response(structure, task))
-        yield pieces["floor_spectrum"]._replace(seconds=begun_seconds(floors))
+        of_floors = _floor_spectrum_seconds(content.floor_spectrum, structure, task)
+        yield pieces["floor_spectrum"]._replace(seconds=of_floors)
     if (section := content.questions.get("tolerances")) is not None:
         assert content.tolerances is not None
         # The largest scale is the widest box, whose envelope takes longest.

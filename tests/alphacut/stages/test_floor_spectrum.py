@@ -67,6 +67,13 @@ def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_pat
     assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
 
 
+def test_the_time_of_its_periods_is_foreseen(tmp_path, capsys):
+    assert main(["check", str(written(tmp_path)), "--time"]) == 0
+    (line,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("floor_spectrum  "))
+    assert line.split()[1:3] == ["2", "periods"]
+    assert float(line.split()[3]) < 60
+
+
 def test_periods_are_given_by_their_range(tmp_path):
     text = CASE.replace('periods = ["0 s", "0.3 s"]', 'shortest = "0.1 s"\ncount = 3')
     periods = load(written(tmp_path, text)).content.floor_spectrum.all_periods
