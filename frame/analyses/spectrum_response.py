@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, checked_number, require_choice
+from alphacut.base.errors import FailedError, RefusedError, checked_number, require_choice
 from alphacut.base.number_text import Table, engineering, percent_text, range_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.peaks import Peak
@@ -238,6 +238,7 @@ def spectrum_response(
         RefusedError: An argument is not as said, the structure is not linear, an output takes
             velocities or accelerations, a period lies outside the range of the spectrum, or the
             structure may drift.
+        FailedError: An attained value contradicts the proof, which is wrong.
 
     Example:
         >>> from alphacut.frame import StoreyFrame, eurocode8_spectrum, spectrum_response
@@ -328,4 +329,10 @@ def _proved(
     # Bounds of a cut hold in the narrower ones, too.
     proved[..., 0] = np.maximum.accumulate(proved[..., 0])
     proved[..., 1] = np.minimum.accumulate(proved[..., 1])
+    # Attained values are rounded, by far less than the factors.
+    is_within = proved * [1 - 1e-9, 1 + 1e-9] * [1, -1] <= attained * [1, -1] + 1e-300
+    if not is_within.all():
+        raise FailedError(
+            "an attained combined peak lies outside guaranteed bounds, which are wrong"
+        )
     return proved, reason

@@ -18,14 +18,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box import over_box
-from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox
+from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
@@ -67,6 +66,30 @@ class _Correlations(NamedTuple):
     largest: Array
 
 
+def _cross_terms(
+    groups: Sequence[ModeGroup], peaks: Sequence[_Peaks], correlations: _Correlations
+) -> TaylorModel:
+    """Return 2 Σ ρ_ij r_i r_j over modes i and j of different groups, for m outputs, shape (m,).
+
+    Args:
+        groups: The groups, two or more.
+        peaks: The peaks of each.
+        correlations: Ranges of ρ of each pair of groups.
+    """
+    first, second = np.triu_indices(len(groups), 1)
+    low = correlations.smallest[first, second]
+    high = correlations.largest[first, second]
+    # The factor covers the rounding of sum and difference. Of a group that is not whole no sum is
+    # known, and 0 stands for it.
+    is_whole = np.array([group.is_whole for group in groups])
+    are_whole = is_whole[first] & is_whole[second]
+    radius = np.where(are_whole, (high - low) * (1 + 1e-12) + 1e-15, 2 * high)
+    largest = np.array([peak.sum_of_magnitudes for peak in peaks])
+    error = radius @ (largest[first] * largest[second]) * (1 + 1e-12)
+    sums = concatenate([peak.sum[None] for peak in peaks], -2)
+    return ((low + high) @ (sums[first] * sums[second])).widened(error)
+
+
 @dataclass(frozen=True, eq=False)
 class _Problem:
     """A structure, the names of its inputs, and what is combined."""
@@ -102,18 +125,10 @@ class _Problem:
                 half = (1 - correlations.smallest[j, j]) / 2
                 lower = lower + square * (1 - half) - magnitudes * (half * (1 - 2 / p))
                 upper = upper + square * (1 - half) + magnitudes * half
-        for i, j in combinations(range(len(groups)), 2):
-            low = correlations.smallest[i, j]
-            high = correlations.largest[i, j]
-            if high > 0:
-                # The factor covers the rounding of sum and difference.
-                radius = (high - low) * (1 + 1e-12) + 1e-15
-                if not (groups[i].is_whole and groups[j].is_whole):
-                    radius = 2 * high  # no sum is known of one of both, and 0 stands for it
-                product = peaks[i].sum * peaks[j].sum * (low + high)
-                error = radius * peaks[i].sum_of_magnitudes * peaks[j].sum_of_magnitudes
-                lower = lower + product.widened(error)
-                upper = upper + product.widened(error)
+        if self.combination.rule == "CQC" and len(groups) > 1:
+            cross_terms = _cross_terms(groups, peaks, correlations)
+            lower = lower + cross_terms
+            upper = upper + cross_terms
         return Squares(lower, upper)
 
     def _correlations(self, groups: Sequence[ModeGroup], periods: Array) -> _Correlations:
@@ -320,12 +335,12 @@ def combined_bounds(
         part = parts[farthest]
         if relative[output, side] < GAP or part.is_narrow:
             break
-        smaller = part.halves(problem, int(output))
+        smaller: list[_Part] = []
         if part.may_gain and enclosures < MAX_ENCLOSURES:
             enclosures += 1
             with suppress(UnprovedError):  # then the enclosure over the wider box is bisected
                 smaller = list(problem.parts(part.low, part.high, MAX_DEPTH))
-        parts[farthest : farthest + 1] = smaller
+        parts[farthest : farthest + 1] = smaller or part.halves(problem, int(output))
     bounds = _bounds(parts)
     return np.stack([bounds[..., 0].min(axis=0), bounds[..., 1].max(axis=0)], axis=-1)
 
