@@ -138,39 +138,15 @@ def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
     patterns = source_patterns(structure, ["load"]) @ to_centred.T
     rows = structure.initial_state.like(structure.output_rows) @ centre.basis
 
-    def group(modes: Ints, eigenvalue_block: TaylorModel, sums: ModalSums) -> ModeGroup:
-        """Return a group with its models made functions of all inputs."""
-        inputs = structure.initial_state.inputs
-        order = structure.initial_state.order
-        block, *sums_ = (
-            x.truncated(order).embedded(used, inputs) for x in (eigenvalue_block, *sums)
-        )
-        factors = structure.output_factors
-        squares = factors * factors
-        all_sums = ModalSums(*sums_)
-        return ModeGroup(
-            modes=modes,
-            is_whole=True,
-            eigenvalue_block=block,
-            ratios=structure.damping_ratios[modes],
-            rayleigh=structure.rayleigh,
-            sums=all_sums._replace(
-                products=all_sums.products[0] * factors,
-                products_over_eigenvalue=all_sums.products_over_eigenvalue[0] * factors,
-                output_squares=all_sums.output_squares * squares,
-                output_squares_over_eigenvalue=all_sums.output_squares_over_eigenvalue * squares,
-            ),
-        )
-
     groups = []
-    remaining: Ints = np.arange(count)
     enclosed = []
+    remaining: Ints = np.arange(count)
     for block in found.blocks:
         if block.modes[-1] >= count:
             continue  # only some of its modes are wanted, whose own sums are not known
-        participation = BlockParticipation.from_block(block, rows, patterns, used)
-        enclosed.append(modal_sums_of_block(participation))
-        groups.append(group(block.modes, block.eigenvalue_block, enclosed[-1]))
+        sums = modal_sums_of_block(BlockParticipation.from_block(block, rows, patterns, used))
+        enclosed.append(sums)
+        groups.append(_group(structure, used, block.modes, block.eigenvalue_block, sums))
         remaining = np.setdiff1d(remaining, block.modes)
     if len(remaining):
         # What the enclosed groups leave of the sums over all modes.
@@ -180,8 +156,50 @@ def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
             others = ModalSums(*(x - y for x, y in zip(others, sums, strict=True)))
         low = found.eigenvalue_low[remaining].min()
         high = found.eigenvalue_high[remaining].max()
-        middle = centre.mass.like([[(low + high) / 2]])
-        rough = group(remaining, middle.widened([[(high - low) / 2 * (1 + 1e-12)]]), others)
+        # The factor covers the rounding.
+        radius = (high - low) / 2 * (1 + 1e-12)
+        eigenvalues = centre.mass.like([[(low + high) / 2]]).widened([[radius]])
+        rough = _group(structure, used, remaining, eigenvalues, others)
         groups.append(replace(rough, is_whole=False))
-    groups.sort(key=lambda found_group: int(found_group.modes[0]))
+    groups.sort(key=lambda group: int(group.modes[0]))
     return ModeGroups(groups, found.bisection_input)
+
+
+def _group(
+    structure: ClassicalStructure,
+    used: Ints,
+    modes: Ints,
+    eigenvalue_block: TaylorModel,
+    sums: ModalSums,
+) -> ModeGroup:
+    """Return a group of modes as functions of all inputs, with the factors of the outputs.
+
+    Args:
+        structure: The structure over the box, with m outputs.
+        used: Indices of the inputs that mass and stiffness depend on, rising.
+        modes: Numbers of the modes from below, shape (p,).
+        eigenvalue_block: As in `ModeGroup`, as functions of the used inputs.
+        sums: Sums over the modes for one source, the motion of the ground, without the factors, as
+            functions of the used inputs or of all.
+    """
+
+    def of_all_inputs(model: TaylorModel) -> TaylorModel:
+        """Return a model as a function of all inputs, of their degree."""
+        like = structure.initial_state
+        return model.truncated(like.order).embedded(used, like.inputs)
+
+    factors = structure.output_factors
+    found = ModalSums(*map(of_all_inputs, sums))
+    return ModeGroup(
+        modes=modes,
+        is_whole=True,
+        eigenvalue_block=of_all_inputs(eigenvalue_block),
+        ratios=structure.damping_ratios[modes],
+        rayleigh=structure.rayleigh,
+        sums=found._replace(
+            products=found.products[0] * factors,
+            products_over_eigenvalue=found.products_over_eigenvalue[0] * factors,
+            output_squares=found.output_squares * factors * factors,
+            output_squares_over_eigenvalue=found.output_squares_over_eigenvalue * factors * factors,
+        ),
+    )
