@@ -169,9 +169,34 @@ def _solve_multipoles(
 ) -> _Multipoles:
     """Return the first coefficients of the potentials, over the radius, for one load.
 
+    Args:
+        orders: The N harmonics of the load, and their couplings at radius 1.
+        radius: Radii over half the distance of the particles, shape (n,).
+        contrast: The factors of the interface conditions of m inclusions.
+        mirror: 1 if the coefficients are real, −1 if they are imaginary.
+        dilatation: Whether the load is the far field φ = z, which excites b_1; else ψ = z or i z.
+    """
+    matrices, sources = _system(orders, radius, contrast, mirror=mirror, dilatation=dilatation)
+    a = np.linalg.solve(matrices, sources[..., None])[..., 0]  # scaled by rⁿ, shape (n, m, N)
+    a_1 = np.asarray(a[..., 0])
+    b_1 = np.zeros_like(a_1)
+    if orders.b[0] == 1 and mirror > 0:
+        to_p1 = orders.to_p[0] * radius[:, None] ** (orders.a + 1)
+        p_1 = np.einsum("nk,nmk->nm", to_p1, a) + dilatation * radius[:, None]
+        b_1 = contrast.swelling * p_1
+    if orders.a[0] != 1:
+        a_1 = np.zeros_like(a_1)
+    return _Multipoles(a_1, b_1)
+
+
+def _system(
+    orders: Family, radius: Array, contrast: Contrast, *, mirror: float, dilatation: bool
+) -> tuple[Array, Array]:
+    """Return the linear systems for the coefficients a_n, from which the b_n are eliminated.
+
     With the Taylor coefficients p_k of φ and q_k of ψ that all images cause, and conjugates *, the
     conditions at the interface are a_n = outer [(n + 2) p*_{n+2} + q*_n], b_n = inner p*_n + (n −
-    2) a_{n-2} for n ≥ 2, and b_1 = swelling Re p_1. The b_n are eliminated.
+    2) a_{n-2} for n ≥ 2, and b_1 = swelling Re p_1.
 
     Args:
         orders: The N harmonics of the load, and their couplings at radius 1.
@@ -179,20 +204,23 @@ def _solve_multipoles(
         contrast: The factors outer, inner and swelling of m inclusions, shape (m,) each.
         mirror: 1 if the coefficients are real, −1 if they are imaginary, which reverses the sign of
             conjugates.
-        dilatation: Whether the load is the far field φ = z, which excites b_1; else ψ = z or i z.
+        dilatation: Whether the load is the far field φ = z; else ψ = z or i z.
+
+    Returns:
+        Matrices, shape (n, m, N, N), and right-hand sides for a unit load, shape (n, m, N).
+        Unknowns are scaled by powers of the radius, so that entries stay of order one.
     """
-    # Unknowns are scaled by powers of the radius, so that entries stay of order one.
     r_a = radius[:, None] ** orders.a
     r_b = radius[:, None] ** orders.b
     to_p = orders.to_p * r_b[:, :, None] * r_a[:, None, :]
     to_next = orders.to_next * (r_a * radius[:, None] ** 2)[:, :, None] * r_a[:, None, :]
     a_to_q = orders.a_to_q * r_a[:, :, None] * r_a[:, None, :]
     b_to_q = orders.b_to_q * r_a[:, :, None] * r_b[:, None, :]
-    has_b_1 = orders.b[0] == 1
+    has_b1 = orders.b[0] == 1
     # What the term (n − 2) a_{n-2} of b_n adds to q. The orders b − 2 are those of a, shifted by
     # one where there is a b_1, which has no such term.
     by_shift = np.zeros_like(b_to_q)
-    if has_b_1:
+    if has_b1:
         by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
     else:
         by_shift = b_to_q * (orders.b - 2)
@@ -204,21 +232,15 @@ def _solve_multipoles(
     # b_1 has the factor `swelling` in place of `inner`, and vanishes where p_1 is imaginary.
     swelling = contrast.swelling if mirror > 0 else np.zeros_like(contrast.swelling)
     b1_to_q = b_to_q[:, None, :, 0]
-    if has_b_1:
+    if has_b1:
         excess = swelling[:, None, None] - inner
         coupling = coupling + excess * b1_to_q[..., None] * to_p[:, None, :1, :]
-    shape = len(radius), contrast.outer.size, orders.a.size
-    source = np.zeros(shape, np.result_type(outer))
+    source = np.zeros((len(radius), contrast.outer.size, orders.a.size), np.result_type(outer))
     if dilatation:
         source += (contrast.outer * swelling)[:, None] * b1_to_q * radius[:, None, None]
     else:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
-    a = np.linalg.solve(np.eye(orders.a.size) - outer * coupling, source[..., None])[..., 0]
-    first = np.asarray(a[..., 0])
-    p_1 = np.zeros_like(first) + dilatation * radius[:, None]
-    if has_b_1:
-        p_1 = p_1 + np.einsum("nk,nmk->nm", to_p[:, 0], a)
-    return _Multipoles(first if orders.a[0] == 1 else np.zeros_like(first), swelling * p_1)
+    return np.eye(orders.a.size) - outer * coupling, source
 
 
 def _shear_modulus(orders: Family, radius: Array, contrast: Contrast) -> Array:
