@@ -21,6 +21,10 @@ s ≤ √(ιᵀ K ι) t + √(ιᵀ C ι t / 2), and
 
     |r p'| ≤ (√(r M⁻¹ K M⁻¹ rᵀ) + √(r M⁻¹ C M⁻¹ C M⁻¹ rᵀ)) s + |r M⁻¹ C ι|.
 
+Ratios of up to ζ add M Φ diag(2 ζ_k ω_k) Φᵀ M to C. The second root becomes larger by at most 2 ζ
+times the first, and |r M⁻¹ C ι| and ιᵀ C ι by at most 2 ζ times √(r M⁻¹ rᵀ · ιᵀ K ι) and
+√(ιᵀ M ι · ιᵀ K ι), by Cauchy and Schwarz again.
+
 Unknowns without mass are condensed, which makes K no larger than its part on the others.
 """
 
@@ -61,7 +65,7 @@ def acceleration_gain(
         structures in the box under the ground acceleration δ, from rest.
 
     Raises:
-        UnprovedError: Neither bound is known to hold.
+        UnprovedError: Damping couples the modes or is too strong, and is not known to dissipate.
     """
     low, high = boxes.lower[0], boxes.upper[0]
     assembly = system.assembly(parameters_over_box(system, boxes.names, low, high))
@@ -88,6 +92,7 @@ class _Parts:
         stiffness: K without condensation, shape (n, n).
         loads: M⁻¹ rᵀ of all outputs, shape (n, m).
         influence: ι as a column, shape (n, 1).
+        moved: Bound of ιᵀ M ι.
         strain: Bound of ιᵀ K ι, over all unknowns.
     """
 
@@ -96,6 +101,7 @@ class _Parts:
     stiffness: TaylorModel
     loads: TaylorModel
     influence: Array
+    moved: float
     strain: float
 
     @classmethod
@@ -110,8 +116,15 @@ class _Parts:
             stiffness=assembly.stiffness[massive[:, np.newaxis], massive],
             loads=solve(mass, mass.like(assembly.accelerated[:, massive].T)),
             influence=every[massive],
+            moved=_form(every[massive], mass)[0],
             strain=_form(every, assembly.stiffness)[0],
         )
+
+    @property
+    def _inverse_masses(self) -> Array:
+        """Bounds of r M⁻¹ rᵀ, shape (m,)."""
+        rows = self.assembly.accelerated[:, self.assembly.massive]
+        return _diagonal(rows @ self.loads)
 
     def by_modes(self) -> Array:
         """Return the bounds by modes, shape (m,).
@@ -127,30 +140,25 @@ class _Parts:
         # The factor is convex in ζ, so that it is largest at an end.
         ratios = np.array([low, high])
         factor = float(((1 + 1 / ratios) / np.sqrt(1 - ratios**2)).max())
-        rows = self.assembly.accelerated[:, self.assembly.massive]
-        by_strain = _diagonal(rows @ self.loads) * self.strain
-        moved = _form(self.influence, self.mass)[0]
-        by_mass = _form(self.loads, self.stiffness) * moved
+        by_strain = self._inverse_masses * self.strain
+        by_mass = _form(self.loads, self.stiffness) * self.moved
         return np.asarray(factor * np.sqrt(np.minimum(by_strain, by_mass)))
 
     def by_energy(self, duration: float) -> Array:
-        """Return the bounds by energy, shape (m,); the damping matrix C ≥ 0 is not checked.
-
-        Raises:
-            UnprovedError: Damping is given by ratios of the modes.
-        """
+        """Return the bounds by energy, shape (m,); that damping is dissipative is not checked."""
         assembly = self.assembly
-        if any(ratio.magnitude() > 0 for ratio in assembly.ratios):
-            raise UnprovedError("damping ratios have no damping matrix over a box")
         massive = assembly.massive[:, np.newaxis], assembly.massive
         a, b = assembly.rayleigh
         damping = assembly.dashpots[massive] + self.mass * a + assembly.springs[massive] * b
-        speed = np.sqrt(self.strain) * duration
-        speed += np.sqrt(_form(self.influence, damping)[0] * duration / 2)
+        by_ratios = 2 * max((float(ratio.bounds()[1]) for ratio in assembly.ratios), default=0.0)
+        dissipated = _form(self.influence, damping)[0]
+        dissipated += by_ratios * np.sqrt(self.moved * self.strain)
+        speed = np.sqrt(self.strain) * duration + np.sqrt(dissipated * duration / 2)
         forces = damping @ self.loads
         of_damping = _diagonal(forces.T @ solve(self.mass, forces))
-        size = np.sqrt(_form(self.loads, self.stiffness)) + np.sqrt(of_damping)
+        size = (1 + by_ratios) * np.sqrt(_form(self.loads, self.stiffness)) + np.sqrt(of_damping)
         direct = (forces.T @ self.influence).magnitude()[:, 0]
+        direct += by_ratios * np.sqrt(self._inverse_masses * self.strain)
         return np.asarray(size * speed + direct)
 
     def _damping_ratios(self) -> tuple[float, float]:

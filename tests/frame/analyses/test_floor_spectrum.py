@@ -117,7 +117,11 @@ def test_matrices_and_coupled_damping_have_floor_spectra(rng):
     inputs = {"k1": Interval(880.0, 920.0)}
     a = floor_spectrum(matrices, inputs, "top", [0.3], alpha=[0], **MOTION)
     b = floor_spectrum(frame, inputs, "a2", [0.3], alpha=[0], **MOTION)
-    assert a.natures == b.natures == (("guaranteed",),)
+    both = floor_spectrum(
+        replace(frame, damping_ratio=1e-4), inputs, "a2", [0.3], alpha=[0], **MOTION
+    )
+    assert a.natures == b.natures == both.natures == (("guaranteed",),)
+    assert both.bound == pytest.approx(b.bound, rel=1e-2)
     assert a.bound == pytest.approx(b.bound, rel=1e-2)
     assert a.nominal == pytest.approx(b.nominal, rel=1e-6)
 
@@ -145,9 +149,18 @@ def test_components_of_the_ground_motion_add_up(rng):
 
 
 def test_without_a_bound_of_the_steps_nothing_is_guaranteed(rng):
-    dashpots = {"dampers": (3.0, 1.0), "damper_placement": "storey"}
-    frame = frame_of(record(rng), **dashpots)
-    found = floor_spectrum(frame, {"k1": Interval(880.0, 920.0)}, "a2", [0.3], alpha=[0], **MOTION)
+    springs = np.array([[900.0, -300.0, 40.0], [-300.0, 300.0, -60.0], [40.0, -60.0, 90.0]])
+    coupled = MatrixStructure(
+        {"k": 1.0},
+        mass=[(1.0, np.diag([3.0, 2.0, 0.0]))],
+        stiffness=[("k", springs)],
+        damping=[(1.0, np.diag([0.3, 0.1, 0.0]))],
+        observed={"top": np.eye(9)[7]},
+        ratios=[0.05],
+        ground=record(rng),
+        pattern=np.array([1.0, 1.0, 0.0]),
+    )
+    found = floor_spectrum(coupled, {"k": Interval(0.98, 1.02)}, "top", [0.3], alpha=[0], **MOTION)
     assert found.natures == (("estimated",),)
     assert "Not all bounds are guaranteed: dashpots couple" in found.words()
 

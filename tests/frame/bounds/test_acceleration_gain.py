@@ -1,5 +1,7 @@
 """Bounds of floor accelerations by the integral of that of the ground."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.bounds.acceleration_gain import acceleration_gain
 from alphacut.frame.boxes import boxes
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.structures.linear import evaluate
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points
 
@@ -41,6 +44,8 @@ CASES = {
     "weights": lambda: StoreyFrame(**FRAME, damping_ratio=0.03, lengths=(3.0, 3.0), gravity=9.81),
     "matrices": matrices,
     "dashpots": lambda: StoreyFrame(**FRAME, dampers=(3.0, 1.0), damper_placement="storey"),
+    "both": lambda: StoreyFrame(**FRAME, dampers=(3.0, 0.0), damping_ratio=0.03),
+    "critical": lambda: StoreyFrame(**FRAME, damping_ratio=0.95),
     "strong": lambda: StoreyFrame(**FRAME, rayleigh=(0.0, 0.09)),
 }
 
@@ -76,7 +81,22 @@ def test_no_ground_of_a_small_integral_moves_the_floors_more(rng, kind):
     assert (largest > 0.005 * gain).all()
 
 
+@pytest.mark.parametrize("kind", ["dashpots", "both", "critical", "strong"])
+def test_bounds_by_energy_hold_those_of_the_damping_matrix(kind):
+    """With all damping as one matrix, at crisp inputs."""
+    frame = CASES[kind]()
+    gain = acceleration_gain(frame, boxes({"m1": 3.0}, [0.0]), DURATION)
+    matrices, _ = evaluate(frame, (), np.zeros((1, 0)), derivatives=False)
+    M, C, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
+    one, loads = np.ones(2), np.linalg.inv(M)
+    energy = np.sqrt(one @ K @ one) * DURATION + np.sqrt(one @ C @ one * DURATION / 2)
+    size = np.sqrt(np.diag(loads @ K @ loads)) + np.sqrt(np.diag(loads @ C @ loads @ C @ loads))
+    expected = size * energy + np.abs(loads @ C @ one)
+    assert (gain >= expected * (1 - 1e-9)).all()
+    assert (gain < 1.2 * expected).all()
+
+
 def test_what_no_bound_holds_for_is_said():
-    coupled = StoreyFrame(**FRAME, dampers=(3.0, 1.0), damping_ratio=0.03)
-    with pytest.raises(UnprovedError, match="dashpots couple the modes; damping ratios have no"):
-        acceleration_gain(coupled, boxes({"m1": 3.0}, [0.0]), DURATION)
+    coupled = replace(matrices(), damping=[(1.0, np.diag([0.3, 0.1, 0.0]))])
+    with pytest.raises(UnprovedError, match="dashpots couple the modes; unknowns without mass"):
+        acceleration_gain(coupled, boxes({"m": 2.0}, [0.0]), DURATION)
