@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
+
 from alphacut.base.errors import RefusedError
 from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import Structure
@@ -20,6 +22,8 @@ from alphacut.frame import (
 )
 from alphacut.frame.analyses.spectrum_accuracy import accuracy_of
 from alphacut.frame.analyses.suites import ScaledRecord
+from alphacut.frame.modes.spectral_modes import spectral_modes
+from alphacut.frame.spectra.modal_combination import Combination
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.stages.store import Stage, StageContext, StageResult
 
@@ -43,16 +47,11 @@ def require_possible(section: ResponseSpectrumSection, structure: Structure) -> 
         RefusedError: An output takes velocities or accelerations, or a period lies outside the
             range of the spectrum.
     """
-    nominal = {name: number.nominal for name, number in structure.inputs(section.fuzzy).items()}
-    spectrum_response(
-        observed_model(section, structure),
-        nominal,
-        section.target,
-        combination=section.combination,
-        modes=section.modes,
-        own_ratios=section.own_ratios,
-        alpha=[1.0],
+    method = Combination(
+        section.target, section.combination, section.modes, own_ratios=section.own_ratios
     )
+    no_parameters = np.zeros((1, 0))  # one set of them
+    method.combined(spectral_modes(observed_model(section, structure), (), no_parameters))
 
 
 def stage(section: ResponseSpectrumSection, structure: Structure) -> Stage[SpectrumResponse]:

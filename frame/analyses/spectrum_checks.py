@@ -65,8 +65,8 @@ def spectrum_checks(
     Args:
         found: The combined peaks.
         limits: Limits of the magnitudes of its outputs.
-        displacement_factor: Factor of displacements and drifts: the displacement behaviour factor
-            q_d of EN 1998-1, 4.3.4, or C_d/I_e of ASCE 7-22, 12.8.6, if the design spectrum is
+        displacement_factor: Factor of displacements, drifts and rotations: the behaviour factor
+            q_d of EN 1998-1, 4.3.4, or C_d/I_e of ASCE 7-22, 12.8.6, where the design spectrum is
             reduced.
         base_shear_floor: Base shear in N that the combined one must have at least, such as that of
             the equivalent lateral force procedure of ASCE 7-22, 12.9.1.4.1.
@@ -97,7 +97,7 @@ def spectrum_checks(
         is_magnitude = limit.side == "" and not isinstance(limit.value, Sequence)
         require(is_magnitude, "limits", limit.text, "limits of magnitudes, as drift1 <= 30 mm")
         factor = 1.0
-        if units[limit.output] == "m":
+        if units[limit.output] in ("m", "rad"):
             factor = displacement_factor
         peaks[limit.output] = found.peak(limit.output, factor=factor)
     if base_shear_floor is not None:
