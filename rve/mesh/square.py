@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
+from alphacut.base.errors import FailedError
 from alphacut.base.extras import extra_named
 from alphacut.base.user_cache import cached_arrays
 from alphacut.rve.cell.lattice import SQUARE, Lattice
@@ -232,17 +233,20 @@ def open_gmsh() -> Iterator[Any]:
     """Open Gmsh with an empty model, and close it when the `with` block ends or raises.
 
     Gmsh prints nothing and uses one thread. Ctrl-C takes effect at the end of the block; a second
-    one ends the process at once. Gmsh may not be open already.
+    one ends the process at once.
 
     Yields:
         The module `gmsh`, initialised.
 
     Raises:
         MissingLibraryError: Gmsh is not installed.
+        FailedError: Gmsh is open already: its model would be mixed with the one of the block.
     """
     with extra_named():
         import gmsh
 
+    if gmsh.isInitialized():
+        raise FailedError("Gmsh is open in this process already", "call gmsh.finalize() before")
     # Gmsh loses exceptions of functions that it calls, KeyboardInterrupt among them.
     with uninterrupted(second_ends=True):
         gmsh.initialize(["", "-v", "0"], readConfigFiles=False, interruptible=False)

@@ -99,6 +99,13 @@ def test_gmsh_meshes_a_cell_again_only_if_its_file_is_not_there_whole(tmp_path, 
     assert [has_meshed(CIRCLE) for _ in range(2)] == [True, True]
 
 
+def test_a_gmsh_that_is_open_already_is_not_mixed_with(gmsh):
+    gmsh.model.add("of the user")
+    with pytest.raises(FailedError, match=r"open in this process already; call gmsh.finalize"):
+        square.gmsh_triangles(0.5, 0.4, CIRCLE, None)
+    assert gmsh.model.getCurrent() == "of the user"
+
+
 def test_a_node_without_a_partner_is_refused():
     plane = extrude(size=0.4, radius=0.5, layers=1).plane
     points = plane.points.copy()
