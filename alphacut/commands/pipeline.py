@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from alphacut.base.errors import RefusedError, require
@@ -298,7 +299,9 @@ class Pipeline:
             kept[checks.key] = checks
         if content.records is not None and content.envelope is not None:
             step = content.envelope.step
-            records = suite.suite_records(content.records, content.envelope, structure)
+            # Spectra are those of whole records, so that the motions last as long.
+            whole = content.envelope.model_copy(update={"duration": inf})
+            records = suite.suite_records(content.records, whole, structure)
             stage = spectrum.accuracy_stage(section, structure, found, records, step)
             kept[stage.name] = self.store.take(stage).numbers
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.errors import require
 from alphacut.base.number_text import MINUS, Table
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, table_of
@@ -98,13 +99,13 @@ def spectrum_accuracy(
     found: SpectrumResponse,
     suite: Sequence[GroundMotion],
     *,
-    duration: float,
     step: float,
     progress: Progress | None = None,
 ) -> SpectrumAccuracy:
     """Return by how much the response-spectrum method errs under each record of a suite.
 
-    Each record moves the structure with its nominal inputs. Its peaks are compared with those that
+    Each record moves the structure with its nominal inputs, to its end and for five natural periods
+    more. Its peaks are compared with those that
     the method gives by the spectrum of the same record, for the damping ratio of each mode.
 
     Args:
@@ -112,15 +113,14 @@ def spectrum_accuracy(
         found: What the method gave under a code's spectrum; the modes, outputs and the rule of
             combination are taken from it.
         suite: Records of one component each.
-        duration: Longest response, in s.
-        step: Time step, in s, of which the duration is a multiple.
+        step: Time step, in s.
         progress: Called with the completed fraction.
 
     Raises:
-        RefusedError: A record is zero throughout, or step and duration do not fit.
+        RefusedError: A record is zero throughout, or has several components.
         FailedError: A peak is not bounded.
     """
-    records = scaled_records(structure, suite, duration=duration, step=step)
+    records = scaled_records(structure, suite, duration=np.inf, step=step)
     return accuracy_of(structure, found, records, step=step, progress=progress)
 
 
@@ -134,8 +134,17 @@ def accuracy_of(
 ) -> SpectrumAccuracy:
     """Return by how much the method errs under each of some scaled records.
 
-    The arguments are those of `spectrum_accuracy`; a record has its duration.
+    The arguments are those of `spectrum_accuracy`, but of records with the length of their
+    responses, which must not end before the record.
+
+    Raises:
+        RefusedError: A response ends before its record, or a record has several components.
+        FailedError: A peak is not bounded.
     """
+    for record in records:
+        allowed = "records of one component, to their end"
+        is_whole = len(record.components) == 1 and record.facts.truncated_fraction == 0
+        require(is_whole, f"record {record.name}", "of several or cut off", allowed)
     inputs = {name: Crisp(value) for name, value in found.nominal_inputs.items()}
     combined = []
     peaks = []

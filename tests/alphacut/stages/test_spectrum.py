@@ -44,7 +44,7 @@ baseline = "mean"
 [envelope]
 fuzzy = ["k1"]
 alpha = [0]
-duration = "20 s"
+duration = "2 s"
 step = "0.02 s"
 """
 
