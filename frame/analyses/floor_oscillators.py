@@ -54,11 +54,8 @@ def observed_accelerations(
         RefusedError: It is not linear, not at rest, under forces, or not moved by a record from
             t = 0 on; or an output is no absolute acceleration.
     """
-    allowed = "a linear structure, whose columns do not yield"
-    is_linear = structure.dynamics is Dynamics.LINEAR and isinstance(structure, LinearSystem)
-    require(is_linear, "structure", type(structure).__name__, allowed)
-    assert isinstance(structure, LinearSystem)
-    grounds = grounds_of(structure)
+    linear = _require_linear(structure)
+    grounds = grounds_of(linear)
     for ground in grounds:
         is_plain = not (ground.start or ground.frequency or ground.is_held)
         allowed = "samples from t = 0 on alone"
@@ -66,7 +63,7 @@ def observed_accelerations(
     forces = [force for force in structure.loads if not force.is_inertial]
     allowed = "accelerograms of the ground alone"
     require(not forces, "loads", f"{len(forces)} forces", allowed)
-    system = structure.with_outputs(outputs)
+    system = linear.with_outputs(outputs)
     points = {"": np.zeros(1)}
     if inputs:
         cuts = boxes(inputs)
@@ -84,6 +81,32 @@ def observed_accelerations(
         is_acceleration = bool(assembly.accelerated[k].any() and not row.any())
         require(is_acceleration, "output", name, "absolute accelerations, as a3 of a frame")
     return system
+
+
+def moved_by(
+    structure: StructureModel, motions: Sequence[Sequence[Accelerogram]]
+) -> list[StructureModel]:
+    """Return a structure under each of some motions of the ground; without any, as it is moved.
+
+    Args:
+        structure: The structure.
+        motions: The accelerograms of the components of each.
+
+    Raises:
+        RefusedError: It is not linear, or has another number of components.
+    """
+    if not motions:
+        return [structure]
+    return [_require_linear(structure).moved_by(*grounds) for grounds in motions]
+
+
+def _require_linear(structure: StructureModel) -> LinearSystem:
+    """Return a structure, or raise RefusedError if it is not linear."""
+    is_linear = structure.dynamics is Dynamics.LINEAR and isinstance(structure, LinearSystem)
+    allowed = "a linear structure, whose columns do not yield"
+    require(is_linear, "structure", type(structure).__name__, allowed)
+    assert isinstance(structure, LinearSystem)
+    return structure
 
 
 def grounds_of(structure: LinearSystem) -> list[Accelerogram]:
@@ -110,6 +133,10 @@ class FloorValues(NamedTuple):
         attained: Attained values, shape (levels, m).
         natures: Guarantees of the bounds of each output.
         encloses: Name of the set that the cuts enclose, or empty.
+        flow: Accelerations of the oscillators as functions of the inputs.
+        error: Error of these by the steps of the oscillator on the ground, shape (m,), in m/s².
+        reached_at: Inputs that attain values, and the nominal ones, shape (points, inputs), in SI
+            units.
     """
 
     nominal: Array
@@ -117,6 +144,44 @@ class FloorValues(NamedTuple):
     attained: Array
     natures: tuple[Nature, ...]
     encloses: str
+    flow: LinearFlow
+    error: Array
+    reached_at: Array
+
+    def peaks_at(self, points: Array) -> Array:
+        """Return values that the spectra exceed at inputs (points, inputs), shape (points, m)."""
+        peaks = np.abs(self.flow.values(points)).max(axis=1)
+        return np.asarray(np.maximum(peaks - self.error, 0.0))
+
+
+def mean_values(values: Sequence[FloorValues], cuts: Boxes) -> FloorValues:
+    """Return the means of floor spectra of one period over records.
+
+    The mean of the bounds is one of the mean. What is attained under one record need not be under
+    another one by the same structure: so the mean is computed at the inputs that attain the values
+    under each, and the largest one in each cut is taken.
+
+    Args:
+        values: Those under each record, one at least.
+        cuts: Boxes of the inputs.
+    """
+    first = values[0]
+    if len(values) == 1:
+        return first
+    attained = np.full_like(first.attained, -np.inf)
+    if not first.encloses:
+        points = np.unique(np.concatenate([x.reached_at for x in values]), axis=0)
+        means = np.mean([x.peaks_at(points) for x in values], axis=0)
+        for level, (low, high) in enumerate(zip(cuts.lower, cuts.upper, strict=True)):
+            is_inside = ((points >= low) & (points <= high)).all(axis=1)
+            attained[level] = means[is_inside].max(axis=0)
+    natures = zip(*(x.natures for x in values), strict=True)
+    return first._replace(
+        nominal=np.mean([x.nominal for x in values], axis=0),
+        bound=np.mean([x.bound for x in values], axis=0),
+        attained=attained,
+        natures=tuple(map(Nature.weakest, natures)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +258,19 @@ class FloorOscillators:
         encloses = found[0].encloses
         if not encloses:  # the nominal inputs belong to each cut
             attained = np.maximum(np.maximum(attained, nominal) - error, 0.0)
-        return FloorValues(nominal, bound + error, attained, tuple(natures), encloses)
+        known = [peak.reached_at for peak in found if peak.reached_at]
+        points = [[at[name] for name in self.cuts.names] for at in known]
+        flow = LinearFlow(system, self.cuts.names, self.duration, step, Exact())
+        return FloorValues(
+            nominal=nominal,
+            bound=bound + error,
+            attained=attained,
+            natures=tuple(natures),
+            encloses=encloses,
+            flow=flow,
+            error=error,
+            reached_at=np.array([self.cuts.nominal, *points]),
+        )
 
     def _filtered(self, period: float, step: float) -> tuple[LinearSystem, Array, Array | None]:
         """Return the structure under the response of an oscillator on the ground.

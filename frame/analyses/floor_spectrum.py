@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,14 @@ from alphacut.frame.analyses.answer import Answer, Record, known, table_of
 from alphacut.frame.analyses.floor_oscillators import (
     FloorOscillators,
     FloorValues,
+    mean_values,
+    moved_by,
     observed_accelerations,
 )
 from alphacut.frame.analyses.peaks import PEAK_ERROR
+from alphacut.frame.analyses.suites import record_names
 from alphacut.frame.boxes import ALPHA, boxes
+from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.spectra.response_spectrum import checked_periods
 from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import FuzzyNumber
@@ -41,6 +45,7 @@ class FloorSpectrum(Answer):
         attained: Largest value in each cut that some inputs are known to have, the same shape;
             -∞ where none is known.
         natures: Guarantee of the bounds of each output and period, nested sequences.
+        suite: Names of the records over which all values are means; empty for one motion.
         unproved: Why some bounds are not guaranteed; empty if all are.
     """
 
@@ -55,6 +60,7 @@ class FloorSpectrum(Answer):
     attained: Array
     natures: tuple[tuple[Nature, ...], ...]
     unproved: str = ""
+    suite: tuple[str, ...] = ()
 
     def table(self) -> Table:
         """Return a table of texts with a row for each output and period, at the lowest level.
@@ -109,8 +115,11 @@ class FloorSpectrum(Answer):
     def words(self) -> str:
         """Return sentences on the oscillators, the curves, and what is not proved."""
         unproved = f" Not all bounds are guaranteed: {self.unproved}." if self.unproved else ""
+        what = "Largest"
+        if self.suite:
+            what = f"Mean over {len(self.suite)} records of the largest"
         return (
-            f"Largest |ω² w| of an oscillator with the damping ratio {self.damping:.3g} and the"
+            f"{what} |ω² w| of an oscillator with the damping ratio {self.damping:.3g} and the"
             " relative displacement w that stands on the floor and is too light to move it, within"
             " the duration. Some structure of the cut has the attained value, and none has more"
             f" than a guaranteed bound.{unproved}"
@@ -128,6 +137,7 @@ def floor_spectrum(
     step: float,
     alpha: Sequence[float] = ALPHA,
     error: float = PEAK_ERROR,
+    records: Sequence[Accelerogram | Sequence[Accelerogram]] = (),
     progress: Progress | bool | None = None,
 ) -> FloorSpectrum:
     """Return upper bounds of the floor spectra of a structure over its uncertain inputs.
@@ -149,6 +159,8 @@ def floor_spectrum(
         step: Largest distance of the time nodes, in s. It is divided for short periods.
         alpha: Levels, rising within [0, 1].
         error: Error that is aimed at, and need not be reached, as a fraction of each value.
+        records: Records, or the components of each, which move the structure one after the other
+            in place of its own ground motion; the spectra are then means over them.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -173,19 +185,28 @@ def floor_spectrum(
     require(len(shaped) > 0, "periods", None, "one period or more")
     ratio = checked_number("damping", damping, least=0, most=0.999)
     cuts = boxes(inputs, alpha)
-    system = observed_accelerations(structure, names, inputs)
-    floor = FloorOscillators.of(system, cuts, ratio, duration=duration, step=step, error=error)
+    motions = [(x,) if isinstance(x, Accelerogram) else tuple(x) for x in records]
+    systems = [
+        observed_accelerations(moved, names, inputs) for moved in moved_by(structure, motions)
+    ]
+    floor = FloorOscillators.of(systems[0], cuts, ratio, duration=duration, step=step, error=error)
+    floors = [replace(floor, system=system) for system in systems]
     columns: list[FloorValues] = []
     with progress_reporter(progress) as report:
         for p, period in enumerate(map(float, shaped)):
-            columns.append(floor.values(period, nth_subprogress(report, p, len(shaped))))
+            tick = nth_subprogress(report, p, len(shaped))
+            of_records = [
+                moved.values(period, nth_subprogress(tick, r, len(floors)))
+                for r, moved in enumerate(floors)
+            ]
+            columns.append(mean_values(of_records, cuts))
     natures = [[column.natures[k] for column in columns] for k in range(len(names))]
     is_proved = all(nature is Nature.GUARANTEED for row in natures for nature in row)
     reason = floor.unproved or "branch and bound and the dual bound find none there"
     return FloorSpectrum(
         encloses=columns[0].encloses,
         damping=ratio,
-        outputs=system.outputs,
+        outputs=floor.system.outputs,
         alpha=cuts.alpha,
         periods=shaped,
         nominal=np.stack([column.nominal for column in columns], axis=-1),
@@ -193,4 +214,5 @@ def floor_spectrum(
         attained=np.stack([column.attained for column in columns], axis=-1),
         natures=tuple(map(tuple, natures)),
         unproved="" if is_proved else reason,
+        suite=tuple(record_names(motions)) if motions else (),
     )
