@@ -88,9 +88,3 @@ def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_
     assert not any(BOX in title for title in tables["envelope_all-drift1"])
     assert main(["verify", str(tmp_path / "out")]) == 0
     assert "exact motions agree with what is guaranteed" in capfd.readouterr().out
-    (tmp_path / "box").mkdir()
-    with_damping = text.replace("5 %", "[5, 5.0001] %").replace(
-        '["k"]\nalpha', '["k", "zeta"]\nalpha'
-    )
-    box, *_ = run_with(tmp_path / "box", with_damping, capfd)
-    assert peak["upper"][0] < 0.99 * box["envelopes"]["all"]["peak"]["drift1"]["upper"][0]
