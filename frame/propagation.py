@@ -19,6 +19,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import make_flow
+from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import (
     LinearSystem,
@@ -156,8 +157,10 @@ def envelope(
         # Between the nodes proofs state a bound; for other methods some trajectories give an
         # estimate.
         bounds = with_node_deviation(bounds, flow)
-        # Guaranteed bounds are tested by exact responses that another algorithm computes.
-        if has_matrices(model) and np.isfinite(bounds.proved.upper).all():
+        # Guaranteed bounds are tested by exact responses that another algorithm computes. Those of
+        # columns that yield have been tested by the proof.
+        is_bounded = np.isfinite(bounds.proved.upper).all()
+        if has_matrices(model) and not yields(model) and is_bounded:
             from alphacut.frame.verification.self_test import with_motions_tested  # needs SciPy
 
             bounds = with_motions_tested(bounds, model)
@@ -226,9 +229,9 @@ def _build_problem(
         method = "auto" if has_matrices(model) else "improved-graph-follower"
     chosen = _chosen_method(method, options)
     # The response of columns that yield has kinks as a function of the parameters.
-    takes_kinks = chosen.name in ("auto", "quasi-monte-carlo")
+    takes_kinks = chosen.name in ("auto", "proof", "quasi-monte-carlo")
     is_possible = takes_kinks or not yields(model)
-    allowed = "auto or quasi-monte-carlo where columns yield"
+    allowed = "auto, proof or quasi-monte-carlo where columns yield"
     require(is_possible, "method", value=chosen.name, allowed=allowed)
     if integrator is None:
         # Proofs hold for the exact response.
@@ -302,7 +305,12 @@ def require_envelope(
     if isinstance(first_steps, LinearFlow):
         first_steps = replace(first_steps, by_modes=False)  # loads no compiled code
     first_steps.values(problem.flow.boxes.probes)
-    if problem.method.name in ("proof", "dual"):
+    if isinstance(flow, YieldingFlow):
+        if problem.method.name == "proof":
+            from alphacut.frame.methods.yielding_proof import provable_storey
+
+            provable_storey(flow, problem.flow.boxes)
+    elif problem.method.name in ("proof", "dual"):
         proof = cast("Proof | DualProof", problem.method)
         with refusing():
             proof.forecast(exact_flow(flow), problem.flow.boxes)
@@ -464,7 +472,9 @@ def _on_levels(bounds: Envelope, alpha: Array, rows: Ints) -> Envelope:
     changes: dict[str, Any] = {name: getattr(bounds, name)[rows] for name in names}
     peaks = bounds.searched_peaks
     if peaks is not None:
-        of_peaks = {name: getattr(peaks, name)[rows] for name in names}
+        of_peaks: dict[str, Any] = {name: getattr(peaks, name)[rows] for name in names}
+        if peaks.inner is not None:
+            of_peaks["inner"] = Ends(peaks.inner.lower[rows], peaks.inner.upper[rows])
         changes["searched_peaks"] = replace(peaks, alpha=alpha, **of_peaks)
     for name in ("inner", "outer", "least_peaks"):
         ends = getattr(bounds, name)

@@ -331,8 +331,9 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
 
     Args:
         found: Bounds of the peaks at the time nodes, with arrays of shape (levels, outputs).
-            Responses that were computed attain both ends. It is not proved that no peak lies
-            outside.
+            Responses that were computed attain both ends, and it is not proved that no peak lies
+            outside; or the bounds are guaranteed at all times, and responses attain the `inner`
+            ones.
         column: Index of the output.
         between: What responses may add to a peak within the time steps, shape (levels,). Its first
             entry, of the lowest level, becomes `between_nodes` of the peak.
@@ -346,6 +347,12 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
     upper = found.upper[:, column]
     attained = upper
     least_upper = lower + between
+    error = found.error[:, column] + between
+    if found.inner is not None:
+        attained = found.inner.upper[:, column]
+        least_upper = found.inner.lower[:, column]
+        between = np.zeros_like(between)
+        error = np.zeros_like(error)
     attained_at = dict(zip(found.inputs, found.upper_at[0, column].tolist(), strict=True))
     if found.encloses:
         attained = np.full_like(upper, -np.inf)
@@ -355,7 +362,7 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
         alpha=found.alpha,
         lower=lower,
         upper=upper,
-        error=found.error[:, column] + between,
+        error=error,
         reached=attained,
         least_lower=np.zeros_like(lower),
         least_upper=least_upper,

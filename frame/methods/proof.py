@@ -40,6 +40,8 @@ from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.chord_deviation import Response, narrowed_at_jumps, narrowed_deviation
@@ -63,9 +65,10 @@ class Proof:
             each output, or in the unit of the first displacement (of the first output if there is
             none) if the envelope is not relative; by default a tenth of the tolerance.
         tolerance: Largest distance allowed, to which the gap may grow if a smaller one is not
-            proved, in the same unit; 1e-3 of each peak by default.
-        boxes: Largest number of boxes looked at for each bound, on average. If it is reached, the
-            gap is wider.
+            proved, in the same unit; 1e-3 of each peak by default. Where columns yield, one of both
+            is the wanted gap, and 5e-3 of each peak without them.
+        boxes: Largest number of boxes looked at for each bound, on average; where columns yield,
+            for all bounds of a level. If it is reached, the gap is wider.
         parts: Largest number of sub-boxes for a peak, and of sub-boxes that may be refused.
         workers: Number of threads, which does not change the result; by default all cores.
 
@@ -95,9 +98,14 @@ class Proof:
         Raises:
             UnprovedError: The structure is not linear, the integrator is not the exact one, there
                 are more than six inputs, or the error of the modal model cannot be bounded within
-                the tolerance.
+                the tolerance; or columns yield, and `prove_yielding` does not bound the response.
             FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
+        if isinstance(flow.flow, YieldingFlow):
+            gap = flow.peak * YIELDING_GAP
+            if stated := self.gap or self.tolerance:
+                gap = flow.scale * stated
+            return prove_yielding(flow, self.name, gap, budget=self.boxes, progress=progress)
         # Without a tolerance the gap is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
         return prove(replace(self, tolerance=tolerance), flow, progress)

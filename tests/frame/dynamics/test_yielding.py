@@ -17,6 +17,7 @@ from alphacut.frame import (
     envelope,
     peaks,
 )
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import Interval, Nature, RefusedError, Triangular
@@ -203,9 +204,11 @@ def test_peaks_are_searched_and_proofs_are_refused(rng):
     flat = peaks(envelope(stiff, {"hardening2": Interval(0.1, 0.2)}, **nodes))["drift1"]
     assert flat.nature is Nature.ESTIMATED
     assert flat.lower == pytest.approx(flat.upper, rel=1e-12)
-    for method in ("proof", "dual", "improved-graph-follower"):
-        with pytest.raises(RefusedError, match="auto or quasi-monte-carlo"):
+    for method in ("dual", "improved-graph-follower"):
+        with pytest.raises(RefusedError, match="auto, proof or quasi-monte-carlo"):
             envelope(frame, inputs, method, **nodes)
+    with pytest.raises(UnprovedError, match="one storey"):
+        envelope(frame, inputs, "proof", **nodes)
 
 
 def test_a_friction_isolator_slides_and_sticks_in_finitely_many_events():

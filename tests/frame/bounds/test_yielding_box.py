@@ -1,0 +1,137 @@
+"""Boxes of one yielding storey: motions stay inside, events too, and the error is not too small."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import Accelerogram, Force, History, StoreyFrame
+from alphacut.frame.bounds.yielding_box import YieldingStorey
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.yielding import YieldingFlow
+
+OUTPUTS = ("q1", "v1", "a1", "shear1", "ductility1", "residual1", "dissipated1")
+
+
+def random_storey(rng, **changes):
+    """A storey of a random period and ductility under a random record."""
+    period = float(rng.uniform(0.3, 1.0))
+    stiffness = 4e4 * (2 * np.pi / period) ** 2
+    yield_force = 4e4 * float(rng.uniform(0.5, 1.5))
+    samples = 4 * rng.normal(size=20).repeat(3) + rng.normal(size=60)
+    frame = StoreyFrame(
+        masses=[4e4],
+        stiffness=[stiffness],
+        lengths=[3.0],
+        damping_ratio=float(rng.uniform(0.0, 0.08)),
+        yield_force=[yield_force],
+        hardening=[float(rng.uniform(0.02, 0.2))],
+        ground=Accelerogram(0.05, samples),
+        outputs=OUTPUTS,
+    )
+    return replace(frame, **changes)
+
+
+def bounds_and_motions(frame, names, radius, rng, step=0.05):
+    """Bounds over a box of inputs ± radius (1 + random) and motions in it: values and peaks."""
+    flow = YieldingFlow(frame, names, 2.5, step)
+    nominal = np.array([frame.parameters[name] for name in names])
+    low, high = nominal * (1 - radius), nominal * (1 + radius)
+    found = YieldingStorey(flow, np.arange(len(names))).bounds(low, high)
+    points = np.vstack([low, high, rng.uniform(low, high, (60, len(names)))])
+    return found, *flow.values_and_peaks(points)
+
+
+@pytest.mark.parametrize(
+    "names", [("k1",), ("fy1",), ("m1", "zeta"), ("k1", "fy1"), ("k1", "fy1", "hardening1")]
+)
+def test_motions_stay_inside_tight_bounds(names, rng):
+    for _ in range(4):
+        frame = random_storey(rng, gravity=float(rng.choice([0.0, 9.81])))
+        found, values, peaks = bounds_and_motions(frame, names, 1e-4, rng)
+        if not np.isfinite(found.peaks).all():  # a grazed yield drift may be too wide
+            continue
+        scale = np.abs(values).max(axis=(0, 1)) + 1e-12
+        assert (values - found.upper[..., 1] <= 1e-9 * scale).all()
+        assert (-values - found.upper[..., 0] <= 1e-9 * scale).all()
+        assert (peaks <= found.peaks.max(axis=1)).all()
+        if found.error < 1e-6:  # no event is grazed
+            wide = found.upper.sum(axis=-1) - np.ptp(values, axis=0)
+            assert (wide[:, :2] <= 0.05 * scale[:2]).all()
+
+
+def test_steps_bound_what_lies_between_nodes(rng):
+    frame = random_storey(rng)
+    found, _, _ = bounds_and_motions(frame, ("k1",), 1e-3, rng)
+    _, finer, _ = bounds_and_motions(frame, ("k1",), 1e-3, rng, step=0.005)
+    steps = finer[:, 1:].reshape(len(finer), -1, 10, len(OUTPUTS))
+    assert (steps.max(axis=(0, 2)) <= found.steps[1:, :, 1] + 1e-9).all()
+    assert (-steps.min(axis=(0, 2)) <= found.steps[1:, :, 0] + 1e-9).all()
+
+
+def test_events_lie_in_their_enclosures(rng):
+    frame = random_storey(rng, outputs=("dissipated1",))
+    found, _, _ = bounds_and_motions(frame, ("k1",), 1e-4, rng)
+    step = 0.0025
+    _, values, _ = bounds_and_motions(frame, ("k1",), 1e-4, rng, step=step)
+    for motion in values[..., 0]:
+        yields = np.diff(motion) > 1e-9 * motion[-1]
+        # A step in which yielding begins or ends lies at a change, or before it.
+        changes = np.flatnonzero(np.diff(yields.astype(int), prepend=0)) * step
+        for time in changes:
+            near = (found.events[:, 1] - step <= time) & (time <= found.events[:, 2] + 2 * step)
+            assert near.any()
+
+
+def test_a_grazed_yield_drift_is_within_an_error_of_its_size(rng):
+    # The motion passes the yield drift for so short a time that no event is looked for. Then the
+    # plastic drift is the whole error, and a bound without a constant would be too small.
+    for _ in range(5):
+        excess = 10 ** float(rng.uniform(-7, -5))
+        frequency = float(rng.uniform(100, 300))
+        drift = 0.01
+        frame = StoreyFrame(
+            masses=[1.0],
+            stiffness=[frequency**2],
+            v0=[frequency * drift * (1 + excess)],
+            yield_drift=[drift],
+            hardening=[0.1],
+            outputs=("residual1", "dissipated1", "q1"),
+        )
+        frame = replace(frame, loads=[Force(1, 0.0, History(0.1, [1.0, 1.0]))])
+        flow = YieldingFlow(frame, ("k1",), 2.5 / frequency, 0.5 / frequency)
+        point = np.array([frequency**2])
+        found = YieldingStorey(flow, np.arange(0)).bounds(point, point)
+        values, _ = flow.values_and_peaks(point[np.newaxis])
+        assert (values[0, -1] <= found.upper[-1, :, 1]).all()
+        assert values[0, -1, 0] > 0
+        assert found.upper[-1, 0, 1] <= 40 * excess * drift
+
+
+def test_the_error_without_hardening_is_bounded_by_its_integral(rng):
+    frame = random_storey(rng, hardening=[0.0])
+    found, values, _ = bounds_and_motions(frame, ("k1",), 1e-4, rng)
+    assert (values.max(axis=0) <= found.upper[..., 1] + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "names", "words"),
+    [
+        ({"masses": [1.0] * 2, "stiffness": [1.0] * 2, "yield_force": [1.0] * 2}, "k1", "one storey"),
+        ({"rayleigh": (0.0, 1e-3), "rayleigh_of": "tangent"}, "k1", "tangent"),
+        ({"q0": [1.0]}, "k1", "yield drift at the start"),
+        ({"gravity": 9.81, "hardening": [0.0]}, "k1", "negative"),
+        ({"loads": [Force(1, 1.0, History.constant(is_static=True))]}, "k1", "static"),
+        ({"loads": [Force(1, 1.0, History.constant())]}, "k1", "accelerations"),
+    ],
+)  # fmt: skip
+def test_what_is_not_proved_is_refused(changes, names, words, rng):
+    frame = (
+        random_storey(rng, **changes)
+        if len(changes.get("masses", "1")) == 1
+        else StoreyFrame(**changes)
+    )
+    flow = YieldingFlow(frame, (names,), 1.0, 0.1)
+    point = np.array([frame.parameters[names]])
+    with pytest.raises(UnprovedError, match=words):
+        YieldingStorey(flow, np.arange(1)).bounds(0.99 * point, 1.01 * point)

@@ -1,0 +1,59 @@
+"""Proof of one yielding storey: guaranteed peaks, and what is refused with the input to change."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope, peaks
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.fuzzy import Interval, Nature, Triangular
+from tests.frame.bounds.test_yielding_box import random_storey
+
+SHORT = {"duration": 2.5, "step": 0.05, "progress": False}
+
+
+def test_auto_guarantees_the_peaks_of_a_yielding_storey(rng):
+    frame = random_storey(rng, outputs=("q1", "ductility1", "dissipated1"))
+    k, fy = frame.parameters["k1"], frame.parameters["fy1"]
+    inputs = {"k1": Triangular(0.97 * k, k, 1.03 * k), "fy1": Interval(0.99 * fy, 1.01 * fy)}
+    found = envelope(frame, inputs, alpha=[0, 0.5, 1], **SHORT)
+    assert found.nature is Nature.GUARANTEED
+    assert found.facts["gap_of_peaks"] <= 0.1
+    points = rng.uniform([0.97 * k, 0.99 * fy], [1.03 * k, 1.01 * fy], (200, 2))
+    flow = YieldingFlow(frame, tuple(inputs), 2.5, 0.05)
+    values, largest = flow.values_and_peaks(points)
+    assert (found.lower[0] <= values).all()
+    assert (values <= found.upper[0]).all()
+    for column, peak in enumerate(peaks(found).values()):
+        assert peak.nature is Nature.GUARANTEED
+        assert largest[:, column].max() <= peak.proved[0] <= 1.1 * peak.reached[0]
+        assert (np.diff(peak.proved) <= 0).all()
+        at = np.array([list(peak.reached_at.values())])
+        assert flow.values_and_peaks(at)[1][0, column] == pytest.approx(peak.reached[0], rel=1e-8)
+
+
+def test_a_proof_keeps_its_gap_and_signed_peaks(rng):
+    frame = random_storey(rng, outputs=("q1",), damping_ratio=0.05)
+    k = frame.parameters["k1"]
+    inputs = {"k1": Interval(0.99 * k, 1.01 * k)}
+    found = envelope(frame, inputs, "proof", gap=0.02, alpha=[0], **SHORT)
+    assert found.facts["gap_of_peaks"] <= 0.02
+    signed = peaks(found, ["max q1", "min q1"])
+    finer = YieldingFlow(frame, ("k1",), 2.5, 0.005).values(
+        np.linspace(0.99, 1.01, 21)[:, None] * k
+    )
+    assert finer.max() <= signed["max q1"].proved[0]
+    assert finer.min() >= signed["min q1"].proved[0]
+
+
+def test_what_cannot_be_proved_names_the_input_or_is_searched(rng):
+    frame = random_storey(rng, outputs=("q1",))
+    p = frame.parameters
+    names = ("k1", "fy1", "hardening1", "l1")
+    inputs = {name: Interval(0.95 * p[name], 1.05 * p[name]) for name in names}
+    with pytest.raises(UnprovedError, match="take l1 as a crisp number"):
+        envelope(frame, inputs, "proof", alpha=[0], **SHORT)
+    two = StoreyFrame([4e4] * 2, stiffness=[2e6] * 2, yield_force=[1e4] * 2, ground=frame.ground)
+    found = envelope(two, {"k1": Interval(2e6, 2.01e6)}, alpha=[0], duration=0.5, step=0.05)
+    assert "one storey can be proved" in found.notes[0]
+    assert found.nature is Nature.ATTAINED
