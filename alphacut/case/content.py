@@ -217,8 +217,8 @@ class Content(CellContent):
 
         Refused are an accelerogram of the structure, a structure that no ground motion moves,
         components that are not those of the structure, and the sections [probability],
-        [tolerances], [floor_spectrum], [identify] and [[study]]. They ask about one response, while
-        a suite has one for each record.
+        [tolerances], [identify] and [[study]], which ask about one response, while a suite has one
+        for each record; and floor spectra over all angles of incidence.
 
         Args:
             records: The section; the case has it.
@@ -233,9 +233,11 @@ class Content(CellContent):
             section.require_pattern()
             self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
-        for key in ("probability", "tolerances", "floor_spectrum", "identify", "study"):
+        for key in ("probability", "tolerances", "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
+        is_turned = records.has_all_angles and self.floor_spectrum is not None
+        require(not is_turned, "floor_spectrum", "over all angles", "an angle in records.angle")
 
     def _require_directions(self, records: RecordsSection, section: StructureSection) -> None:
         """Refuse records whose components are not those of the structure, and what needs two.
@@ -315,8 +317,11 @@ class Content(CellContent):
             require(is_first, f"study[{number}].name", study.name, "a name of its own")
             names.append(study.name)
         self._require_modulus()
-        for section in self.answered.values():
+        for section in self.questions.values():
             section.require_answerable(structure)
+        if self.floor_spectrum is not None:
+            count = self.records.component_count if self.records is not None else 0
+            self.floor_spectrum.require_answerable(structure, count)
         if self.identify is not None:
             is_framed = structure.model.floors > 0
             require(is_framed, "identify", "without a frame", "beside [frame]")

@@ -10,6 +10,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.case.structure import Structure
 from alphacut.case.types import Names, OneOrMany, Quantity, Section, Time
+from alphacut.frame import Accelerogram
 from alphacut.frame.spectra.response_spectrum import MIN_PERIOD
 
 Period = Annotated[float, Quantity("s", minimum=0)]
@@ -17,7 +18,10 @@ RANGE = ("shortest", "longest", "count")
 
 
 class FloorSpectrumSection(Section):
-    """Spectra of light oscillators on floors, over the α-cuts of [envelope], with its time step."""
+    """Spectra of light oscillators on floors, over the α-cuts of [envelope], with its time step.
+
+    With [records] they are means over the records.
+    """
 
     key: ClassVar[str] = "floor_spectrum"
 
@@ -55,12 +59,21 @@ class FloorSpectrumSection(Section):
             return np.array(self.periods)
         return np.append(0.0, np.geomspace(self.shortest, self.longest, self.count))
 
-    def require_answerable(self, structure: Structure) -> None:
-        """Refuse a structure without floor spectra, and outputs that are no accelerations."""
-        from alphacut.frame.analyses.floor_oscillators import observed_accelerations  # takes time
+    def require_answerable(self, structure: Structure, components: int) -> None:
+        """Refuse a structure without floor spectra, and outputs that are no accelerations.
 
+        Args:
+            structure: The structure.
+            components: Number of components of the records that will move it; 0 where it has a
+                ground motion of its own.
+        """
+        # takes time to import
+        from alphacut.frame.analyses.floor_oscillators import moved_by, observed_accelerations
+
+        motions = [(Accelerogram(1.0, np.zeros(2)),) * components] if components else []
         try:
-            observed_accelerations(structure.model, self.outputs, {})
+            (model,) = moved_by(structure.model, motions)
+            observed_accelerations(model, self.outputs, {})
         except RefusedError as error:
             key = f"floor_spectrum: {error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None

@@ -408,7 +408,7 @@ def _envelope_seconds(structure: Structure, task: EnvelopeTask) -> float:
 def _records(
     content: Content, structure: Structure, task: EnvelopeTask, pieces: Mapping[str, Foreseen]
 ) -> Iterator[Foreseen]:
-    """Yield what the peaks under the records of a suite, and fragility over intensities, will take.
+    """Yield what peaks under the records of a suite, fragility and floor spectra will take.
 
     The peaks under the record of median duration are computed; the time is taken as proportional to
     the durations. Of a frame that yields, some responses at two intensities are timed.
@@ -443,6 +443,11 @@ def _records(
         foreseen = [analysis.foresee() for analysis in analyses.values()]
         motions = round(sum(count for count, _ in foreseen))
         yield Foreseen("fragility", motions, "motions", sum(time for _, time in foreseen))
+    if content.floor_spectrum is not None:
+        moved = suite.moved_by(structure, typical)
+        longest = replace(task, duration=max(durations))
+        seconds = _floor_spectrum_seconds(content.floor_spectrum, moved, longest)
+        yield pieces["floor_spectrum"]._replace(seconds=len(records) * seconds)
 
 
 def _floor_spectrum_seconds(

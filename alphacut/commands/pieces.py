@@ -64,6 +64,9 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
         yield Foreseen("records", count, "records")
         if content.incremental_question is not None:
             yield Foreseen("fragility", count, "records")
+        if content.floor_spectrum is not None:
+            periods = len(content.floor_spectrum.all_periods)
+            yield Foreseen("floor_spectrum", count * periods, "spectra")
         return
     studies = tasks(section, content.study)
     yield Foreseen("envelopes", len(studies), "studies")

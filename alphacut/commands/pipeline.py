@@ -375,7 +375,7 @@ class Pipeline:
             ]
             scaled = self.store.take_all(further, self.executor)
             increments = {x.name: scaled[f"incremental_{x.name}"].numbers for x in records}
-        return Response(structure, task, found.peak, found, increments)
+        return Response(structure, task, found.peak, found, increments, records)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Return the peaks that questions are asked about, by name.

@@ -356,6 +356,8 @@ def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
         axes.plot(periods, nominal, color=INK, lw=1.2, label="nominal")
         natures = " and ".join(dict.fromkeys(map(str, answer.natures[k])))
         title = f"{answer.outputs[k]}, ζ = {answer.damping:.3g}; {natures} bounds"
+        if answer.suite:
+            title += f" of the mean over {len(answer.suite)} records"
         axes.set(title=title, ylim=(0.0, None), xlim=(0.0, None))
         axes.set_ylabel("floor spectrum Sa (g)")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

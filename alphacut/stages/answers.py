@@ -38,6 +38,7 @@ from alphacut.frame.analyses.fragility import fragility_of
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.peaks import Peaks
+from alphacut.frame.analyses.suites import ScaledRecord
 from alphacut.frame.analyses.tolerances import require_admissible_scale
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.stages.envelope import EnvelopeTask
@@ -61,6 +62,7 @@ class Response:
         peaks: Peaks of the outputs; None where no question reads them.
         suite: Peaks under each record, if there is a suite.
         increments: Peaks over the scales of each record by its name, of a frame that yields.
+        records: The records of the suite.
     """
 
     structure: Structure
@@ -68,6 +70,7 @@ class Response:
     peaks: Peaks | None = None
     suite: SuitePeaks | None = None
     increments: Mapping[str, Increments] = field(default_factory=dict)
+    records: tuple[ScaledRecord, ...] = ()
 
     @property
     def inputs(self) -> dict[str, FuzzyNumber]:
@@ -199,21 +202,24 @@ def floor_spectra(
     Args:
         section: Its accelerations, periods and damping ratio.
         response: The structure, and the inputs, α-levels, duration and time step of its response.
-            Its peaks are not used.
+            Its peaks are not used. With records the duration is that of the longest response.
         tick: Called with the completed fraction of the work.
 
     Raises:
         RefusedError: The structure has no such spectra.
         FailedError: A response could not be computed.
     """
+    durations = [record.duration for record in response.records]
     return floor_spectrum(
         response.structure.model,
         response.inputs,
         section.outputs,
         section.all_periods,
         section.damping,
-        **response.times,
+        duration=max(durations, default=response.task.duration),
+        step=response.task.section.step,
         alpha=response.task.section.alpha,
+        records=[record.components for record in response.records],
         progress=tick,
     )
 

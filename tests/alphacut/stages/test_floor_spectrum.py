@@ -10,6 +10,7 @@ from alphacut.figures.answers import draw_floor_spectrum
 from alphacut.figures.style import figure_style
 from alphacut.frame import FloorSpectrum, floor_spectrum
 from alphacut.io.typed_json import from_document
+from alphacut.stages.suite import suite_records
 from tests.alphacut.small import refusals, summary_of
 
 CASE = """
@@ -32,10 +33,14 @@ periods = ["0 s", "0.3 s"]
 """
 
 
+RECORD = 'accelerogram = "record.csv"\n'
+
+
 def written(folder, text=CASE):
-    samples = np.random.default_rng(5).normal(size=40)
-    rows = "".join(f"{0.02 * k:.2f},{x:.6f}\n" for k, x in enumerate(samples))
-    (folder / "record.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+    for seed, name in enumerate(("record", "other")):
+        samples = np.random.default_rng(5 + seed).normal(size=40)
+        rows = "".join(f"{0.02 * k:.2f},{x:.6f}\n" for k, x in enumerate(samples))
+        (folder / f"{name}.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}")
     path = folder / "case.toml"
     path.write_text(text, encoding="utf-8")
     return path
@@ -74,6 +79,28 @@ def test_the_time_of_its_periods_is_foreseen(tmp_path, capsys):
     assert float(line.split()[3]) < 60
 
 
+def test_a_suite_of_records_has_mean_spectra(tmp_path, capsys):
+    text = CASE.replace(RECORD, '[records]\nfiles = ["record.csv", "other.csv"]\n')
+    case, out = written(tmp_path, text), tmp_path / "out"
+    assert main(["check", str(case)]) == 0
+    assert "floor_spectrum  4 spectra" in capsys.readouterr().out
+    assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
+    found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
+    assert found.suite == ("record", "other")
+    content = load(case).content
+    structure = content.structure
+    records = suite_records(content.records, content.envelope, structure)
+    expected = floor_spectrum(
+        structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], 0.05,
+        records=[x.components for x in records], duration=max(x.duration for x in records),
+        step=0.02, alpha=[0, 1], progress=False,
+    )  # fmt: skip
+    assert found.bound == pytest.approx(expected.bound, rel=1e-9)
+    with figure_style():
+        (axes,) = draw_floor_spectrum(found).axes
+    assert axes.get_title(loc="left").endswith("of the mean over 2 records")
+
+
 def test_periods_are_given_by_their_range(tmp_path):
     text = CASE.replace('periods = ["0 s", "0.3 s"]', 'shortest = "0.1 s"\ncount = 3')
     periods = load(written(tmp_path, text)).content.floor_spectrum.all_periods
@@ -91,14 +118,13 @@ def test_periods_are_given_by_their_range(tmp_path):
         ('periods = ["0 s", "0.3 s"]', 'damping = "120 %"', "floor_spectrum.damping is 120 %"),
         ('"5 %"', '"5 %"\ndisplacements = "1 mm"', "floor_spectrum: structure is displaced"),
         ('"5 %"', '"5 %"\nyield_force = "30 kN"', "floor_spectrum: structure is StoreyFrame"),
-        (
-            'accelerogram = "record.csv"\n',
-            '[records]\nfiles = ["record.csv"]\n',
-            "floor_spectrum is beside [records]",
-        ),
+        (RECORD, '[records]\nfiles = "record.csv"\n', "floor_spectrum: output is q1; allowed:"),
     ],
 )
 def test_what_has_no_floor_spectrum_is_one_line(tmp_path, old, new, message):
     assert old in CASE
-    lines = refusals(written(tmp_path, CASE.replace(old, new)))
+    text = CASE.replace(old, new)
+    if "[records]" in text:  # which stand in place of the accelerogram
+        text = text.replace('"a1"', '"q1"')
+    lines = refusals(written(tmp_path, text))
     assert any(message in line for line in lines), lines
