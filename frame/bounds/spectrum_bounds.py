@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.bounds.box import over_box
+from alphacut.frame.bounds.box import parameters_over_box
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups
+from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups, undamped_structure
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
 from alphacut.frame.spectra.modal_combination import Combination, correlation_range
 from alphacut.frame.structures.linear import LinearSystem
@@ -215,9 +215,10 @@ class _Problem:
             UnprovedError: See `combined_bounds`.
         """
         try:
-            groups, along = mode_groups(
-                over_box(self.system, self.names, low, high), self.combination.modes
-            )
+            parameters = parameters_over_box(self.system, self.names, low, high)
+            has_ratios = self.combination.rule == "CQC" and self.combination.own_ratios
+            structure = undamped_structure(self.system, parameters, has_ratios=has_ratios)
+            groups, along = mode_groups(structure, self.combination.modes)
             yield _Part(low, high, groups, self.squares(groups), along, is_enclosed=True)
             return
         except UnprovedError as error:
@@ -314,8 +315,9 @@ def combined_bounds(
         attained: Smallest and largest attained combined peak of each output, shape (outputs, 2).
 
     Raises:
-        UnprovedError: The structure has no classical modes, may lose its stiffness in some part of
-            the box, or may have a period outside the range of the spectrum.
+        UnprovedError: The structure may lose its stiffness in some part of the box, may have a
+            period outside the range of the spectrum, or is to have damping ratios of its own where
+            damping couples its modes.
     """
     low, high = ends
     if (low == high).all():

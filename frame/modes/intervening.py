@@ -110,8 +110,8 @@ class BlockParticipation:
 
         Args:
             block: The block, as a function of the inputs of mass and stiffness alone.
-            rows: Rows r of the outputs in the coordinates of the block, shape (m, n). They are
-                constant but for rounding.
+            rows: Rows r of the outputs in the coordinates of the block, shape (m, n), as functions
+                of all inputs.
             patterns: Vectors v of the sources in the same coordinates, shape (sources, n), as
                 functions of all inputs.
             used: Indices, among all inputs, of those of the block, rising, shape (inputs of the
@@ -119,7 +119,7 @@ class BlockParticipation:
 
         Returns:
             r X (p, m), Xᵀ M v and N⁻¹ Xᵀ M v (p, sources) as functions of all inputs; of the inputs
-            of the block alone if no pattern depends on an input.
+            of the block alone if no pattern and no row depends on an input.
 
         Raises:
             UnprovedError: N may be singular in the box.
@@ -132,15 +132,21 @@ class BlockParticipation:
         while degree < 6 and comb(2 * d + degree + 1, degree + 1) <= 100_000:
             degree += 1
         block = block.truncated(min(degree, block.modal_mass.order))
-        if len(patterns.active_inputs()):
-            block = block.truncated(patterns.order).embedded(used, patterns.inputs)
-        else:
+        has_constant_rows = not len(rows.active_inputs())
+        if has_constant_rows and not len(patterns.active_inputs()):
             patterns = block.modal_mass.like(patterns.value).widened(patterns.remainder)
-        rounding = block.shapes.magnitude() @ rows.remainder.T
+        else:
+            block = block.truncated(patterns.order).embedded(used, patterns.inputs)
+        # Constant rows are numbers but for rounding, and their product is one with numbers.
+        if has_constant_rows:
+            rounding = block.shapes.magnitude() @ rows.remainder.T
+            output_modes = (block.shapes @ rows.value.T).widened(rounding)
+        else:
+            output_modes = block.shapes @ rows.T
         modal_forces = block.mass_times_shapes @ patterns.T
         return cls(
             block=block,
-            output_modes=(block.shapes @ rows.value.T).widened(rounding),
+            output_modes=output_modes,
             modal_forces=modal_forces,
             source_participation=solve(block.modal_mass, modal_forces),
         )

@@ -7,7 +7,7 @@ subspace (see `truncated_modes`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,14 +17,15 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
-from alphacut.frame.modes.intervening import BlockParticipation, Ends, source_patterns
+from alphacut.frame.modes.intervening import BlockParticipation, Ends
 from alphacut.frame.modes.models import inverse_with_rounding
-from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.modes.structure import with_classical_damping
 from alphacut.frame.modes.truncated_modes import (
     ModalSums,
     modal_sums_of_block,
     sums_over_all_modes,
 )
+from alphacut.frame.structures.linear import LinearSystem, stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +114,54 @@ class ModeGroup:
         return float(smallest + stated_low.min()), float(largest + stated_high.max())
 
 
+class UndampedStructure(NamedTuple):
+    """A structure over a box whose modes are those without damping; n unknowns, m outputs."""
+
+    mass: TaylorModel  # M, (n, n)
+    stiffness: TaylorModel  # K, (n, n)
+    output_rows: TaylorModel  # rows of the outputs on displacements, (m, n)
+    output_factors: TaylorModel  # what the outputs are multiplied by, (m,)
+    ground_pattern: Array  # ι, how the unknowns move with the ground, (n,)
+    rayleigh: TaylorModel  # a and b, (2,)
+    damping_ratios: TaylorModel  # ζ_k of the modes with mass by rising frequency, (modes,)
+
+
+def undamped_structure(
+    system: LinearSystem, parameters: Mapping[str, TaylorModel], *, has_ratios: bool
+) -> UndampedStructure:
+    """Return a structure for its modes without damping.
+
+    Args:
+        system: The structure, whose outputs take displacements alone.
+        parameters: Value of each of its parameters, by name, as a scalar Taylor model of the
+            inputs.
+        has_ratios: Whether the damping ratios of the modes count: then nothing may couple the
+            modes.
+
+    Raises:
+        UnprovedError: Damping couples the modes, and `has_ratios` is set.
+    """
+    assembly = system.assembly(parameters)
+    if has_ratios:
+        assembly = with_classical_damping(assembly)
+    n = len(assembly.pattern)
+    rows = assembly.rows
+    if isinstance(rows, np.ndarray):
+        rows = assembly.mass.like(rows)
+    ratios = assembly.ratios or [assembly.rayleigh[0] * 0.0]
+    if len(ratios) == 1:
+        ratios = ratios * len(assembly.massive)
+    return UndampedStructure(
+        mass=assembly.mass,
+        stiffness=assembly.stiffness,
+        output_rows=rows[:, :n],
+        output_factors=assembly.row_factors,
+        ground_pattern=assembly.pattern,
+        rayleigh=stack(list(assembly.rayleigh)),
+        damping_ratios=stack(ratios),
+    )
+
+
 class ModeGroups(NamedTuple):
     """The lowest modes of a structure over its box, in groups by rising first mode."""
 
@@ -121,7 +170,7 @@ class ModeGroups(NamedTuple):
     bisection_input: int | None
 
 
-def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
+def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
     """Return the lowest modes of a structure over its box, in groups.
 
     Args:
@@ -134,9 +183,9 @@ def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
     centre, used = centred_matrices(structure.mass, structure.stiffness)
     count = min(count or centre.mode_count, centre.mode_count)
     found = enclose_subspaces(centre, used, count)
-    to_centred = inverse_with_rounding(centre.basis, like=structure.initial_state)
-    patterns = source_patterns(structure, ["load"]) @ to_centred.T
-    rows = structure.initial_state.like(structure.output_rows) @ centre.basis
+    to_centred = inverse_with_rounding(centre.basis, like=structure.mass)
+    patterns = structure.mass.like(structure.ground_pattern[np.newaxis]) @ to_centred.T
+    rows = structure.output_rows @ centre.basis
 
     groups = []
     enclosed = []
@@ -150,7 +199,7 @@ def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
         remaining = np.setdiff1d(remaining, block.modes)
     if len(remaining):
         # What the enclosed groups leave of the sums over all modes.
-        order = max((x.products.order for x in enclosed), default=structure.initial_state.order)
+        order = max((x.products.order for x in enclosed), default=structure.mass.order)
         others = sums_over_all_modes(found, rows, patterns, order)
         for sums in enclosed:
             others = ModalSums(*(x - y for x, y in zip(others, sums, strict=True)))
@@ -166,7 +215,7 @@ def mode_groups(structure: ClassicalStructure, count: int | None) -> ModeGroups:
 
 
 def _group(
-    structure: ClassicalStructure,
+    structure: UndampedStructure,
     used: Ints,
     modes: Ints,
     eigenvalue_block: TaylorModel,
@@ -185,7 +234,7 @@ def _group(
 
     def of_all_inputs(model: TaylorModel) -> TaylorModel:
         """Return a model as a function of all inputs, of their degree."""
-        like = structure.initial_state
+        like = structure.mass
         return model.truncated(like.order).embedded(used, like.inputs)
 
     factors = structure.output_factors

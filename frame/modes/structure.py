@@ -68,8 +68,8 @@ def classical_structure(
     """
     assembly = system.assembly(parameters)
     if len(assembly.pattern) == 1:
-        assembly = _with_damping_by_mass(_with_unit_rows(assembly))
-    _require_classical(assembly)
+        assembly = _with_unit_rows(assembly)
+    assembly = with_classical_damping(assembly)
     displacements = assembly.q0
     velocities = assembly.v0
     if assembly.static is not None:
@@ -99,6 +99,18 @@ def classical_structure(
         damping_ratios=stack(ratios),
         force_accelerations=force_accelerations,
     )
+
+
+def with_classical_damping(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:
+    """Return the structure if undamped modes uncouple it; that of one unknown without dashpots.
+
+    Raises:
+        UnprovedError: Dashpots, or damping by springs without the weights, couple the modes.
+    """
+    if len(assembly.pattern) == 1:
+        assembly = _with_damping_by_mass(assembly)
+    _require_classical(assembly)
+    return assembly
 
 
 def _with_damping_by_mass(assembly: Assembly[TaylorModel]) -> Assembly[TaylorModel]:

@@ -186,9 +186,10 @@ def sums_over_all_modes(
 
     Args:
         found: Holds M and K in coordinates that are modal at the midpoint, modes with mass first.
-        rows: Rows r of m outputs in these coordinates, shape (m, n); constant but for rounding.
+        rows: Rows r of m outputs in these coordinates, shape (m, n), of the same inputs.
         patterns: Vectors v of the sources, shape (sources, n).
-        order: Order of the Taylor models if `patterns` depend on no input; else it is theirs.
+        order: Order of the Taylor models if `patterns` and `rows` depend on no input; else it is
+            theirs.
 
     Returns:
         Sums of products (sources, m), and of squares (m,) and (sources,), each without and with λ.
@@ -197,7 +198,7 @@ def sums_over_all_modes(
     centre = found.centre
     mass = centre.mass
     stiffness = centre.stiffness
-    if len(patterns.active_inputs()):
+    if len(patterns.active_inputs()) or len(rows.active_inputs()):
         order = patterns.order
         mass = mass.truncated(order).embedded(found.used, patterns.inputs)
         stiffness = stiffness.truncated(order).embedded(found.used, patterns.inputs)
@@ -205,7 +206,7 @@ def sums_over_all_modes(
         patterns = mass.like(patterns.value).widened(patterns.remainder)
         mass = mass.truncated(order)
         stiffness = stiffness.truncated(order)
-    rows = stiffness.like(rows.value).widened(rows.remainder)
+        rows = stiffness.like(rows.value).widened(rows.remainder)
     min_mass = 1 - found.mass_decrease
     min_stiffness = 1 - found.stiffness_decrease
 

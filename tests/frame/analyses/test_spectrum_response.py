@@ -126,9 +126,17 @@ def random_structure(rng, number):
     masses = rng.uniform(3e4, 6e4, floors)
     stiffness = rng.uniform(0.8, 1.2, floors) * 4e4 * (2 * np.pi / period) ** 2 * floors**2 / 2
     if number % 2:
-        outputs = ("drift1", f"q{floors}", "base_shear")
-        factors = (0.3, 1e-4)
-        frame = StoreyFrame(masses, stiffness=stiffness, rayleigh=factors, outputs=outputs)
+        outputs = ("drift1", f"q{floors}", "base_shear", "overturning_moment")
+        frame = StoreyFrame(
+            masses,
+            stiffness=stiffness,
+            lengths=[3.0] * floors,
+            rayleigh=(0.3, 1e-4),
+            outputs=outputs,
+            # Dashpots do not count where no damping ratio of a mode does.
+            dampers=[1e5 * (number % 4 > 1)] * floors,
+            damper_placement="storey",
+        )
         return frame, names, rules[number % 3]
     # The same chain on a spring without a mass, and a member force.
     k = {f"k{z + 1}": x for z, x in enumerate(stiffness)}
@@ -280,3 +288,21 @@ def test_correlations_of_modes_in_ranges_lie_within_bounds(rng):
     exact = correlation_range((periods, periods), (ratios, ratios))
     assert exact[0][above] == pytest.approx(rho[above])
     assert exact[1][above] == pytest.approx(rho[above])
+
+
+def test_ratios_of_modes_that_dashpots_couple_are_not_bounded():
+    frame = StoreyFrame(
+        masses=[3e4, 3e4],
+        stiffness=[6e7, 6e7],
+        dampers=[1e5, 0.0],
+        damper_placement="storey",
+        outputs=("drift1",),
+    )
+    inputs = {"k1": Interval(5e7, 7e7)}
+    found = spectrum_response(frame, inputs, SPECTRUM, own_ratios=True, alpha=[0.0])
+    assert found.proved.tolist() == [[[0.0, np.inf]]]
+    assert found.table().rows[0][2] == "attained"
+    assert "dashpots couple" in found.words()
+    assert found.records()[0]["guaranteed upper"] is None
+    of_spectrum = spectrum_response(frame, inputs, SPECTRUM, alpha=[0.0])
+    assert np.isfinite(of_spectrum.proved).all()
