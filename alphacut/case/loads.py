@@ -390,6 +390,10 @@ class RecordsSection(Section):
         require_alone("records.scale", is_scaled, "[records.spectrum]")
         names = ["+".join(x.name for x in components) for components in self.suite]
         require_distinct("records.files", names)
+        # Results are files record_NAME.json, whose names have 101 characters at most.
+        longest = max(names, key=len, default="")
+        allowed = "names of all components of 88 characters together, as names of results"
+        require(len(longest) <= 88, "records.files", longest, allowed)
         if self.suite:  # empty where a step or a unit was refused
             self._require_components()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import pi
 from typing import TYPE_CHECKING, TextIO
 
@@ -74,16 +75,19 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
             motion_text,
         )
         from alphacut.frame import MatrixStructure
-        from alphacut.frame.structures.linear import nominal_modes
+        from alphacut.frame.structures.linear import NominalModes, nominal_modes
 
         modes = nominal_modes(structure.linear)
         document["modes"] = modes_document(modes)
         document["period_s"] = 2 * pi / float(modes.frequencies[0])
         section = content.structure_section
+        others: list[NominalModes] = []
         if section is not None and isinstance(structure.linear, MatrixStructure):
             text += matrices_text(structure.linear, section.places, modes)
+            for _, influence in structure.linear.components:
+                others.append(nominal_modes(replace(structure.linear, pattern=influence)))
         is_shaken = content.records is not None or structure.linear.ground is not None
-        text += modes_text(modes, is_shaken=is_shaken)
+        text += modes_text(modes, others, is_shaken=is_shaken)
         text += motion_text(content, structure, records)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]

@@ -111,15 +111,18 @@ def modes_document(modes: NominalModes) -> dict[str, object]:
     }
 
 
-def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
+def modes_text(
+    modes: NominalModes, others: Sequence[NominalModes] = (), *, is_shaken: bool = False
+) -> str:
     """Return the first period, a table of the lowest modes, and the weight that moves.
 
     Modes are shown until their effective masses add up to 90 % of the mass that moves with the
-    ground, but three at least and eight at most, if the structure has as many. Without such a mass
-    eight are shown.
+    ground, in each direction, but three at least and eight at most, if the structure has as many.
+    Without such a mass eight are shown.
 
     Args:
         modes: Undamped modes by rising frequency, at the most plausible values.
+        others: The same modes with the effective masses of further directions of the ground.
         is_shaken: Whether the ground moves. The structure is then taken for a building, whose
             first period is longer than that of a part of a machine.
 
@@ -143,17 +146,18 @@ def modes_text(modes: NominalModes, *, is_shaken: bool = False) -> str:
     if largest > 1 or 1e-12 < largest < 1e-5:
         text += f"warning: damping ratios are up to {largest:.2g} of critical: {doubt}\n"
     moved = modes.moved_mass
-    fractions = modes.effective_masses / (moved or np.inf)
+    directions = [x.effective_masses / (x.moved_mass or np.inf) for x in (modes, *others)]
     # Building codes ask for the modes that have 90 % of the mass (EN 1998-1, 4.3.3.3.1).
-    needed = int(np.searchsorted(np.cumsum(fractions), 0.9)) + 1
+    needed = max(int(np.searchsorted(np.cumsum(fractions), 0.9)) for fractions in directions) + 1
     rows = []
-    for k in range(min(max(needed, 3), 8, len(fractions))):
-        mass = "–"
+    for k in range(min(max(needed, 3), 8, len(periods))):
+        masses = ["–"]
         if moved:
-            mass = percent_text(float(fractions[k]))
+            masses = [percent_text(float(fractions[k])) for fractions in directions]
         damping = percent_text(modes.damping_ratios[k], 2)
-        rows.append((f"{k + 1}", f"{engineering(float(periods[k]), '')} s", damping, mass))
-    text += text_table(("mode", "period", "damping ratio", "effective mass"), rows)
+        rows.append((f"{k + 1}", f"{engineering(float(periods[k]), '')} s", damping, *masses))
+    titles = ["effective mass", *(f"direction {k + 2}" for k in range(len(others)))]
+    text += text_table(("mode", "period", "damping ratio", *titles), rows)
     if moved:
         weight = engineering(moved * STANDARD_GRAVITY, "N")
         text += f"total weight: {weight}, of {moved:,.6g} kg that move with the ground\n"

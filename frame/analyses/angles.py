@@ -36,7 +36,7 @@ from alphacut.fuzzy.result import Nature
 
 GAP = 0.01
 """Distance of the bound over all angles from the attained value, as a fraction of this value, at
-which no further direction is bounded (tuned: of it 0.5 % are those of the peaks themselves)."""
+which no further direction is bounded (tuned)."""
 GAIN = 2e-3
 """Fraction of the bound that further directions must promise (tuned: each costs a proof)."""
 FURTHER = 12
@@ -49,6 +49,9 @@ TURN = (
 COARSE_ERROR = 0.02
 """Error of the peaks that is aimed at in the first directions (tuned: it costs a fifth of 0.5 %,
 and matters little in directions far from the worst one)."""
+CLOSE_ERROR = 3e-3
+"""Error that is aimed at in further directions (tuned: it leaves most of the gap to what peaks may
+rise between time nodes and between directions)."""
 
 
 class AngleBounds(NamedTuple):
@@ -242,12 +245,13 @@ def angle_peaks(
     angles = np.arange(round(circle / pi) * count) * pi / count
     n_pieces = len(angles) + len(names)
     by_angle: dict[float, dict[str, Peak]] = {}
-    motion: dict[str, Any] = {"duration": duration, "step": step}
+    motion: dict[str, Any] = {"duration": duration, "step": step, "alpha": alpha}
+    motion["dual_first"] = True  # each direction is a proof
 
     def bounded(angle: float, names: Sequence[str], **options: Any) -> dict[str, Peak]:
         """Bound peaks at an angle in rad, and add them to `by_angle`."""
         turned_structure = turned(structure, angle)
-        peaks = close_peaks(turned_structure, inputs, names, alpha=alpha, **motion, **options)
+        peaks = close_peaks(turned_structure, inputs, names, **motion, **options)
         by_angle.setdefault(float(np.degrees(angle)), {}).update(peaks)
         return peaks
 
@@ -270,7 +274,8 @@ def angle_peaks(
             enough = max((1 + GAP) * float(peak[name].reached[0]), (1 + GAIN) * largest)
             if peak[name].proved[0] <= enough or not np.isfinite(peak[name].proved[0]):
                 break
-            close[farthest.angle] = bounded(farthest.angle, [name], progress=tick(k))[name]
+            found = bounded(farthest.angle, [name], error=CLOSE_ERROR, progress=tick(k))
+            close[farthest.angle] = found[name]
     return AngleBounds(by_angle, peak)
 
 

@@ -535,6 +535,7 @@ def close_peaks(
     step: float,
     alpha: Sequence[float] = ALPHA,
     error: float = PEAK_ERROR,
+    dual_first: bool = False,
     progress: Progress | bool | None = None,
 ) -> dict[str, Peak]:
     """Return fuzzy peaks of a structure, by the method that bounds them most closely.
@@ -551,6 +552,8 @@ def close_peaks(
         step: Distance of the time nodes, in s.
         alpha: Levels, rising within [0, 1].
         error: Error that is aimed at, and need not be reached, as a fraction of each peak.
+        dual_first: Whether the dual bound is tried first: it is sooner done, and no better than
+            the error.
         progress: Called with the completed fraction; None shows a bar on a terminal, False shows
             nothing.
 
@@ -565,7 +568,7 @@ def close_peaks(
     band = envelope(
         model.with_outputs(outputs),
         inputs,
-        Auto(error, peaks=True, magnitudes=magnitudes),
+        Auto(error, peaks=True, magnitudes=magnitudes, dual_first=dual_first),
         duration=duration,
         step=step,
         alpha=alpha,

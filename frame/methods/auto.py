@@ -58,6 +58,8 @@ class Auto:
             cores.
         peaks: Whether the error is that of the peaks, so that a proof with a wider gap is kept.
         magnitudes: Whether nothing is read off bounds below the peaks, which may be wide then.
+        dual_first: Whether the dual bound is tried first in any case, which bounds peaks sooner
+            than branch and bound, but no closer than asked.
 
     Raises:
         RefusedError: The tolerance is not positive.
@@ -69,6 +71,7 @@ class Auto:
     workers: int | None = None
     peaks: bool = False
     magnitudes: bool = False
+    dual_first: bool = False
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
@@ -199,6 +202,8 @@ class Auto:
         # Branch and bound closes the gap at all nodes alike, the dual bound only at peaks. Branch
         # and bound on sub-boxes comes last, because each one costs as much as the whole box.
         if self.is_for_all_nodes or works[0] <= works[1]:
+            if self.dual_first:
+                return [dual, undivided, proof]
             return [undivided, dual, proof]
         return [dual, undivided]
 

@@ -137,7 +137,7 @@ def read_recordings(
     Returns:
         Recordings with samples in m/s². The name of each is that of its file without ending, and of
         the channel if one was named, joined by "_"; other characters than letters, digits, "_", "+"
-        and "-" in the file's name become "_". Remarks tell where a file states another step or unit
+        and "-" become "_". Remarks tell where a file states another step or unit
         than the arguments do; the file's is taken.
 
     Raises:
@@ -158,9 +158,10 @@ def read_recordings(
             continue
         remarks = recording.remarks + tuple(_contradictions(recording, step, unit))
         # Names of results are those of files and variables as well, and have their alphabet.
-        name = re.sub(r"[^A-Za-z0-9_+-]+", "_", path.stem)
+        name = path.stem
         if channel:
             name += f"_{channel}"
+        name = re.sub(r"[^A-Za-z0-9_+-]+", "_", name)
         recordings.append(replace(recording, name=name, remarks=remarks))
     if len(errors) == 1:
         raise errors[0]

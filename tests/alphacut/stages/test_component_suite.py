@@ -1,6 +1,7 @@
 """Records of two components in a case: over all angles, turned by one, and what does not fit."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -70,6 +71,7 @@ def test_a_case_over_all_angles_gives_the_bounds_of_python_and_their_angles(tmp_
     assert main(["check", str(path)]) == 0
     checked = capsys.readouterr().out
     assert "RotD50(T1) used" in checked
+    assert re.search(r"^mode +period .* effective mass +direction 2$", checked, re.MULTILINE)
     assert "2 components a record, all angles of incidence" in checked
     out = tmp_path / "out"
     assert main(["run", str(path), "--out", str(out), "--no-figures"]) == 0
@@ -114,6 +116,18 @@ def test_an_angle_turns_both_components_after_their_scaling(tmp_path):
         assert turned.measures == still.measures
         for ground, other in zip(turned.components, expected, strict=True):
             assert ground.samples == pytest.approx(other.samples)
+
+
+def test_names_of_channels_make_names_of_results(tmp_path):
+    rows = "".join(f"{0.02 * k:.2f},{k % 3},{k % 5}\n" for k in range(40))
+    (tmp_path / "a.csv").write_text(f"time [s],90 deg [m/s^2],0 deg [m/s^2]\n{rows}")
+    path = written(tmp_path, '["one.csv", "two.csv"]', '["a.csv#90 deg", "a.csv#0 deg"]')
+    (record,) = records_of(path)
+    assert record.name == "a_90_deg+a_0_deg"
+    long = "x" * 100
+    (tmp_path / f"{long}.csv").write_text((tmp_path / "one.csv").read_text())
+    (line,) = refusals(written(tmp_path, "two.csv", f"{long}.csv"))
+    assert "88 characters together" in line
 
 
 def test_patterns_pair_files_in_their_order(tmp_path):
