@@ -3,14 +3,8 @@
 Let a mode k of a group have the output a_k, the participation factor β_k and the spectral
 displacement S_k = S(λ_k), so that its peak is r_k = a_k β_k S_k. The sums s = Σ a_k β_k S_k,
 A = Σ a_k² S_k and B = Σ β_k² S_k over the group do not depend on how its modes turn in their common
-subspace. With w² = A B, Cauchy and Schwarz give W = Σ |r_k| ≤ w. The positive peaks sum up to
-(W + s)/2 and the negative ones to (W − s)/2 in magnitude, and Σ r_k² ≥ W²/p for p modes. Hence
-
-    Σ_{i≠j} d_ij r_i r_j ≥ −d (W² − s²)/2           by pairs of opposite signs,
-    Σ_{i≠j} d_ij r_i r_j ≤ d ((W² + s²)/2 − W²/p)   by pairs of equal signs
-
-for 0 ≤ d_ij ≤ d, and with w in the place of W for p ≥ 2. The square of the combined peak is s² less
-this sum with d_ij = 1 − ρ_ij. SRSS has d_ij = 1.
+subspace. With w² = A B, Cauchy and Schwarz give Σ |r_k| ≤ w. What follows for the combined peak is
+in `close_modes`.
 """
 
 from __future__ import annotations
@@ -24,11 +18,17 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box import parameters_over_box
+from alphacut.frame.bounds.close_modes import Moments, Squares, by_fit, by_signs, moments_of
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.mode_groups import ModeGroup, mode_groups, undamped_structure
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
-from alphacut.frame.spectra.modal_combination import Combination, correlation_range
+from alphacut.frame.spectra.modal_combination import (
+    Combination,
+    QuadraticFit,
+    correlation_range,
+    decorrelation_fit,
+)
 from alphacut.frame.structures.linear import LinearSystem
 
 GAP = 0.01
@@ -47,13 +47,7 @@ class _Peaks(NamedTuple):
     sum: TaylorModel  # s, (m,)
     sum_of_magnitudes: Array  # upper bound of w over the box, (m,)
     squared_magnitudes: TaylorModel  # w², (m,)
-
-
-class Squares(NamedTuple):
-    """Taylor models that are nowhere above and nowhere below the squared combined peaks, (m,)."""
-
-    lower: TaylorModel
-    upper: TaylorModel
+    moments: Moments | None = None  # of several modes
 
 
 class _Correlations(NamedTuple):
@@ -113,18 +107,23 @@ class _Problem:
         periods = np.clip(periods, first, last)
         peaks = [self._peaks(x, ends) for x, ends in zip(groups, periods, strict=True)]
         lower = upper = peaks[0].sum * 0.0
-        for j, (group, (total, _, magnitudes)) in enumerate(zip(groups, peaks, strict=True)):
-            p = len(group.modes)
-            square = total * total
-            if not group.is_whole:
-                upper = upper + magnitudes
-            elif p == 1:
-                lower = lower + square
-                upper = upper + square
-            else:
-                half = (1 - correlations.smallest[j, j]) / 2
-                lower = lower + square * (1 - half) - magnitudes * (half * (1 - 2 / p))
-                upper = upper + square * (1 - half) + magnitudes * half
+        for j, (group, (total, _, magnitudes, moments)) in enumerate(
+            zip(groups, peaks, strict=True)
+        ):
+            of_group = Squares(total * 0.0, magnitudes)
+            if group.is_whole and moments is None:
+                of_group = Squares(total * total, total * total)
+            elif moments is not None:
+                d = 1 - float(correlations.smallest[j, j])
+                p = len(group.modes)
+                of_group = by_signs(total, magnitudes, modes=p, d=d)
+                if self.combination.rule == "CQC":
+                    fit = self._fit(group, periods[j])
+                    fitted = by_fit(total, moments, magnitudes, modes=p, fit=fit)
+                    if fitted.width.sum() < of_group.width.sum():
+                        of_group = fitted
+            lower = lower + of_group.lower
+            upper = upper + of_group.upper
         if self.combination.rule == "CQC" and len(groups) > 1:
             cross_terms = _cross_terms(groups, peaks, correlations)
             lower = lower + cross_terms
@@ -197,11 +196,32 @@ class _Problem:
         squared_magnitudes = outputs * ground
         largest = np.maximum(squared_magnitudes.bounds()[1], 0.0)
         total = weighted(sums.products, sums.products_over_eigenvalue)
+        moments = None
+        if group.subspace is not None:
+            radius = abs(chord.slope) * (longest**2 - shortest**2) / 2 + error
+            moments = moments_of(
+                group.subspace,
+                chord.midpoint,
+                (chord.value - radius, chord.value + radius),
+                magnitude=unweighted,
+                largest=(longest**2 / chord.midpoint - 1) * (1 + 1e-9),
+            )
         return _Peaks(
             sum=total.widened(error * unweighted * (1 + 1e-15)),
             sum_of_magnitudes=np.sqrt(largest) * (1 + 1e-15),
             squared_magnitudes=squared_magnitudes,
+            moments=moments,
         )
+
+    def _fit(self, group: ModeGroup, periods: Array) -> QuadraticFit:
+        """Return 1 − ρ of modes of a group as a quadratic function of their periods' squares."""
+        shortest = float(periods[0])
+        longest = float(periods[1])
+        ratios = (self.combination.spectrum.damping, self.combination.spectrum.damping)
+        if self.combination.own_ratios:
+            ratios = group.ratio_range
+        midpoint = (shortest**2 + longest**2) / 2
+        return decorrelation_fit((shortest, longest), ratios, midpoint)
 
     def parts(self, low: Array, high: Array, depth: int) -> Iterator[_Part]:
         """Yield parts of a box, each with its modes.

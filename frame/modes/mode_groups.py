@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import BlockParticipation, Ends
@@ -26,6 +26,14 @@ from alphacut.frame.modes.truncated_modes import (
     sums_over_all_modes,
 )
 from alphacut.frame.structures.linear import LinearSystem, stack
+
+
+class Subspace(NamedTuple):
+    """What several modes span: an output of a function f of the eigenvalues is a f(L) β."""
+
+    output_modes: TaylorModel  # a, output rows times shapes, with the factors of outputs, (p, m)
+    participation: TaylorModel  # β, of the motion of the ground, (p,)
+    inverse_eigenvalues: TaylorModel  # L⁻¹, (p, p), in s²
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +50,7 @@ class ModeGroup:
         rayleigh: Rayleigh's factors a in 1/s and b in s, shape (2,).
         sums: Sums over the modes of output and participation in the motion of the ground, with
             the factors of the outputs.
+        subspace: That of several modes; None for others.
     """
 
     modes: Ints
@@ -50,21 +59,25 @@ class ModeGroup:
     ratios: TaylorModel
     rayleigh: TaylorModel
     sums: ModalSums
+    subspace: Subspace | None = None
 
     @property
     def models(self) -> list[TaylorModel]:
         """All Taylor models of the group."""
-        return [self.eigenvalue_block, self.ratios, self.rayleigh, *self.sums]
+        of_subspace = self.subspace or ()
+        return [self.eigenvalue_block, self.ratios, self.rayleigh, *self.sums, *of_subspace]
 
     def with_models(self, models: Sequence[TaylorModel]) -> ModeGroup:
         """Return the group with other models in the order of `models`."""
-        block, ratios, rayleigh, *sums = models
+        block, ratios, rayleigh, *others = models
+        count = len(ModalSums._fields)
         return replace(
             self,
             eigenvalue_block=block,
             ratios=ratios,
             rayleigh=rayleigh,
-            sums=ModalSums(*sums),
+            sums=ModalSums(*others[:count]),
+            subspace=Subspace(*others[count:]) if self.subspace else None,
         )
 
     @property
@@ -193,9 +206,13 @@ def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
     for block in found.blocks:
         if block.modes[-1] >= count:
             continue  # only some of its modes are wanted, whose own sums are not known
-        sums = modal_sums_of_block(BlockParticipation.from_block(block, rows, patterns, used))
+        participation = BlockParticipation.from_block(block, rows, patterns, used)
+        sums = modal_sums_of_block(participation)
         enclosed.append(sums)
-        groups.append(_group(structure, used, block.modes, block.eigenvalue_block, sums))
+        group = _group(structure, used, block.modes, block.eigenvalue_block, sums)
+        if len(block.modes) > 1:
+            group = replace(group, subspace=_subspace(structure, used, participation))
+        groups.append(group)
         remaining = np.setdiff1d(remaining, block.modes)
     if len(remaining):
         # What the enclosed groups leave of the sums over all modes.
@@ -231,18 +248,12 @@ def _group(
         sums: Sums over the modes for one source, the motion of the ground, without the factors, as
             functions of the used inputs or of all.
     """
-
-    def of_all_inputs(model: TaylorModel) -> TaylorModel:
-        """Return a model as a function of all inputs, of their degree."""
-        like = structure.mass
-        return model.truncated(like.order).embedded(used, like.inputs)
-
     factors = structure.output_factors
-    found = ModalSums(*map(of_all_inputs, sums))
+    found = ModalSums(*(_of_all_inputs(x, structure, used) for x in sums))
     return ModeGroup(
         modes=modes,
         is_whole=True,
-        eigenvalue_block=of_all_inputs(eigenvalue_block),
+        eigenvalue_block=_of_all_inputs(eigenvalue_block, structure, used),
         ratios=structure.damping_ratios[modes],
         rayleigh=structure.rayleigh,
         sums=found._replace(
@@ -252,3 +263,28 @@ def _group(
             output_squares_over_eigenvalue=found.output_squares_over_eigenvalue * factors * factors,
         ),
     )
+
+
+def _subspace(
+    structure: UndampedStructure, used: Ints, participation: BlockParticipation
+) -> Subspace:
+    """Return the subspace of a block of several modes as functions of all inputs.
+
+    Args:
+        structure: The structure over the box.
+        used: Indices of the inputs that mass and stiffness depend on, rising.
+        participation: How the block takes part in the motion of the ground.
+    """
+    block = participation.block.eigenvalue_block.T
+    models = (
+        participation.output_modes,
+        participation.source_participation[:, 0],
+        solve(block, block.like(np.eye(len(block.remainder)))),
+    )
+    found = Subspace(*(_of_all_inputs(x, structure, used) for x in models))
+    return found._replace(output_modes=found.output_modes * structure.output_factors)
+
+
+def _of_all_inputs(model: TaylorModel, structure: UndampedStructure, used: Ints) -> TaylorModel:
+    """Return a model of the used inputs, or of all, as a function of all, of their degree."""
+    return model.truncated(structure.mass.order).embedded(used, structure.mass.inputs)

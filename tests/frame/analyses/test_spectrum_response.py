@@ -14,7 +14,12 @@ from alphacut.frame import (
 )
 from alphacut.frame.modes.spectral_modes import spectral_modes
 from alphacut.frame.spectra.displacement_chord import displacement_chord, max_acceleration
-from alphacut.frame.spectra.modal_combination import Combination, correlation, correlation_range
+from alphacut.frame.spectra.modal_combination import (
+    Combination,
+    correlation,
+    correlation_range,
+    decorrelation_fit,
+)
 from alphacut.frame.structures.linear import evaluate
 from alphacut.fuzzy import Interval, RefusedError
 
@@ -306,3 +311,32 @@ def test_ratios_of_modes_that_dashpots_couple_are_not_bounded():
     assert found.records()[0]["guaranteed upper"] is None
     of_spectrum = spectrum_response(frame, inputs, SPECTRUM, alpha=[0.0])
     assert np.isfinite(of_spectrum.proved).all()
+
+
+def test_correlations_of_close_modes_are_nearly_quadratic(rng):
+    for width, largest in ((1e-6, 1e-3), (0.03, 0.15), (0.5, 1.0)):
+        shortest = rng.uniform(0.1, 2.0)
+        longest = shortest * (1 + width)
+        ratio = rng.uniform(0.04, 0.1)
+        midpoint = (shortest**2 + longest**2) / 2
+        fit = decorrelation_fit((shortest, longest), (ratio, 1.001 * ratio), midpoint)
+        periods = rng.uniform(shortest, longest, (500, 2))
+        periods[0] = shortest, longest
+        ratios = rng.uniform(ratio, 1.001 * ratio, (500, 2))
+        d = 1 - correlation(2 * np.pi / periods, ratios)[:, 0, 1]
+        z = (periods[:, 0] ** 2 - periods[:, 1] ** 2) / midpoint
+        distances = np.abs(d - fit.factor * z**2)
+        assert distances.max() <= fit.error
+        assert fit.error <= largest * d.max() + 0.01
+
+
+def test_bounds_of_close_modes_by_cqc_are_near_samples(rng):
+    chains = two_chains(1e5)
+    cut = {"k": Interval(3.96e7, 4.04e7)}
+    found = spectrum_response(chains, cut, SPECTRUM, alpha=[0.0])
+    method = Combination(SPECTRUM, "CQC", None, False)
+    points = rng.uniform(3.96e7, 4.04e7, (300, 1))
+    samples = method.combined(spectral_modes(chains, ["k"], points, None))
+    low, high = found.proved[0].T
+    assert (high <= 1.02 * samples.max(axis=0)).all()
+    assert (low >= 0.98 * samples.min(axis=0)).all()
