@@ -107,21 +107,9 @@ class _Problem:
         periods = np.clip(periods, first, last)
         peaks = [self._peaks(x, ends) for x, ends in zip(groups, periods, strict=True)]
         lower = upper = peaks[0].sum * 0.0
-        for j, (group, (total, _, magnitudes, moments)) in enumerate(
-            zip(groups, peaks, strict=True)
-        ):
-            of_group = Squares(total * 0.0, magnitudes)
-            if group.is_whole and moments is None:
-                of_group = Squares(total * total, total * total)
-            elif moments is not None:
-                d = 1 - float(correlations.smallest[j, j])
-                p = len(group.modes)
-                of_group = by_signs(total, magnitudes, modes=p, d=d)
-                if self.combination.rule == "CQC":
-                    fit = self._fit(group, periods[j])
-                    fitted = by_fit(total, moments, magnitudes, modes=p, fit=fit)
-                    if fitted.width.sum() < of_group.width.sum():
-                        of_group = fitted
+        for j, group in enumerate(groups):
+            smallest = float(correlations.smallest[j, j])
+            of_group = self._squares_of_group(group, peaks[j], periods[j], smallest)
             lower = lower + of_group.lower
             upper = upper + of_group.upper
         if self.combination.rule == "CQC" and len(groups) > 1:
@@ -129,6 +117,34 @@ class _Problem:
             lower = lower + cross_terms
             upper = upper + cross_terms
         return Squares(lower, upper)
+
+    def _squares_of_group(
+        self, group: ModeGroup, peaks: _Peaks, periods: Array, smallest: float
+    ) -> Squares:
+        """Return bounds of the squared combined peaks of the modes of one group alone.
+
+        Args:
+            group: The group.
+            peaks: Its peaks.
+            periods: Its shortest and longest period, shape (2,).
+            smallest: Smallest correlation coefficient of two of its modes.
+        """
+        total = peaks.sum
+        magnitudes = peaks.squared_magnitudes
+        if not group.is_whole:
+            # Correlation matrices are not indefinite, and their entries are at most 1.
+            return Squares(total * 0.0, magnitudes)
+        if peaks.moments is None:
+            square = total * total
+            return Squares(square, square)
+        p = len(group.modes)
+        found = by_signs(total, magnitudes, modes=p, d=1 - smallest)
+        if self.combination.rule == "CQC":
+            fit = self._fit(group, periods)
+            fitted = by_fit(total, peaks.moments, magnitudes, modes=p, fit=fit)
+            if np.mean(fitted.width / np.maximum(found.width, 1e-300)) < 1:
+                return fitted
+        return found
 
     def _correlations(self, groups: Sequence[ModeGroup], periods: Array) -> _Correlations:
         """Return ranges of the correlation coefficients; those of SRSS are 0.
