@@ -296,12 +296,12 @@ class Content(CellContent):
                 output or duration does not fit; two studies have the same name; no modulus is known
                 or computed; a limit does not fit; or [identify] has no frame.
         """
-        # Where columns begin to yield, the response has kinks as a function of the inputs. Proofs
-        # expand it in Taylor polynomials and Graph Followers follow gradients: both need
-        # derivatives. Sampling needs none.
+        # Where columns begin to yield, the response has kinks as a function of the inputs. The dual
+        # bound and Graph Followers need derivatives. Sampling needs none, and the proof of one
+        # storey encloses the events.
         if yields(structure.model):
-            allowed = "auto or quasi-monte-carlo where columns yield"
-            is_possible = envelope.method in ("auto", "quasi-monte-carlo")
+            allowed = "auto, proof or quasi-monte-carlo where columns yield"
+            is_possible = envelope.method in ("auto", "proof", "quasi-monte-carlo")
             require(is_possible, "envelope.method", envelope.method, allowed)
             is_exact = envelope.integrator != "midpoint"
             allowed = "exact where columns yield"

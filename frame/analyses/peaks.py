@@ -346,10 +346,12 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
     lower = found.lower[:, column]
     upper = found.upper[:, column]
     attained = upper
+    least_lower = np.zeros_like(lower)
     least_upper = lower + between
     error = found.error[:, column] + between
     if found.inner is not None:
         attained = found.inner.upper[:, column]
+        least_lower = lower
         least_upper = found.inner.lower[:, column]
         between = np.zeros_like(between)
         error = np.zeros_like(error)
@@ -364,7 +366,7 @@ def _searched_peak(found: Bounds, column: int, between: Array) -> Peak:
         upper=upper,
         error=error,
         reached=attained,
-        least_lower=np.zeros_like(lower),
+        least_lower=least_lower,
         least_upper=least_upper,
         nature=found.natures[column],
         between_nodes=float(between[0]),

@@ -36,16 +36,23 @@ from alphacut.frame.calculus.truncated_polynomials import magnitude, multiply, u
 # Fraction of the yield drift, or of the velocity ω y, by which a state may pass an event without
 # one being looked for (tuned: a smaller violation costs less than the event's own error).
 IGNORED = 1e-9
+# Fraction of what is passed without an event that its residual may be (tuned: with a larger one it
+# is better left out).
+MAX_RESIDUAL = 0.1
 # Number of elements of the present length in which an event at the midpoint is looked for.
 LOOK_AHEAD = 6.0
 # Fraction of an output's peak to which bounds within elements are refined (tuned).
 PEAK_GAP = 1e-4
 # Entries of `State.numbers`: direction of yielding, or 0; the last time that was the same at all
 # inputs, in s; the bound S of the error in m/s, and its integral in m; what the plastic path lacks,
-# in m; ∫|load| dt in m/s; largest velocity in m/s, and largest energy norm of the motion in m/s;
-# and the last direction s of yielding, with bounds of s z̃ − y in m and of s ṽ in m/s since then,
-# as long as the storey is decelerated.
-PHASE, WINDOW, ERROR, INTEGRAL, PATH, PUSHED, SPEED, NORM, SIDE, TOP, TOP_SPEED = range(11)
+# in m; what the work of load, damping and defects is off, in m²/s²; the energy norm of the motion
+# on the element, in m/s; the last direction s of yielding, with bounds of s z̃ − y in m and of s ṽ
+# in m/s since then, as long as the storey is decelerated; the side at which an elastic storey may
+# be beyond the yield drift, or 0; by how much it may be, in m; and the side from which it fell on
+# the element before, or 0.
+PHASE, WINDOW, ERROR, INTEGRAL, PATH, WORK, NORM, SIDE, TOP, TOP_SPEED, BEYOND, MOST, FALL = range(
+    13
+)
 # Time in s below which two times are taken as the same one, far above rounding and far below steps.
 SAME_TIME = 1e-12
 # Elements for each interval of the loads after which a march has failed.
@@ -99,7 +106,7 @@ class State(NamedTuple):
     v: Array
     begin: Array  # time, in s
     slider: Array  # (2, N)
-    numbers: Array  # (11,)
+    numbers: Array  # (13,)
 
 
 class Element(NamedTuple):
@@ -132,7 +139,7 @@ def march(
         found: Receives the result; all bounds must begin with −∞.
     """
     n = len(start[0])
-    state = State(start[0].copy(), start[1].copy(), np.zeros(n), np.zeros((2, n)), np.zeros(11))
+    state = State(start[0].copy(), start[1].copy(), np.zeros(n), np.zeros((2, n)), np.zeros(13))
     series = Series(np.zeros((MAX_TERMS, n)), np.zeros((MAX_TERMS, n)), np.zeros(5))
     element = Element(
         np.zeros(n), np.zeros(n), series, np.zeros(2, np.int64), np.zeros((MAX_TERMS, n))
@@ -198,7 +205,7 @@ def march(
         _add_defects(storey, load, state, element, passed, residual, by_load)
         if not numbers[ERROR] <= limit:
             return End(TOO_WIDE, numbers[ERROR], n_events, state.begin[0])
-        _write_errors(storey, numbers, by_load, until, errors)
+        _write_errors(storey, numbers, by_load, errors)
         _observe(storey, observed, load, state, element, errors, is_fixed and not is_event, found)
 
         terms = int(series.numbers[0])
@@ -227,7 +234,7 @@ def march(
             edge = np.searchsorted(load.edges, target, side="right") - 1
         elif observed.node[edge] >= 0:
             by_load[:] = 0.0
-            _write_errors(storey, numbers, by_load, target, errors)
+            _write_errors(storey, numbers, by_load, errors)
             _observe_node(storey, observed, state, errors, observed.node[edge], found)
         element.integers[0] = edge
     return End(PROVED, numbers[ERROR], n_events, state.begin[0])
@@ -291,6 +298,9 @@ def _passed(storey: Storey, state: State, element: Element) -> float:
             above = min(above, known)
         else:
             below = min(below, known)
+    numbers[BEYOND] = 0.0
+    if min(below, above) <= 0:
+        numbers[BEYOND] = 1.0 if above > below else -1.0
     return max(below, above)
 
 
@@ -347,9 +357,12 @@ def _event(
     first = event[0] - spread
     last = event[0] + spread
     h_min = event[0] - state.begin[0] - magnitude(event[1:] - state.begin[1:])
-    if not residual < passed or last >= load.edges[-3] or first >= target:
+    is_found = residual < MAX_RESIDUAL * passed
+    # If the march has gone back, the event may come a little earlier than under the load here.
+    margin = 0.3 * spread if is_sought else 0.0
+    if not is_found or last >= load.edges[-3] or first >= target + margin:
         known = np.inf
-        if residual < passed and first >= target and h_min >= 0:
+        if is_found and first >= target and h_min >= 0:
             # What holds up to the event at all inputs holds on the shorter element.
             element.h[:] = event - state.begin
             known = _passed(storey, state, element)
@@ -359,7 +372,7 @@ def _event(
     # the load meet in the element with the event.
     if is_fixed and last > target and first > state.begin[0] + spacing / 50:
         for part in (0.05, 0.3, 1.0):
-            end = first - spacing / 1000 - part * spread
+            end = min(first - part * spread, target) - spacing / 1000
             if (is_sought and part < 0.1) or end <= state.begin[0]:
                 continue
             _to_time(storey, load, state, end, element)
@@ -371,7 +384,7 @@ def _event(
         piece = max(np.searchsorted(load.edges, event[0]) - 1, piece)
         residual = _solve(storey, load, state, side, piece, event, element)
         h_min = event[0] - state.begin[0] - magnitude(event[1:] - state.begin[1:])
-    if not residual < passed or not h_min >= 0:
+    if not residual < MAX_RESIDUAL * passed or not h_min >= 0:
         _to_time(storey, load, state, target, element)
         return 0.0, -1.0 if is_fixed else np.inf, np.inf
     element.h[:] = event - state.begin
@@ -441,9 +454,18 @@ def _add_defects(
     moved = 0.0  # what the slider is moved without a velocity
     if numbers[PHASE] == 0:
         beyond = max(passed + by_load[3] + storey.remainder[DRIFT], 0.0)
-        moved += beyond
         error += longest * size[SLIDER] * beyond
+        numbers[PATH] += 2 * beyond
+        numbers[MOST] = beyond
+        fall = _fall(state, element) if by_load[3] == 0 else 0.0
+        # While z̃ rises the slider flows as it may. Over elements in a row on which z̃ falls at
+        # all inputs, it falls by no more than it was beyond the yield drift at first.
+        if beyond > 0 and fall >= 0 and not (fall > 0 and numbers[FALL] == numbers[BEYOND]):
+            moved += beyond
+        numbers[FALL] = numbers[BEYOND] if beyond > 0 and fall > 0 else 0.0
     else:
+        numbers[FALL] = 0.0
+        numbers[MOST] = 0.0
         moved += longest * max(passed + by_load[2], 0.0)
         error += longest * size[SLIDER] * storey.remainder[DRIFT]
     if residual < np.inf:
@@ -451,45 +473,58 @@ def _add_defects(
         moved += by_load[3] + 2 * storey.remainder[DRIFT]
         if numbers[PHASE] == 0:
             moved += residual
-    numbers[ERROR] += error + root_slider * moved
+    error += root_slider * moved
+    numbers[ERROR] += error
     numbers[INTEGRAL] += longest * numbers[ERROR]
     numbers[PATH] += 2 * moved
 
-    speed = displacement = 0.0
+    # The balance of energy of the motion is off by the work of the defects, and differs from that
+    # of the exact motion by the works of load and damping on the error of the velocity.
+    speed = by_load[2]
+    displacement = by_load[3]
     for k in range(int(element.series.numbers[0])):
         speed += magnitude(element.series.v[k])
         displacement += magnitude(element.series.u[k])
-    piece = element.integers[0]
-    push = magnitude(element.pushed) + abs(load.slope[piece]) * longest
-    numbers[PUSHED] += longest * push + by_load[2]
-    speed += by_load[2]
-    displacement += by_load[3]
     norm = speed**2 + size[YIELDED] * displacement**2 + size[SLIDER] * size[DRIFT] ** 2
-    numbers[SPEED] = max(numbers[SPEED], speed)
-    numbers[NORM] = max(numbers[NORM], math.sqrt(norm))
+    numbers[NORM] = math.sqrt(norm)
+    push = magnitude(element.pushed) + abs(load.slope[element.integers[0]]) * longest
+    damped = size[DAMPING] * (2 * speed + numbers[ERROR])
+    numbers[WORK] += numbers[NORM] * error
+    numbers[WORK] += numbers[ERROR] * (longest * (push + damped) + by_load[2])
 
 
 @compiled
-def _write_errors(
-    storey: Storey, numbers: Array, by_load: Array, time: float, errors: Array
-) -> None:
-    """Write bounds of |Δu|, |Δv|, |Δz| and |ΔP| up to a time to `errors`, shape (4,).
+def _fall(state: State, element: Element) -> float:
+    """Return 1 if z̃ falls at all inputs and times, −1 if it rises, and else 0.
+
+    It is counted from the side at which it may be beyond the yield drift; 0 where this is not one.
+    """
+    v = element.series.v
+    spread = magnitude(v[0, 1:])
+    for k in range(1, int(element.series.numbers[0])):
+        spread += magnitude(v[k])
+    if abs(v[0, 0]) <= spread:
+        return 0.0
+    return -state.numbers[BEYOND] * math.copysign(1.0, v[0, 0])
+
+
+@compiled
+def _write_errors(storey: Storey, numbers: Array, by_load: Array, errors: Array) -> None:
+    """Write bounds of |Δu|, |Δv|, |Δz| and |ΔP| up to now to `errors`, shape (4,).
 
     The path follows from the balance of energy. With the force F = K_z y, F P is the work of the
-    load less that of damping and less the energy E, which is half the square of the norm N of the
-    motion. With an error S of the norm, the work of the load is off by at most S ∫|load| dt, that
-    of damping over a time t by c t (2 max|v| + S) S, the energy by (N + S/2) S, and the work of the
-    defects is at most N S.
+    load less that of damping and less the energy, which is half the square of the norm N of the
+    motion, and is off by at most (N + S/2) S with an error S of the norm. Where z̃ is beyond the
+    yield drift, it differs by as much from the slider's, which the inequality is about.
     """
     S = numbers[ERROR]
     u = numbers[INTEGRAL]
     if storey.min_yielded > 0:
         u = min(u, S / math.sqrt(storey.min_yielded))
-    damped = storey.magnitude[DAMPING] * time * (2 * numbers[SPEED] + S)
-    work = S * (numbers[PUSHED] + damped + 2 * numbers[NORM] + S / 2)
+    work = numbers[WORK] + S * (numbers[NORM] + S / 2)
     errors[0] = u + by_load[3]
     errors[1] = S + by_load[2]
-    errors[2] = S / math.sqrt(storey.min_slider) + by_load[3]
+    errors[2] = S / math.sqrt(storey.min_slider) + by_load[3] + numbers[MOST]
     errors[3] = work / storey.min_force + numbers[PATH] + by_load[3]
 
 

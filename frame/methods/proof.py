@@ -66,7 +66,7 @@ class Proof:
             none) if the envelope is not relative; by default a tenth of the tolerance.
         tolerance: Largest distance allowed, to which the gap may grow if a smaller one is not
             proved, in the same unit; 1e-3 of each peak by default. Where columns yield, one of both
-            is the wanted gap, and 5e-3 of each peak without them.
+            is the wanted gap, and 0.01 of each peak without them.
         boxes: Largest number of boxes looked at for each bound, on average; where columns yield,
             for all bounds of a level. If it is reached, the gap is wider.
         parts: Largest number of sub-boxes for a peak, and of sub-boxes that may be refused.

@@ -22,7 +22,7 @@ from alphacut.frame.result import Ends, Envelope
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import corners
 
-YIELDING_GAP = 5e-3
+YIELDING_GAP = 0.01
 """Wanted gap of peaks by default, as a fraction of each (tuned: attained values come from corners
 and midpoints of sub-boxes, so that closer gaps take many of them)."""
 MIN_WIDTH = 2.0**-14
@@ -125,6 +125,7 @@ class _Search:
     Attributes:
         upper: Guaranteed bounds over closed sub-boxes, at nodes and over steps, (2, T, m, 2).
         peaks: Guaranteed bounds of their peaks, shape (m, 2).
+        min_peak: Lower bound of the peak magnitude of each output in them, shape (m,).
         attained: Largest values of trajectories, less their rounding, shape (T, m, 2).
         attained_at: Their inputs, in SI units, shape (T, m, 2, d).
         peak: Largest peak magnitude that a trajectory attains, shape (m,).
@@ -157,6 +158,7 @@ class _Search:
         shape = (len(storey.flow.time), m, 2)
         self.upper = np.full((2, *shape), -np.inf)
         self.peaks = np.full((m, 2), -np.inf)
+        self.min_peak = np.full(m, np.inf)
         self.attained = np.full(shape, -np.inf)
         self.attained_at = np.zeros((*shape, d))
         self.peak = np.full(m, -np.inf)
@@ -259,6 +261,9 @@ class _Search:
         """Add the bounds of a sub-box to those of the level."""
         self.upper = np.maximum(self.upper, box.upper)
         self.peaks = np.maximum(self.peaks, box.peaks)
+        # A magnitude is at least the distance of the bounds at a node from zero.
+        least = np.maximum(-box.upper[0], 0.0).max(axis=(0, 2))
+        self.min_peak = np.minimum(self.min_peak, least)
 
     def _attain(self, points: Array) -> None:
         """Raise attained values by the trajectories at points in SI units, shape (points, d)."""
@@ -313,7 +318,7 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
     between = np.maximum((steps - ends).max(axis=(0, 3)), 0.0)
     searched = Bounds(
         alpha=flow.boxes.alpha,
-        lower=np.zeros_like(peaks),
+        lower=np.maximum.accumulate(np.stack([x.min_peak for x in levels]), axis=0),
         upper=peaks,
         lower_at=np.stack([x.least_peak_at for x in levels]),
         upper_at=np.stack([x.peak_at for x in levels]),

@@ -22,7 +22,7 @@ def random_storey(rng, **changes):
     frame = StoreyFrame(
         masses=[4e4],
         stiffness=[stiffness],
-        lengths=[3.0],
+        lengths=[30.0],
         damping_ratio=float(rng.uniform(0.0, 0.08)),
         yield_force=[yield_force],
         hardening=[float(rng.uniform(0.02, 0.2))],
@@ -46,16 +46,16 @@ def bounds_and_motions(frame, names, radius, rng, step=0.05):
     "names", [("k1",), ("fy1",), ("m1", "zeta"), ("k1", "fy1"), ("k1", "fy1", "hardening1")]
 )
 def test_motions_stay_inside_tight_bounds(names, rng):
-    for _ in range(4):
+    for radius in (1e-4, 1e-4, 1e-3, 3e-3, 0.01, 0.02):
         frame = random_storey(rng, gravity=float(rng.choice([0.0, 9.81])))
-        found, values, peaks = bounds_and_motions(frame, names, 1e-4, rng)
+        found, values, peaks = bounds_and_motions(frame, names, radius, rng)
         if not np.isfinite(found.peaks).all():  # a grazed yield drift may be too wide
             continue
         scale = np.abs(values).max(axis=(0, 1)) + 1e-12
         assert (values - found.upper[..., 1] <= 1e-9 * scale).all()
         assert (-values - found.upper[..., 0] <= 1e-9 * scale).all()
         assert (peaks <= found.peaks.max(axis=1)).all()
-        if found.error < 1e-6:  # no event is grazed
+        if radius == 1e-4 and found.error < 1e-6:  # no event is grazed
             wide = found.upper.sum(axis=-1) - np.ptp(values, axis=0)
             assert (wide[:, :2] <= 0.05 * scale[:2]).all()
 
