@@ -25,11 +25,18 @@ QUICK = {
         "envelope.duration='2 s'",
         FEW.replace("[1-2]", "1"),
     ),
+    "eccentric-frame": (
+        *BOUNDS,
+        "records.files=[['eccentric-frame/1_x.AT2', 'eccentric-frame/1_y.AT2']]",
+        "envelope.fuzzy=['core']",
+        "envelope.duration='4 s'",
+    ),
 }
 GOLDEN = {
     "suite": (6.5604, 10.3512),  # median of the lognormal fit of Sa(T1) in m/s² at α = 0
     "wind": {"drift1": 4.3510e-3, "a4": 0.41193, "base_shear": 126.26e3},
     "plane-frame": 7.4881e-3,
+    "eccentric-frame": 15.62e-3,
 }
 
 
@@ -71,6 +78,16 @@ def test_a_frame_from_matrices_answers_all_questions(shipped_run):
     assert limits["moment"]["unit"] == "N*m"
     assert limits["roof"]["peak"]["proved"][0] == pytest.approx(GOLDEN["plane-frame"], rel=0.03)
     assert set(summary["fragility"]["limits"]) == {"roof"}
+
+
+def test_a_frame_in_plan_has_its_golden_drift_over_all_angles(shipped_run):
+    summary = quick("eccentric-frame", shipped_run)
+    limit = summary["decision"]["limits"]["corner_y"]
+    assert limit["nature"] == "guaranteed"
+    assert limit["peak"]["proved"][0] == pytest.approx(GOLDEN["eccentric-frame"], rel=0.02)
+    assert 0.98 * limit["peak"]["proved"][0] <= limit["peak"]["reached"][0]
+    assert limit["record"] == f"1_x+1_y, {limit['peak']['worst']['angle']:.1f}°"
+    assert summary["fragility"]["measure"] == "RotD50(T1)"
 
 
 def is_number(text):
