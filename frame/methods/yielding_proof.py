@@ -311,7 +311,9 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
     attained = np.stack([x.attained for x in levels])
     at = np.stack([x.attained_at for x in levels])
     reached = np.stack([x.peak for x in levels])
-    gap = float(((peaks - reached) / np.maximum(peaks, 1e-300)).max())
+    # The gap of an output that stays at rest has no peak that it could be a fraction of.
+    scale = np.where(flow.at_rest, flow.peak, np.maximum(peaks, 1e-300))
+    gap = float(((peaks - reached) / scale).max())
     nature = Nature.GUARANTEED
     # The largest excess over the ends of a step of both sides, on all levels.
     ends = np.maximum(upper, np.concatenate([upper[:, :1], upper[:, :-1]], axis=1))

@@ -1,5 +1,7 @@
 """Proof of one yielding storey: guaranteed peaks, and what is refused with the input to change."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,3 +59,13 @@ def test_what_cannot_be_proved_names_the_input_or_is_searched(rng):
     found = envelope(two, {"k1": Interval(2e6, 2.01e6)}, alpha=[0], duration=0.5, step=0.05)
     assert "one storey can be proved" in found.notes[0]
     assert found.nature is Nature.ATTAINED
+
+
+def test_what_stays_at_zero_is_bounded_beside_what_moves(rng):
+    frame = random_storey(rng, outputs=("drift1", "residual1", "dissipated1"))
+    strong = replace(frame, yield_force=[1e3 * frame.parameters["fy1"]])
+    k = frame.parameters["k1"]
+    found = envelope(strong, {"k1": Interval(0.98 * k, 1.02 * k)}, alpha=[0], **SHORT)
+    assert found.nature is Nature.GUARANTEED
+    drift, residual, _ = (peak.proved[0] for peak in peaks(found).values())
+    assert residual < 1e-5 * drift
