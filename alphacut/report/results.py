@@ -507,6 +507,8 @@ def natures(parts: Parts) -> Iterator[str]:
     if suite is not None:
         peaks_of_studies.append(suite.peak)
         over = "over time and records"
+        if suite.has_angles:
+            over = "over time, records and all angles of incidence"
     outputs: dict[Nature, dict[str, None]] = {}  # an ordered set of names for each guarantee
     for peaks in peaks_of_studies:
         for output, peak in peaks.items():

@@ -97,8 +97,11 @@ def test_a_case_over_all_angles_gives_the_bounds_of_python_and_their_angles(tmp_
     assert peak["worst"]["angle"] == pytest.approx(expected.worst.angle)
     where = f"one+two, {expected.worst.angle:.1f}°"
     assert where in printed
+    assert "all angles of incidence, all guaranteed" in " ".join(printed.split())
     assert summary["decision"]["limits"]["corner"]["record"] == where
     assert main(["report", str(out), "--quiet", "--csv", str(tmp_path)]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Each peak is the largest one over all angles of incidence." in page
     head, row, *_ = csv.reader((tmp_path / "records.csv").open(encoding="utf-8"))
     values = dict(zip(head, row, strict=True))
     assert float(values["angle [deg]"]) == pytest.approx(expected.worst.angle)
