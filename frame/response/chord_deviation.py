@@ -160,7 +160,12 @@ class Response(NamedTuple):
             assert self.load is not None
             return self._range_of_load(chords.deviations(self.load.values(nodes)[:, None]))
         # All nodes of a step share its bound; the last node is the end of a chord, where G is 0.
-        fourth = np.append(np.repeat(self._fourth_off_chords(nodes[::parts]), parts), 0.0)
+        decay = float(-self.sigma.real.max())
+        fast = float(np.abs(self.sigma).max())
+        time = nodes[::parts]
+        moments = moments_of(decay, self.load, time)[:, :-1]
+        of_steps = _fourth_off_chords(self.order, decay, fast, self.load, moments, np.diff(time))
+        fourth = np.append(np.repeat(of_steps, parts), 0.0)
         return self._range_off(chords, nodes, fourth=fourth)
 
     def change(self, first: float, last: float) -> tuple[Array, Array]:
@@ -244,34 +249,6 @@ class Response(NamedTuple):
         margin = np.outer(missed, np.abs(kappa).max(1)) + np.outer(np.hypot(real, imag), change)
         margin += np.stack([real + missed, imag + missed], 1) @ self.coefficient_error
         return low - margin, margin - minus_high
-
-    def _fourth_off_chords(self, time: Array) -> Array:
-        """Return bounds of |∂⁴/∂σ⁴| of G less its chord in each step, G = σ^order ρ, (steps,).
-
-        It is at most h²/8 times that of the second derivative of G by time, σ² G + σ^order (σ f +
-        f′), in a step of length h. The terms with the load f are polynomials of degree below 4 in
-        σ, and so is what jumps of f add.
-
-        Args:
-            time: Ends of the steps, rising, shape (steps + 1,), in s.
-        """
-        assert self.sigma is not None
-        decay = float(-self.sigma.real.max())
-        fast = float(np.abs(self.sigma).max())
-        h = np.diff(time)
-        force = 0.0
-        if self.load:
-            force = self.load.extremes[0]
-        # Moments ∫ τⁿ |f| at the beginnings of the steps, then bounds of them within the steps. A
-        # time h later each τ has become τ + h, of which the binomial theorem gives the powers, and
-        # the force in the step has added at most max |f| ∫₀ʰ τⁿ dτ. Higher moments are updated
-        # first, since they need the lower ones at the beginning.
-        moments = moments_of(decay, self.load, time)[:, :-1]
-        for n in reversed(range(5)):
-            carried = sum(comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
-            moments[n] = carried + force * h ** (n + 1) / (n + 1)
-        growth = np.exp(max(-decay, 0.0) * h)
-        return np.asarray(h**2 / 8 * fourth_derivative(self.order + 2, fast, growth * moments))
 
 
 class Chords(NamedTuple):
@@ -490,6 +467,34 @@ def fourth_derivative(order: int, fast: float, moments: Array) -> Array:
     return np.asarray(total)
 
 
+def _fourth_off_chords(
+    order: int, decay: float, fast: float, load: History | None, moments: Array, h: Array
+) -> Array:
+    """Return bounds of |∂⁴/∂σ⁴| of G = σ^order ρ less its chord in each step, shape (steps,).
+
+    It is at most h²/8 times that of the second derivative of G by time, σ² G + σ^order (σ f +
+    f′), in a step of length h. The terms with the load f are polynomials of degree below 4 in
+    σ, and so is what jumps of f add.
+
+    Args:
+        order: Power of σ, from 0 to 2.
+        decay: Smallest decay −Re σ, in 1/s; may be negative.
+        fast: Bound of |σ|, in 1/s.
+        load: The load f; None for ρ = exp(σ t).
+        moments: `moments_of` ρ at the beginnings of the steps, shape (5, steps).
+        h: Lengths of the steps, shape (steps,), in s.
+    """
+    force = load.extremes[0] if load else 0.0
+    # A time h later each τ of the moments ∫ τⁿ |f| has become τ + h, of which the binomial theorem
+    # gives the powers, and the force in the step has added at most max |f| ∫₀ʰ τⁿ dτ.
+    within = []
+    for n in range(5):
+        carried = sum(comb(n, j) * h ** (n - j) * moments[j] for j in range(n + 1))
+        within.append(carried + force * h ** (n + 1) / (n + 1))
+    growth = np.exp(max(-decay, 0.0) * h)
+    return np.asarray(h**2 / 8 * fourth_derivative(order + 2, fast, growth * np.array(within)))
+
+
 def _between_points(sigma: Array) -> float:
     """Return b such that a function F of σ differs by at most b sup|F″| from interpolation.
 
@@ -629,7 +634,10 @@ def line_deviations(
         curved += growth * fast**order * 2 * d * pieces.bend
         # at the ends of segments: H, and its imaginary part
         modulus, second, imaginary, *with_load = largest[order].off
-        missed = is_inside * between * (second + between * chords.with_ends(fourth))
+        of_steps = _fourth_off_chords(order, decay, fast, load, bounds[:, node[:-1]], np.diff(time))
+        of_chords = np.append(np.repeat(of_steps, np.diff(node)), 0.0)
+        fourth_off = np.minimum(chords.with_ends(fourth), of_chords)
+        missed = is_inside * between * (second + between * fourth_off)
         missed_imaginary = (missed + is_inside * h_omega * imaginary) / low
         (error,) = largest[order].rounding
         error = np.maximum(error, chords.with_ends(error) - error)

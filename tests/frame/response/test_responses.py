@@ -443,6 +443,25 @@ def test_a_mode_alone_strays_as_far_as_its_magnitude_says(load, order, rng):
     assert (off <= bound * (1 + 1e-9) + 1e-15).all()
 
 
+def test_bounds_over_a_coarse_grid_fall_with_the_step_where_samples_lie_within(rng):
+    load = History(0.001, rng.normal(size=3000).cumsum())
+    omega, quotient = (100.0, 140.0), (0.05, 0.15)
+    sigma = grid_over(omega, quotient, (24, 3)).sigma
+    kappa = 1 / (1j * sigma.imag[None])
+    bounds = []
+    for step in (0.016, 0.004):
+        time = step * np.arange(round(3 / step) + 1)
+        response = Response(sigma, load, 0, kappa, np.zeros((2, 1)))
+        bounds.append(response.line_deviation(time).max())
+        fine = np.linspace(0, time[-1], 8 * len(time) - 7)
+        w, q = rng.uniform(*omega, 5), rng.uniform(*quotient, 5)
+        rho = responses_at_nodes((-q + 1j) * w, load, fine, 0)[0][0]
+        y = (rho / (1j * w)).real.T
+        chords = [np.interp(fine, time, x[::8]) for x in y]
+        assert np.abs(y - chords).max() <= bounds[-1]
+    assert bounds[1] < bounds[0] / 8
+
+
 @pytest.mark.parametrize(
     ("spread", "fall"), [((0, 0), 0), ((0, 0), 1), ((0.01, 0), 0), ((0, 0.01), 0)]
 )
