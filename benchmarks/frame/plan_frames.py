@@ -74,7 +74,7 @@ def random_plan(rng: np.random.Generator, storeys: int, count: int, duration: fl
         part = total * rng.uniform(0.5, 1.5) / (n_frames / 2) * np.outer(row, row)
         # Columns resist the rotation of floors as well.
         part[2, 2] += 0.06 * total * (sides @ sides) / n_frames
-        stiffness.append((f"k{k + 1}", np.kron(springs, part)))
+        stiffness.append((f"k{k + 1}", np.asarray(np.kron(springs, part))))
     inertia = (sides @ sides) / 12
     corner = np.zeros(3 * storeys)
     corner[:3] = [1.0, 0.0, -sides[1] / 2]
@@ -129,8 +129,14 @@ def bounded(plan: Plan) -> dict[str, Any]:
     """Return bound and attained value over all angles, and what they took."""
     begun = time.perf_counter()
     spent = time.process_time()
-    times = {"duration": plan.duration, "step": plan.step}
-    found = over_angles(plan.structure, plan.inputs, **times, alpha=[0.0], progress=lambda _: None)
+    found = over_angles(
+        plan.structure,
+        plan.inputs,
+        duration=plan.duration,
+        step=plan.step,
+        alpha=[0.0],
+        progress=lambda _: None,
+    )
     peak = found.peak["drift"]
     return {
         "storeys": plan.structure.size // 3,
