@@ -32,7 +32,7 @@ class ProductTable(NamedTuple):
     """
 
     place: Ints  # (N, N)
-    count: Ints  # (N,)
+    factors: Ints  # (N,)
 
 
 @cache
@@ -73,7 +73,7 @@ def multiply(a: Array, b: Array, table: ProductTable, out: Array) -> float:
     for i in range(len(a)):
         if a[i] == 0.0:
             continue
-        kept = table.count[i]
+        kept = table.factors[i]
         for j in range(kept):
             out[table.place[i, j]] += a[i] * b[j]
         above = 0.0
@@ -122,7 +122,7 @@ def at_time(series: Array, terms: int, tau: float, out: Array) -> None:
 def max_at(series: Array, terms: int, tau: float, work: Array) -> float:
     """Return an upper bound of a series at τ over the box; `work` is overwritten, shape (N,)."""
     at_time(series, terms, tau, work)
-    return work[0] + magnitude(work[1:])
+    return float(work[0] + magnitude(work[1:]))
 
 
 @compiled
@@ -179,4 +179,4 @@ def upper_bound(
         stack[n] = (low, width / 2, halvings + 1)
         stack[n + 1] = (low + width / 2, width / 2, halvings + 1)
         n += 2
-    return bound
+    return float(bound)
