@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, radians
+from math import inf, isfinite, radians
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -318,12 +318,15 @@ def _parse_angle(value: object, _: ValidationInfo) -> float:
     """Return an angle in rad, or infinity for all angles, from 30, "30 deg" or "all"."""
     if value == "all":
         return inf
+    allowed = '"all", or degrees, as 30'
     if is_number(value):
-        return radians(float(str(value)))
+        angle = radians(float(str(value)))
+        require(isfinite(angle), "", value, allowed)
+        return angle
     try:
         return quantity.parse_number(value, "rad")
     except ValueError as error:
-        raise RefusedError("", value, '"all", or degrees, as 30', str(error)) from None
+        raise RefusedError("", value, allowed, str(error)) from None
 
 
 Files = Annotated[tuple[tuple[Recording, ...], ...], text(_read_suite)]

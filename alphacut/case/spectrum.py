@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo
 
-from alphacut.base.errors import require
+from alphacut.base.errors import require, require_choice
 from alphacut.case.limits import AnyLimit, QuestionSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import ALPHA, Levels, Names, Quantity, Section, case_file, text
@@ -58,6 +58,7 @@ class CodeSpectrumSection(Section):
             return replace(self.file, damping=self.damping)
         if self.ground_acceleration is None:
             return replace(asce7_multi_period(np.array(self.values)), damping=self.damping)
+        require_choice(f"{self.place}.ground_type", self.ground_type, "ABCDE")
         return eurocode8_spectrum(
             self.ground_acceleration,
             self.ground_type,
@@ -71,6 +72,7 @@ class CodeSpectrumSection(Section):
         super().require_consistent()
         stated = [x for x in ("ground_acceleration", "values", "file") if self.has_key(x)]
         allowed = "one of ground_acceleration, values and file"
+        require(len(stated) > 0, f"{self.place}.ground_acceleration", None, allowed)
         require(len(stated) == 1, self.place, f"with {' and '.join(stated)}", allowed)
         _ = self.target
 

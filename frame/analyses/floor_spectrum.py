@@ -23,6 +23,7 @@ from alphacut.frame.analyses.floor_oscillators import (
 from alphacut.frame.analyses.peaks import PEAK_ERROR
 from alphacut.frame.analyses.suites import record_names
 from alphacut.frame.boxes import ALPHA, boxes
+from alphacut.frame.dynamics.flow import time_nodes
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.spectra.response_spectrum import checked_periods
 from alphacut.frame.structures.model import StructureModel
@@ -184,6 +185,7 @@ def floor_spectrum(
     shaped = checked_periods(periods).ravel()
     require(len(shaped) > 0, "periods", None, "one period or more")
     ratio = checked_number("damping", damping, least=0, most=0.999)
+    time_nodes(duration, step)  # refuses what is not whole steps, before these are divided
     cuts = boxes(inputs, alpha)
     motions = [(x,) if isinstance(x, Accelerogram) else tuple(x) for x in records]
     systems = [

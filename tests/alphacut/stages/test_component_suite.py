@@ -178,6 +178,8 @@ PAIR = '[["one.csv", "two.csv"]]'
         ("directions", 'direction = "x"\ndirections', "directions is beside direction"),
         ("directions", 'accelerogram = "one.csv"\ndirections', "accelerogram is beside directions"),
         ('"all"', '"any"', '"all", or degrees, as 30'),
+        ('"all"', "inf", 'records.angle is inf; allowed: "all", or degrees, as 30'),
+        ('"all"', "nan", 'records.angle is nan; allowed: "all", or degrees, as 30'),
         ("corner <= 4 mm", "max corner <= 4 mm", "magnitudes over all angles"),
         ("[envelope]", f"{SPECTRUM}\n[envelope]", "spectrum is beside records of several"),
     ],

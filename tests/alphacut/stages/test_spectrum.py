@@ -96,8 +96,9 @@ def test_beside_records_the_method_tells_its_errors(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({'ground_type = "C"': 'ground_type = "F"'}, "ground_type"),
-        ({'ground_acceleration = "0.25 g"\nground_type = "C"\n': ""}, "one of ground_acceleration"),
+        ({'ground_type = "C"': 'ground_type = "F"'}, "response_spectrum.ground_type is F"),
+        ({'ground_type = "C"': ""}, "response_spectrum.ground_type is empty"),
+        ({'ground_acceleration = "0.25 g"\nground_type = "C"\n': ""}, "ground_acceleration is missing"),
         ({'fuzzy = ["k1", "m3"]': 'fuzzy = ["k2"]'}, "response_spectrum.fuzzy"),
         ({'"base_shear <= 300 kN"': '"max base_shear <= 300 kN"'}, "response_spectrum.limits"),
         ({'"base_shear <= 300 kN"': '"a1 <= 1 g"'}, "a1"),

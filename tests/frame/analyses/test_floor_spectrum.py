@@ -212,8 +212,7 @@ def test_what_has_no_floor_spectrum_is_one_line(rng):
                 changes.pop("inputs", {"k1": 900.0}),
                 outputs,
                 periods,
-                **MOTION,
-                **changes,
+                **MOTION | changes,
             )
 
     refuses(pendulum(), "structure is LagrangianSystem; allowed: a linear structure")
@@ -227,3 +226,4 @@ def test_what_has_no_floor_spectrum_is_one_line(rng):
     refuses(frame, "periods is missing", periods=())
     refuses(frame, "periods is 0.0001 s", periods=[1e-4])
     refuses(frame, "damping is 1.5", damping=1.5)
+    refuses(frame, "duration is 0.5 s; allowed: .* whole steps of 0.3 s", duration=0.5, step=0.3)
