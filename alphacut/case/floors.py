@@ -12,6 +12,7 @@ from alphacut.case.structure import Structure
 from alphacut.case.types import Names, OneOrMany, Quantity, Section, Time
 from alphacut.frame import Accelerogram
 from alphacut.frame.spectra.response_spectrum import MIN_PERIOD
+from alphacut.frame.structures.linear import frequencies
 
 Period = Annotated[float, Quantity("s", minimum=0)]
 RANGE = ("shortest", "longest", "count")
@@ -34,7 +35,8 @@ class FloorSpectrumSection(Section):
     longest: Time = 2.0
     """longest period"""
     count: Annotated[int, Quantity(minimum=2, maximum=500, is_integer=True)] = 20
-    """number of periods in geometric progression, beside 0, the floor's largest acceleration"""
+    """number of periods in geometric progression, beside 0, the floor's largest acceleration, and
+    the nominal periods of the structure in this range"""
     periods: OneOrMany[Period] = ()
     """periods in place of these, as ["0 s", "0.2 s"]"""
 
@@ -53,11 +55,22 @@ class FloorSpectrumSection(Section):
         require(is_range, "floor_spectrum.longest", f"{self.longest:g} s", allowed)
 
     @property
-    def all_periods(self) -> Array:
-        """The periods in s, shape (periods,)."""
+    def stated_periods(self) -> Array:
+        """The periods in s, shape (periods,), without those of the structure."""
         if self.periods:
             return np.array(self.periods)
         return np.append(0.0, np.geomspace(self.shortest, self.longest, self.count))
+
+    def periods_of(self, structure: Structure) -> Array:
+        """Return the periods in s, shape (periods,), and nominal ones of the structure in a range.
+
+        Spectra are largest about these.
+        """
+        if self.periods or structure.linear is None:
+            return self.stated_periods
+        own = 2 * np.pi / frequencies(structure.linear)
+        own = own[(own >= self.shortest) & (own <= self.longest)]
+        return np.union1d(self.stated_periods, own)
 
     def require_answerable(self, structure: Structure, components: int) -> None:
         """Refuse a structure without floor spectra, and outputs that are no accelerations.

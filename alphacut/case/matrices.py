@@ -41,6 +41,7 @@ from alphacut.frame import (
     read_matrix,
     read_unknowns,
 )
+from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions, require_symmetric
 from alphacut.frame.structures.quantities import Output, require_names
 from alphacut.frame.structures.read_matrix import MAX_ROWS
@@ -369,8 +370,9 @@ class MatricesSection(StructureSection):
         """Yield sentences on fuzzy parameters in no factor, and on unknowns that are not named.
 
         Args:
-            structure: The structure, which is not looked at.
+            structure: The structure, of which the masses that directions move are compared.
         """
+        yield from self._direction_warnings(structure)
         used = set[str]()
         for factor, _ in (*self.mass, *self.stiffness, *self.damping):
             used.update(dict(factor.powers))
@@ -382,6 +384,25 @@ class MatricesSection(StructureSection):
         for name, number in self.parameters.items():
             if number.support.width > 0 and name not in used:
                 yield f"matrices.parameters.{name} is in no factor: is a name misspelt?"
+
+    def _direction_warnings(self, structure: Structure | None) -> Iterator[str]:
+        """Yield a sentence on two horizontal directions that are no motions of one ground.
+
+        They are at right angles where ι₁ᵀ M ι₂ = 0 for the influence vectors ι, and move the same
+        mass.
+        """
+        if len(self.directions) < 2 or structure is None or structure.linear is None:
+            return
+        matrices, _ = evaluate(structure.linear, (), np.zeros((1, 0)), derivatives=False)
+        patterns = np.array(self._ground_patterns()[:2])
+        moved = patterns @ matrices.mass.value[0] @ patterns.T
+        first, second = map(float, moved.diagonal())
+        doubt = "is a sign wrong, or an unknown missing?"
+        if abs(moved[0, 1]) > 1e-6 * np.sqrt(first * second):
+            yield f"matrices.directions: the first two are not at right angles: {doubt}"
+        elif abs(first - second) > 1e-6 * max(first, second):
+            masses = f"{first:,.0f} kg and {second:,.0f} kg"
+            yield f"matrices.directions: the first two move {masses}: {doubt}"
 
     def _material_damping_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber

@@ -464,7 +464,7 @@ def _floor_spectrum_seconds(
         RefusedError: The structure has no such spectra.
         FailedError: A response could not be computed.
     """
-    periods = section.all_periods
+    periods = section.periods_of(structure)
     inputs = structure.inputs(task.fuzzy)
     # The time of a period grows with the time nodes in it, and so with 1/T: the harmonic mean of
     # the periods takes the mean time.

@@ -65,7 +65,7 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
         if content.incremental_question is not None:
             yield Foreseen("fragility", count, "records")
         if content.floor_spectrum is not None:
-            periods = len(content.floor_spectrum.all_periods)
+            periods = len(content.floor_spectrum.stated_periods)
             yield Foreseen("floor_spectrum", count * periods, "spectra")
         return
     studies = tasks(section, content.study)
@@ -73,7 +73,7 @@ def pieces_of(content: Content, petsc: Mapping[str, str]) -> Iterator[Foreseen]:
     if "probability" in content.questions:
         yield Foreseen("probability", 1, "campaigns")
     if content.floor_spectrum is not None:
-        yield Foreseen("floor_spectrum", len(content.floor_spectrum.all_periods), "periods")
+        yield Foreseen("floor_spectrum", len(content.floor_spectrum.stated_periods), "periods")
     if "tolerances" in content.questions:
         # Two scales are tried first, then the interval between them is halved until it is a
         # hundredth of what it was.

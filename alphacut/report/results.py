@@ -21,7 +21,14 @@ from alphacut.base.number_text import (
     range_text,
     text_table,
 )
-from alphacut.frame import FloorSpectrum, Peak, SuitePeaks, Tolerances
+from alphacut.frame import (
+    FloorSpectrum,
+    Peak,
+    SpectrumChecks,
+    SpectrumResponse,
+    SuitePeaks,
+    Tolerances,
+)
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
@@ -86,6 +93,11 @@ def run_text(parts: Parts) -> str:
         shown.append(parts.update.table())
     for what, answer, guarantee in answers(parts):
         sentences.append(f"{what}: {answer} ({guarantee})")
+    for found in parts.answers:
+        if isinstance(found, SpectrumResponse):
+            sentences.extend(found.cautions)
+        if isinstance(found, SpectrumChecks):
+            sentences.extend(note.removesuffix(".") for note in found.notes)
     sentences.extend(drivers(parts))
 
     # Readers who do not know α-cuts are told once, before the first number.

@@ -214,7 +214,7 @@ def floor_spectra(
         response.structure.model,
         response.inputs,
         section.outputs,
-        section.all_periods,
+        section.periods_of(response.structure),
         section.damping,
         duration=max(durations, default=response.task.duration),
         step=response.task.section.step,

@@ -185,6 +185,27 @@ class SpectrumResponse(Answer):
                 rows.append(row)
         return rows
 
+    @property
+    def cautions(self) -> list[str]:
+        """Sentences on what makes the peaks too small at the nominal inputs; none if nothing does.
+
+        Modes that move less than 5 % of the mass are not judged by their damping.
+        """
+        modes = self.modes
+        spectrum = self.method.spectrum
+        found = []
+        ratios = modes.ratios[0][modes.mass_fractions[0] > 0.05]
+        least = float(ratios.min(initial=np.inf))
+        if not spectrum.minimum and least < spectrum.damping * (1 - 1e-6):
+            found.append(
+                f"The spectrum is that of a damping ratio of {percent_text(spectrum.damping)}, and"
+                f" a mode has {percent_text(least)}: peaks of this structure are larger"
+            )
+        if self.sufficient_modes is None:
+            total = percent_text(float(modes.mass_fractions[0].sum()))
+            found.append(f"The modes move {total} of the mass, less than the 90 % of codes")
+        return found
+
     def words(self) -> str:
         """Return sentences on spectrum, combination, and how much mass the modes move."""
         method = self.method

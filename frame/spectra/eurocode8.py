@@ -27,6 +27,8 @@ SHAPES = {
 }
 """Tables 3.2 (type 1) and 3.3 (type 2), by ground type: the soil factor S, and the periods T_B, T_C
 and T_D in s, from which on the spectrum is constant, falls as 1/T, and falls as 1/T²."""
+DESIGN_DAMPING = 0.05
+"""Damping ratio of the design spectrum, whose behaviour factor takes account of others."""
 MEAN_RULE = MeanRule("EN 1998-1:2004, 3.2.3.1.2(4)", floor_at_start=1.0)
 
 
@@ -45,7 +47,7 @@ def eurocode8_spectrum(
         ag: Design ground acceleration a_g = γ_I a_gR on ground type A, in m/s².
         ground_type: "A" to "E".
         spectrum_type: 1, or 2 for surface-wave magnitudes up to 5.5.
-        damping: Viscous damping ratio of the elastic spectrum.
+        damping: Viscous damping ratio of the elastic spectrum; that of the design one is 5 %.
         q: Behaviour factor, from 1 on, of the design spectrum; None for the elastic spectrum.
         beta: Lower bound of the design spectrum over a_g, at most 2.5/q.
 
@@ -78,6 +80,8 @@ def eurocode8_spectrum(
             falls_from=tuple(falls_from),
             rule=MEAN_RULE,
         )
+    allowed = "0.05, the ratio of the design spectrum"
+    require(damping == DESIGN_DAMPING, "damping", f"{damping:g} beside q", allowed)
     plateau = 2.5 / checked_number("q", q, least=1)
     checked_number("beta", beta, least=0, most=plateau)
     return TargetSpectrum(

@@ -202,3 +202,20 @@ def test_measures_of_two_components_need_them(tmp_path, old, new, message):
     path.write_text(text.replace('directions = ["x", "y"]', 'direction = "x"'))
     (line,) = refusals(path)
     assert message in line
+
+
+@pytest.mark.parametrize(
+    ("directions", "words"),
+    [
+        ('["x", "y"]', ""),
+        ('["x", { "1.x" = 0.6, "1.y" = 0.8 }]', "the first two are not at right angles"),
+        ('["x", { "1.y" = 0.5 }]', "the first two move 20,000 kg and 5,000 kg"),
+    ],
+)
+def test_check_warns_of_directions_that_are_no_motions_of_one_ground(
+    tmp_path, capsys, directions, words
+):
+    assert main(["check", str(written(tmp_path, '["x", "y"]', directions))]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert words in said
+    assert ("warning: matrices.directions" in said) == bool(words)

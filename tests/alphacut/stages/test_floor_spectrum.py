@@ -9,6 +9,7 @@ from alphacut.case.content import load
 from alphacut.figures.answers import draw_floor_spectrum
 from alphacut.figures.style import figure_style
 from alphacut.frame import FloorSpectrum, floor_spectrum
+from alphacut.frame.structures.linear import frequencies
 from alphacut.io.typed_json import from_document
 from alphacut.stages.suite import suite_records
 from tests.alphacut.small import refusals, summary_of
@@ -103,7 +104,13 @@ def test_a_suite_of_records_has_mean_spectra(tmp_path, capsys):
 
 def test_periods_are_given_by_their_range(tmp_path):
     text = CASE.replace('periods = ["0 s", "0.3 s"]', 'shortest = "0.1 s"\ncount = 3')
-    periods = load(written(tmp_path, text)).content.floor_spectrum.all_periods
+    content = load(written(tmp_path, text)).content
+    periods = content.floor_spectrum.stated_periods
+    own = 2 * np.pi / frequencies(content.structure.linear)
+    own = own[(own >= 0.1) & (own <= 2.0)]
+    assert len(own) > 0
+    found = content.floor_spectrum.periods_of(content.structure)
+    assert found.tolist() == sorted([*periods, *own])
     assert periods == pytest.approx([0, 0.1, 0.2**0.5, 2])
 
 
