@@ -343,11 +343,11 @@ def test_bounds_of_close_modes_by_cqc_are_near_samples(rng):
 
 
 def test_too_little_damping_and_too_few_modes_are_cautioned():
-    frame = StoreyFrame([5e4] * 3, stiffness=[6e7] * 3, damping_ratio=0.02, outputs=("q3",))
+    frame = StoreyFrame([5e4] * 5, stiffness=[6e7] * 5, damping_ratio=0.02, outputs=("q5",))
     spectrum = eurocode8_spectrum(2.0, "B")
     few = spectrum_response(frame, {"k1": 6e7}, spectrum, modes=1, alpha=[0]).cautions
     assert "damping ratio of 5.0%, and a mode has 2.0%" in few[0]
-    assert "less than the 90 % of codes" in few[1] or len(few) == 1
+    assert "less than the 90 % of codes" in few[1]
     design = eurocode8_spectrum(2.0, "B", q=3)
     assert spectrum_response(frame, {"k1": 6e7}, design, alpha=[0]).cautions == []
     fitting = eurocode8_spectrum(2.0, "B", damping=0.02)
