@@ -50,6 +50,9 @@ class FloorSpectrumSection(Section):
             allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
             is_long = smallest >= MIN_PERIOD
             require(is_long, f"floor_spectrum.{name}", f"{smallest:g} s", allowed)
+        is_once = len(set(self.periods)) == len(self.periods)
+        text = ", ".join(f"{x:g} s" for x in self.periods)
+        require(is_once, "floor_spectrum.periods", text, "each period once")
         allowed = f"more than floor_spectrum.shortest, {self.shortest:g} s"
         is_range = self.shortest < self.longest
         require(is_range, "floor_spectrum.longest", f"{self.longest:g} s", allowed)

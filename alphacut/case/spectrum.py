@@ -74,6 +74,10 @@ class CodeSpectrumSection(Section):
         allowed = "one of ground_acceleration, values and file"
         require(len(stated) > 0, f"{self.place}.ground_acceleration", None, allowed)
         require(len(stated) == 1, self.place, f"with {' and '.join(stated)}", allowed)
+        if self.ground_acceleration is None:
+            for name in ("ground_type", "type"):
+                key, value = f"{self.place}.{name}", getattr(self, name)
+                require(not self.has_key(name), key, value, "beside ground_acceleration")
         _ = self.target
 
 

@@ -51,7 +51,12 @@ def require_possible(section: ResponseSpectrumSection, structure: Structure) -> 
         section.target, section.combination, section.modes, own_ratios=section.own_ratios
     )
     no_parameters = np.zeros((1, 0))  # one set of them
-    method.combined(spectral_modes(observed_model(section, structure), (), no_parameters))
+    model = observed_model(section, structure)
+    try:
+        method.combined(spectral_modes(model, (), no_parameters))
+    except RefusedError as error:
+        key = f"response_spectrum: {error.key}"
+        raise RefusedError(key, error.value, error.allowed, error.cure) from None
 
 
 def stage(section: ResponseSpectrumSection, structure: Structure) -> Stage[SpectrumResponse]:

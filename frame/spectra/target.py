@@ -129,6 +129,9 @@ def read_spectrum(path: str | Path, *, damping: float = 0.05) -> TargetSpectrum:
     factor = acceleration_factor(match[1]) if match else None
     allowed = "period [s],acceleration [g] or in another unit"
     require(factor is not None, f"{file.name}, head", text[:80], allowed)
+    for row, cells in rows:
+        what, cure = ",".join(cells), "write decimal points"
+        require(len(cells) == 2, f"{file.name}, row {row}", what, "two numbers", cure)
     periods = [number(file, row, cells, 0) for row, cells in rows]
     values = [number(file, row, cells, 1) for row, cells in rows]
     accelerations = np.array(values) * (factor or 1.0)

@@ -120,6 +120,7 @@ def test_periods_are_given_by_their_range(tmp_path):
         ('"a1"', '"q1"', "floor_spectrum: output is q1; allowed: absolute accelerations, as a3"),
         ('"a1"', '"a2"', "floor_spectrum: output is a2; allowed:"),
         ('"0.3 s"]', '"0.3 s"]\ncount = 3', "floor_spectrum.periods is beside count; allowed"),
+        ('"0.3 s"]', '"0 s"]', "floor_spectrum.periods is 0 s, 0 s; allowed: each period once"),
         ('"0.3 s"]', '"0.1 ms"]', "floor_spectrum.periods is 0.0001 s; allowed: 0 s, and"),
         ('periods = ["0 s", "0.3 s"]', 'longest = "10 ms"', "floor_spectrum.longest is 0.01 s"),
         ('periods = ["0 s", "0.3 s"]', 'damping = "120 %"', "floor_spectrum.damping is 120 %"),

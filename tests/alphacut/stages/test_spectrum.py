@@ -93,6 +93,9 @@ def test_beside_records_the_method_tells_its_errors(tmp_path):
     assert np.abs(np.array(errors["combined"]) / np.array(errors["peaks"])[..., 0] - 1).max() < 0.5
 
 
+VALUES = f"values = {['0.3 g'] * 22}"
+
+
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
@@ -101,7 +104,8 @@ def test_beside_records_the_method_tells_its_errors(tmp_path):
         ({'ground_acceleration = "0.25 g"\nground_type = "C"\n': ""}, "ground_acceleration is missing"),
         ({'fuzzy = ["k1", "m3"]': 'fuzzy = ["k2"]'}, "response_spectrum.fuzzy"),
         ({'"base_shear <= 300 kN"': '"max base_shear <= 300 kN"'}, "response_spectrum.limits"),
-        ({'"base_shear <= 300 kN"': '"a1 <= 1 g"'}, "a1"),
+        ({'"base_shear <= 300 kN"': '"a1 <= 1 g"'}, "response_spectrum: output is a1"),
+        ({'ground_acceleration = "0.25 g"': VALUES, "q = 3.9": ""}, "ground_type is C; allowed: be"),
         ({'lengths = ["3.5 m", "3 m", "3 m"]\n': "", '"drift <= 0.5 %", ': ""}, "theta"),
         ({'stages = ["response_spectrum"]': 'stages = ["envelope"]'}, "envelope"),
         ({'q = 3.9': 'q = 0.5'}, "response_spectrum.q"),

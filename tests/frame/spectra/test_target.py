@@ -67,6 +67,7 @@ def test_a_table_of_ones_own_is_linear_and_in_the_unit_of_its_head(tmp_path):
     for text, message in (
         ("T,Sa\n1,2\n", r"site.csv, head is T,Sa; allowed: period \[s\],acc"),
         ("T [s],Sa [g]\n1,x\n", "row 2, column 2"),
+        ("T [s],Sa [g]\n0,1,5\n1,1\n", "row 2 is 0,1,5; allowed: two numbers"),
         ("T [s],Sa [g]\n1,2\n0.5,1\n", "spectrum is .* rising"),
     ):
         file.write_text(text)
