@@ -11,7 +11,8 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.yielding_element import Load, Storey
-from alphacut.frame.bounds.yielding_march import PROVED, Found, Observed, march
+from alphacut.frame.bounds.yielding_march import PROVED, march
+from alphacut.frame.bounds.yielding_outputs import Found, Observed
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.truncated_polynomials import product_table
 from alphacut.frame.calculus.unproved import UnprovedError

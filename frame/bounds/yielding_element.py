@@ -235,11 +235,11 @@ def _bound(series: Array, terms: int, slope: float, gap: float) -> float:
     for k in range(1, terms):
         rough += magnitude(series[k])
     if rough < 0:
-        return rough
+        return float(rough)
     if slope != 0:
         work = np.empty(series.shape[1])
-        return max_at(series, terms, 1.0 if slope > 0 else 0.0, work)
-    return upper_bound(series, terms, 0.0, 1.0, gap, 0.0)
+        return float(max_at(series, terms, 1.0 if slope > 0 else 0.0, work))
+    return float(upper_bound(series, terms, 0.0, 1.0, gap, 0.0))
 
 
 @compiled
@@ -296,7 +296,7 @@ def _margin(
         value = value * tau + x
     if phase != 0:
         return -phase * value
-    return side * (value - plastic[0]) - storey.rows[DRIFT, 0]
+    return float(side * (value - plastic[0]) - storey.rows[DRIFT, 0])
 
 
 @compiled

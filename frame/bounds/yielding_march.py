@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array, Ints
+from alphacut.base.arrays import Array
 from alphacut.base.kernels import compiled
 from alphacut.frame.bounds.yielding_element import (
     DAMPING,
@@ -31,7 +31,29 @@ from alphacut.frame.bounds.yielding_element import (
     solve_event,
     total,
 )
-from alphacut.frame.calculus.truncated_polynomials import magnitude, multiply, upper_bound
+from alphacut.frame.bounds.yielding_outputs import (
+    BEYOND,
+    ERROR,
+    FALL,
+    INTEGRAL,
+    MOST,
+    NORM,
+    PATH,
+    PHASE,
+    SAME_TIME,
+    SIDE,
+    TOP,
+    TOP_SPEED,
+    WINDOW,
+    WORK,
+    Element,
+    Found,
+    Observed,
+    State,
+    observe,
+    observe_node,
+)
+from alphacut.frame.calculus.truncated_polynomials import magnitude, multiply
 
 # Fraction of the yield drift, or of the velocity ω y, by which a state may pass an event without
 # one being looked for (tuned: a smaller violation costs less than the event's own error).
@@ -41,49 +63,10 @@ IGNORED = 1e-9
 MAX_RESIDUAL = 0.1
 # Number of elements of the present length in which an event at the midpoint is looked for.
 LOOK_AHEAD = 6.0
-# Fraction of an output's peak to which bounds within elements are refined (tuned).
-PEAK_GAP = 1e-4
-# Entries of `State.numbers`: direction of yielding, or 0; the last time that was the same at all
-# inputs, in s; the bound S of the error in m/s, and its integral in m; what the plastic path lacks,
-# in m; what the work of load, damping and defects is off, in m²/s²; the energy norm of the motion
-# on the element, in m/s; the last direction s of yielding, with bounds of s z̃ − y in m and of s ṽ
-# in m/s since then, as long as the storey is decelerated; the side at which an elastic storey may
-# be beyond the yield drift, or 0; by how much it may be, in m; and the side from which it fell on
-# the element before, or 0.
-PHASE, WINDOW, ERROR, INTEGRAL, PATH, WORK, NORM, SIDE, TOP, TOP_SPEED, BEYOND, MOST, FALL = range(
-    13
-)
-# Time in s below which two times are taken as the same one, far above rounding and far below steps.
-SAME_TIME = 1e-12
 # Elements for each interval of the loads after which a march has failed.
 MAX_ELEMENTS = 20
 # How a march ends: at its last time, or where the error has passed its limit.
 PROVED, TOO_WIDE = 0, 1
-
-
-class Observed(NamedTuple):
-    """m outputs as linear functions of the state.
-
-    An output is a_0 u + a_2 v − a_3 p + a_5 P of an elastic storey, with its plastic drift p and
-    the length P = ∫ |p'| dt of the plastic path, and a_1 u + a_2 v + s a_4 + a_5 P of one that
-    yields in the direction s. Its error is at most w_0 |Δu| + w_1 |Δv| + w_2 |Δz| + w_3 |ΔP|.
-    """
-
-    rows: Array  # coefficients a, (m, 6, N)
-    remainder: Array  # bounds of what the polynomials leave out, (m, 6)
-    weights: Array  # w, (m, 4)
-    last: int  # index of the interval of the loads that begins at the end of the motion
-    node: Ints  # number of the time node at each edge of the loads, −1 for none, (E + 1,)
-    step: Ints  # number of the first time node behind each edge, T behind the last node, (E + 1,)
-
-
-class Found(NamedTuple):
-    """What a march writes."""
-
-    bounds: Array  # largest (−output, output) at time nodes, (T, m, 2)
-    steps: Array  # the same over the step before each node, with both its ends, (T, m, 2)
-    peaks: Array  # the same over all times, (m, 2)
-    events: Array  # direction of yielding, or 0; earliest and latest time, in s; (max_events, 3)
 
 
 class End(NamedTuple):
@@ -93,34 +76,6 @@ class End(NamedTuple):
     error: float
     events: int
     time: float
-
-
-class State(NamedTuple):
-    """State at the beginning of an element, as polynomials of the inputs, shape (N,) each.
-
-    `slider` has the plastic drift p of an elastic storey, and its path P, or P − s u of a storey
-    that yields in the direction s. `numbers` has the entries named above.
-    """
-
-    u: Array
-    v: Array
-    begin: Array  # time, in s
-    slider: Array  # (2, N)
-    numbers: Array  # (13,)
-
-
-class Element(NamedTuple):
-    """An element: its length, its load at τ = 0, and the motion on it.
-
-    The load is that of the interval `integers[0]`, extended. At the end the edge `integers[1]` of
-    the loads is reached, or none if it is −1.
-    """
-
-    h: Array  # (N,)
-    pushed: Array  # acceleration by the load at τ = 0, (N,)
-    series: Series
-    integers: Ints  # (2,)
-    work: Array  # (MAX_TERMS, N), overwritten
 
 
 @compiled
@@ -157,7 +112,7 @@ def march(
     counts = np.zeros((2, 2), np.int64)
     sought = np.inf
     sought_passed = 0.0
-    _observe_node(storey, observed, state, errors, 0, found)
+    observe_node(storey, observed, state, errors, 0, found)
     while not (is_fixed and element.integers[0] >= observed.last):
         if is_fixed:
             numbers[WINDOW] = state.begin[0]
@@ -206,7 +161,7 @@ def march(
         if not numbers[ERROR] <= limit:
             return End(TOO_WIDE, numbers[ERROR], n_events, state.begin[0])
         _write_errors(storey, numbers, by_load, errors)
-        _observe(storey, observed, load, state, element, errors, is_fixed and not is_event, found)
+        observe(storey, observed, load, state, element, errors, is_fixed and not is_event, found)
 
         terms = int(series.numbers[0])
         total(series.u, terms, state.u)
@@ -235,7 +190,7 @@ def march(
         elif observed.node[edge] >= 0:
             by_load[:] = 0.0
             _write_errors(storey, numbers, by_load, errors)
-            _observe_node(storey, observed, state, errors, observed.node[edge], found)
+            observe_node(storey, observed, state, errors, observed.node[edge], found)
         element.integers[0] = edge
     return End(PROVED, numbers[ERROR], n_events, state.begin[0])
 
@@ -246,7 +201,7 @@ def _tolerance(storey: Storey, phase: float) -> float:
     ignored = IGNORED * storey.magnitude[DRIFT]
     if phase != 0:
         ignored *= math.sqrt(storey.magnitude[ELASTIC])
-    return ignored
+    return float(ignored)
 
 
 @compiled
@@ -259,16 +214,16 @@ def _target(load: Load, state: State, element: Element, is_fixed: bool) -> float
     piece = element.integers[0]
     if is_fixed:
         element.integers[1] = piece + 1
-        return load.edges[piece + 1]
+        return float(load.edges[piece + 1])
     latest = state.begin[0] + magnitude(state.begin[1:])
     edge = np.searchsorted(load.edges, latest + SAME_TIME)
     if edge >= len(load.edges):
         return -1.0
     if load.edges[edge - 1] > state.numbers[WINDOW] + SAME_TIME:
         element.integers[1] = -1
-        return latest
+        return float(latest)
     element.integers[1] = edge
-    return load.edges[edge]
+    return float(load.edges[edge])
 
 
 @compiled
@@ -301,14 +256,14 @@ def _passed(storey: Storey, state: State, element: Element) -> float:
     numbers[BEYOND] = 0.0
     if min(below, above) <= 0:
         numbers[BEYOND] = 1.0 if above > below else -1.0
-    return max(below, above)
+    return float(max(below, above))
 
 
 @compiled
 def _is_decelerated(state: State, element: Element) -> bool:
     """Return whether s ṽ falls on an element at all inputs, s the last direction of yielding."""
     side = state.numbers[SIDE]
-    return side * element.series.numbers[3] + element.series.numbers[4] < 0
+    return bool(side * element.series.numbers[3] + element.series.numbers[4] < 0)
 
 
 @compiled
@@ -399,10 +354,11 @@ def _solve(
 ) -> float:  # fmt: skip
     """Return `solve_event` under the load of the interval `piece`, extended."""
     load_at(load, piece, state.begin, element.pushed)
-    return solve_event(
+    residual: float = solve_event(
         storey, state.numbers[PHASE], side, state.slider[0], (state.u, state.v, state.begin),
         (element.pushed, load.slope[piece]), event, element.series,
     )  # fmt: skip
+    return residual
 
 
 @compiled
@@ -505,7 +461,7 @@ def _fall(state: State, element: Element) -> float:
         spread += magnitude(v[k])
     if abs(v[0, 0]) <= spread:
         return 0.0
-    return -state.numbers[BEYOND] * math.copysign(1.0, v[0, 0])
+    return float(-state.numbers[BEYOND] * math.copysign(1.0, v[0, 0]))
 
 
 @compiled
@@ -577,148 +533,3 @@ def _switch(storey: Storey, state: State, side: float) -> None:
         state.numbers[TOP_SPEED] = magnitude(state.v)
         state.slider[1] += phase * state.u
         state.numbers[PHASE] = 0.0
-
-
-@compiled
-def _output(
-    storey: Storey, observed: Observed, row: int, state: State, motion: tuple[Array, Array],
-    out: Array,
-) -> float:  # fmt: skip
-    """Write the series of an output to `out`, and return a bound of what it leaves out.
-
-    Args:
-        storey: The storey.
-        observed: The outputs.
-        row: Number of the output.
-        state: Phase and slider.
-        motion: Series of displacement and velocity, shape (terms or more, N).
-        out: Series of the output, shape (terms, N).
-    """
-    u, v = motion
-    a = observed.rows[row]
-    rest = observed.remainder[row]
-    phase = state.numbers[PHASE]
-    on_u = 0 if phase == 0 else 1
-    work = np.empty(out.shape[1])
-    lost = multiply(a[5], state.slider[1], storey.table, out[0])
-    lost += rest[5] * magnitude(state.slider[1])
-    out[1:] = 0.0
-    if phase == 0:
-        lost += multiply(a[3], state.slider[0], storey.table, work)
-        lost += rest[3] * magnitude(state.slider[0])
-        out[0] -= work
-    else:
-        out[0] += phase * a[4]
-        lost += rest[4]
-    for k in range(len(out)):
-        lost += multiply(a[on_u], u[k], storey.table, work)
-        out[k] += work
-        lost += multiply(a[2], v[k], storey.table, work)
-        out[k] += work
-        lost += (rest[on_u] + rest[5]) * magnitude(u[k]) + rest[2] * magnitude(v[k])
-        if phase != 0:
-            lost += multiply(a[5], u[k], storey.table, work)
-            out[k] += phase * work
-    return lost
-
-
-@compiled
-def _observe(
-    storey: Storey, observed: Observed, load: Load, state: State, element: Element,
-    errors: Array, is_fixed: bool, found: Found,
-) -> None:  # fmt: skip
-    """Raise peaks by an element, and bounds at the time nodes that it may contain.
-
-    Args:
-        storey: The storey.
-        observed: The outputs.
-        load: The load.
-        state: State at the beginning of the element.
-        element: The element.
-        errors: Bounds of |Δu|, |Δv|, |Δz| and |ΔP|, shape (4,).
-        is_fixed: Whether begin and end are the same at all inputs: then no time node lies inside.
-        found: Its bounds are raised in place.
-    """
-    terms = int(element.series.numbers[0])
-    n = len(element.h)
-    series = np.empty((terms, n))
-    negative = np.empty((terms, n))
-    motion = (element.series.u, element.series.v)
-    # the steps that the element may touch
-    end = state.begin + element.h
-    begin = state.begin[0] - magnitude(state.begin[1:])
-    edge = np.searchsorted(load.edges, begin + SAME_TIME, side="right") - 1
-    first = observed.step[max(edge, 0)]
-    edge = np.searchsorted(load.edges, end[0] + magnitude(end[1:]) - SAME_TIME) - 1
-    last = min(observed.step[max(edge, 0)], len(found.steps) - 1)
-    for row in range(len(observed.rows)):
-        error = _output(storey, observed, row, state, motion, series)
-        error += (observed.weights[row] * errors).sum()
-        negative[:] = -series
-        gap = PEAK_GAP * max(found.peaks[row, 0], found.peaks[row, 1], 0.0)
-        for side in range(2):
-            chosen = negative if side == 0 else series
-            most = upper_bound(chosen, terms, 0.0, 1.0, gap, -np.inf) + error
-            found.peaks[row, side] = max(found.peaks[row, side], most)
-            for step in range(first, last + 1):
-                found.steps[step, row, side] = max(found.steps[step, row, side], most)
-            if not is_fixed:
-                _observe_inside(
-                    observed, load, state, element, chosen, error, row, side, gap, found
-                )
-
-
-@compiled
-def _observe_inside(
-    observed: Observed, load: Load, state: State, element: Element, series: Array, error: float,
-    row: int, side: int, gap: float, found: Found,
-) -> None:  # fmt: skip
-    """Raise the bounds of one side of an output at time nodes that an element may contain.
-
-    A node t is met at τ = (t − begin) / h = 1 − (end − t) / h. The bounds of begin, end and h bound
-    τ. A node at which the element begins or ends at all inputs is bounded elsewhere.
-    """
-    spread = magnitude(state.begin[1:])
-    first = state.begin[0] - spread
-    last = state.begin[0] + spread
-    end = state.begin + element.h
-    spread_of_end = magnitude(end[1:])
-    longest = magnitude(element.h)
-    shortest = 2 * element.h[0] - longest
-    edge = np.searchsorted(load.edges, first - SAME_TIME)
-    if spread == 0:
-        edge = np.searchsorted(load.edges, first + SAME_TIME)
-    until = end[0] + spread_of_end + (SAME_TIME if spread_of_end > 0 else -SAME_TIME)
-    while edge < len(load.edges) and load.edges[edge] <= until:
-        node = observed.node[edge]
-        time = load.edges[edge]
-        edge += 1
-        if node < 0:
-            continue
-        low = (time - last) / longest
-        high = 1 - (end[0] - spread_of_end - time) / longest
-        if shortest > 0:
-            low = max(low, 1 - (end[0] + spread_of_end - time) / shortest)
-            high = min(high, (time - first) / shortest)
-        low = min(max(low - SAME_TIME, 0.0), 1.0)
-        high = min(max(high + SAME_TIME, low), 1.0)
-        most = error + upper_bound(series, len(series), low, high, gap, -np.inf)
-        found.bounds[node, row, side] = max(found.bounds[node, row, side], most)
-
-
-@compiled
-def _observe_node(
-    storey: Storey, observed: Observed, state: State, errors: Array, node: int, found: Found
-) -> None:
-    """Raise the bounds at a time node, and the peaks, by the state at this time at all inputs."""
-    n = len(state.u)
-    motion = (state.u.reshape(1, n), state.v.reshape(1, n))
-    value = np.empty((1, n))
-    for row in range(len(observed.rows)):
-        error = _output(storey, observed, row, state, motion, value)
-        radius = magnitude(value[0, 1:]) + error + (observed.weights[row] * errors).sum()
-        for side in range(2):
-            most = radius + (value[0, 0] if side else -value[0, 0])
-            found.bounds[node, row, side] = max(found.bounds[node, row, side], most)
-            found.steps[node, row, side] = max(found.steps[node, row, side], most)
-            found.peaks[row, side] = max(found.peaks[row, side], most)
