@@ -49,6 +49,7 @@ FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
     "ansys": "frame/structures/mapdl.py",
     "array_api_compat": "rve/image/fields/grid.py",
     "cupy": "rve/image/fields/grid.py",
+    "eurocodepy": "tests/frame/spectra/test_other_packages.py",
     "obspy": "frame/records/read.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
     "pyyeti": "frame/structures/nastran.py",

@@ -78,7 +78,7 @@ def test_questions_say_of_which_box_they_are_and_claim_nothing_reached_in_it(tmp
 
 
 def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_path, capfd):
-    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]')
+    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
     text = text.replace("[4, 5, 6] %", "5 %")
     summary, told, _, tables = run_with(tmp_path, text, capfd)
     peak = summary["envelopes"]["all"]["peak"]["drift1"]

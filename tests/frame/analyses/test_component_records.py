@@ -46,7 +46,7 @@ def records(rng, count, components):
     return [tuple(record(f"r{k}{axis}") for axis in "xyz"[:components]) for k in range(count)]
 
 
-@pytest.mark.parametrize("components", [2, 3])
+@pytest.mark.parametrize("components", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("all_angles", [False, True])
 def test_motions_under_records_of_components_stay_within_the_bounds(components, all_angles):
     print(f"seed {SEED}")

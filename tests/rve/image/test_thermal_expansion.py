@@ -205,7 +205,7 @@ def test_equal_bulk_moduli_expand_by_the_mean(rng, n):
     assert abs(near.stress[-1] / mean - 1).max() < 1e-5
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_high_contrast_and_a_pore(rng, n):
     phase = np.zeros((6,) * n, int)
     phase[(slice(2, 4),) * n] = 1
