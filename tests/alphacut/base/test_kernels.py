@@ -145,8 +145,8 @@ def test_what_kernels_read_from_other_files_is_in_their_digests() -> None:
             for name in read & {x.name for x in line.names}:
                 if line.module.startswith("alphacut"):
                     source = inspect.getsource(importlib.import_module(line.module))
-                    assert re.search(rf"^(def {name}\(|(\w+, )*{name}(, \w+)* = )", source, re.M), (
-                        name
-                    )
+                    assert re.search(
+                        rf"^((def|class) {name}\(|(\w+, )*{name}(, \w+)* = )", source, re.M
+                    ), name
                     found += 1
     assert found
