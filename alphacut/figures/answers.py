@@ -436,9 +436,10 @@ def draw_response_spectrum(answer: SpectrumResponse) -> Figure:
     axes.plot(grid, spectrum(grid) / STANDARD_GRAVITY, color=INK, lw=1.2)
     sizes = 10 + 190 * fractions
     axes.scatter(periods, spectrum(periods) / STANDARD_GRAVITY, s=sizes, color=BLUE, alpha=0.7)
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel("period [s]; points: the modes, by the mass that they move")
-    axes.set_ylabel("spectral acceleration [g]")
+    # The largest point must not be cut.
+    axes.set_ylim(0.0, 1.1 * float(spectrum(grid).max()) / STANDARD_GRAVITY)
+    axes.set_xlabel("period T (s); points: the modes, by the mass that they move")
+    axes.set_ylabel("spectral acceleration (g)")
     return figure
 
 
