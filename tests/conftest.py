@@ -46,9 +46,11 @@ def pytest_collection_finish():
 
 
 @pytest.fixture
-def rng():
-    """Random numbers; the seed is printed, and given by SEED."""
-    seed = int(os.environ.get("SEED", secrets.randbelow(10**9)))
+def rng(request):
+    """Random numbers; the seed is printed, and given by SEED, or by `tests.seeds`."""
+    seed = getattr(request, "param", None)
+    if seed is None:
+        seed = int(os.environ.get("SEED", secrets.randbelow(10**9)))
     print(f"SEED={seed}")
     return np.random.default_rng(seed)
 

@@ -17,6 +17,7 @@ from alphacut.frame import (
     floor_spectrum,
     pendulum,
 )
+from alphacut.frame.analyses.floor_oscillators import STEP_ERROR
 from alphacut.fuzzy import Interval, RefusedError, Triangular
 from tests.frame.motions import random_points
 
@@ -126,11 +127,13 @@ def test_matrices_and_coupled_damping_have_floor_spectra(rng):
     a = floor_spectrum(matrices, inputs, "top", [0.3], alpha=[0], **MOTION)
     b = floor_spectrum(frame, inputs, "a2", [0.3], alpha=[0], **MOTION)
     both = floor_spectrum(
-        replace(frame, damping_ratio=1e-4), inputs, "a2", [0.3], alpha=[0], **MOTION
+        replace(frame, damping_ratio=1e-9), inputs, "a2", [0.3], alpha=[0], **MOTION
     )
     assert a.natures == b.natures == both.natures == (("guaranteed",),)
-    assert both.bound == pytest.approx(b.bound, rel=1e-2)
-    assert a.bound == pytest.approx(b.bound, rel=1e-2)
+    for x in (a, both):
+        assert (x.attained <= b.bound).all()
+    for x in (a, both):
+        assert (b.attained <= x.bound).all()
     assert a.nominal == pytest.approx(b.nominal, rel=1e-6)
 
 
@@ -152,8 +155,11 @@ def test_components_of_the_ground_motion_add_up(rng):
         floor_spectrum(x, inputs, "top", [0.0, 0.3], alpha=[0], **MOTION) for x in (plan, apart)
     )
     assert b.natures == (("guaranteed",) * 2,)
-    assert b.nominal == pytest.approx(a.nominal, rel=1e-3)
-    assert b.bound == pytest.approx(a.bound, rel=1e-2)
+    # The responses of the oscillators to the components are computed with steps of their own.
+    assert (np.abs(b.nominal - a.nominal) <= STEP_ERROR * (a.nominal + b.nominal)).all()
+    # Both bounds hold for the same motions; how far above these they lie differs.
+    assert (a.attained <= b.bound).all()
+    assert (b.attained <= a.bound).all()
 
 
 def test_means_over_records_are_those_of_each_structure(rng):

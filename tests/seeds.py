@@ -1,0 +1,129 @@
+"""Every test that draws from the fixture `rng`, with many seeds each.
+
+    ./enter python -m tests.seeds 200                            # all, with 200 seeds each
+    ./enter python -m tests.seeds 200 tests/frame/spectra        # those of one folder
+    ./enter python -m tests.seeds 200 --seconds 60 --not-slow    # a test stops after a minute
+
+Each file of tests has one process, in which its tests run again with one seed after the other. A
+line for each test says how many seeds it got, and which ones failed; SEED=… repeats one of these.
+This module is also the plugin of pytest that does so within a process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import secrets
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+from time import perf_counter
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+class Repetition:
+    """Repeats tests with further seeds, and counts.
+
+    Args:
+        seeds: Seeds of each test.
+        seconds: Time in s after which a test gets no further seed.
+    """
+
+    def __init__(self, seeds: range, seconds: float) -> None:
+        self.seeds = seeds
+        self.seconds = seconds
+        self.spent: dict[str, float] = defaultdict(float)  # s by the name of a test
+        self.passed: dict[str, int] = defaultdict(int)
+        self.failed: dict[str, list[int]] = defaultdict(list)  # seeds
+
+    def pytest_generate_tests(self, metafunc):
+        """Give the fixture `rng` one seed after the other."""
+        if "rng" in metafunc.fixturenames:
+            metafunc.parametrize("rng", self.seeds, ids=lambda seed: f"SEED={seed}", indirect=True)
+
+    def pytest_collection_modifyitems(self, items):
+        """Leave out tests that draw nothing."""
+        items[:] = [item for item in items if "rng" in item.fixturenames]
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item):
+        """Count the time of a test, or leave it out if its earlier seeds took too long."""
+        name = _name(item)
+        if self.spent[name] > self.seconds:
+            item.add_marker(pytest.mark.skip("no time for further seeds"))
+        begin = perf_counter()
+        result = yield
+        self.spent[name] += perf_counter() - begin
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item):
+        """Count whether a test has passed, and note the seed if not."""
+        report = yield
+        name = _name(item)
+        if report.failed:
+            self.failed[name].append(item.callspec.params["rng"])
+        elif report.when == "call" and report.passed:
+            self.passed[name] += 1
+        return report
+
+    def pytest_terminal_summary(self, terminalreporter):
+        """Write a line for each test."""
+        for name, seconds in self.spent.items():
+            failed = sorted(set(self.failed[name]))
+            count = self.passed[name] + len(failed)
+            line = f"{count:4d} seeds, {len(failed)} failed, {seconds:6.1f} s: {name}"
+            terminalreporter.write_line(" ".join([line, *(f"SEED={seed}" for seed in failed)]))
+
+
+def _name(item: pytest.Item) -> str:
+    """Return the name of a test without its seed."""
+    return re.sub(r"\[SEED=\d+\]|-SEED=\d+|(?<=\[)SEED=\d+-", "", item.nodeid)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the repetition that the environment describes."""
+    first, count, seconds = os.environ["ALPHACUT_SEEDS"].split()
+    seeds = range(int(first), int(first) + int(count))
+    config.pluginmanager.register(Repetition(seeds, float(seconds)))
+
+
+def main() -> int:
+    """Run the tests in the files or folders of the command line; return 1 if one fails."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("count", type=int, help="number of seeds for each test")
+    parser.add_argument("places", nargs="*", type=Path, default=[ROOT / "tests"])
+    parser.add_argument("--seconds", type=float, default=1e9, help="longest time for a test")
+    parser.add_argument("--first", type=int, help="first seed (else a random one)")
+    parser.add_argument("--not-slow", action="store_true", help="without tests that are slow")
+    options = parser.parse_args()
+    first = secrets.randbelow(10**9) if options.first is None else options.first
+    print(f"seeds from {first} on", flush=True)
+    environment = os.environ | {"ALPHACUT_SEEDS": f"{first} {options.count} {options.seconds}"}
+    words = [sys.executable, "-m", "pytest", "-q", "-p", "tests.seeds", "--tb=short", "--no-header"]
+    words += ["-o", "console_output_style=none", "--show-capture=no"]
+    if options.not_slow:
+        words += ["-m", "not slow"]
+    files = set()
+    for place in options.places:
+        files.update([place] if place.is_file() else place.rglob("test_*.py"))
+    status = 0
+    for file in sorted(files):
+        if "rng" in file.read_text(encoding="utf-8"):
+            code = subprocess.run(
+                [*words, str(file)], cwd=ROOT, env=environment, check=False
+            ).returncode
+            if code not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+                status = 1
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
