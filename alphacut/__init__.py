@@ -1,19 +1,17 @@
 """The front door: case files, units, command line, stages, report; logs as "alphacut", silently."""
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from alphacut.base.first_use import at_first_use
 
 if TYPE_CHECKING:
     from alphacut.entry import main
 
 __all__ = ["main"]
+AT_FIRST_USE = {"main": "entry"}
+"""Module of each exported name that is imported at its first use: frames in Python need none."""
+
 logging.getLogger(__name__).addHandler(logging.NullHandler())
 
-
-def __getattr__(name: str) -> Any:
-    """Return `main` at its first use (PEP 562): functions and frames in Python do without it."""
-    if name == "main":
-        from alphacut.entry import main
-
-        return main
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sphinx.pycode import ModuleAnalyzer
+
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
     from sphinx.application import Sphinx
@@ -17,7 +19,13 @@ os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"  # demos 
 
 project = "alphacut"
 author = "The alphacut developers"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+]
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_update_mathjax = False
 myst_heading_anchors = 3
@@ -56,6 +64,16 @@ mathjax2_config = {
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "imported-members": True}
+autodoc_type_aliases = {name: name for name in ("Array", "Ints", "Mask")}  # not ndarray[tuple[…
+CONSTANTS = {
+    "DISCS": "alphacut.stochastic.particles.shapes",
+    "INTEGRATORS": "alphacut.frame.dynamics.integrators",
+    "LOADS": "alphacut.rve.cell.cell",
+    "METHODS": "alphacut.frame.propagation",
+    "SPHERES": "alphacut.stochastic.particles.shapes",
+    "STRAIN": "alphacut.rve.cell.cell",
+}
+"""Module that assigns each public constant."""
 
 
 def copy_mathjax(app: Sphinx) -> None:
@@ -107,6 +125,16 @@ def with_bars(
             lines[number] = line.replace("|", "\\|")
 
 
+def with_strings_below(
+    _app: Sphinx, what: str, name: str, _documented: object, _options: object, lines: list[str]
+) -> None:
+    """Describes a public constant by the string that stands below its assignment."""
+    constant = name.rpartition(".")[2]
+    if what == "data" and constant in CONSTANTS:
+        analyzer = ModuleAnalyzer.for_module(CONSTANTS[constant])
+        lines[:] = analyzer.find_attr_docs()["", constant]
+
+
 def described(field: FieldInfo) -> str:
     """The description of a key in reStructuredText."""
     return (field.description or "section of its own").replace("`", "``")
@@ -148,5 +176,6 @@ def setup(app: Sphinx) -> None:
     app.connect("builder-inited", copy_mathjax)
     app.connect("autodoc-process-docstring", with_bars)
     app.connect("autodoc-process-docstring", with_keys)
+    app.connect("autodoc-process-docstring", with_strings_below, priority=900)
     app.connect("autodoc-process-signature", without_signature)
     app.connect("html-page-context", without_modules, priority=900)

@@ -169,4 +169,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name, which is imported at its first use: all of them take .1 s."""
 
-__getattr__ = at_first_use(__name__, AT_FIRST_USE)
+__getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

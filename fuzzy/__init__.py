@@ -48,4 +48,4 @@ AT_FIRST_USE = {
 """Module of each exported name that is imported at its first use, since a case file needs fuzzy
 numbers alone. Campaigns, with SQLite and processes, take .04 s of processor time."""
 
-__getattr__ = at_first_use(__name__, AT_FIRST_USE)
+__getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

@@ -89,4 +89,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name that is imported at its first use: some need DOLFINx."""
 
-__getattr__ = at_first_use(__name__, AT_FIRST_USE)
+__getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

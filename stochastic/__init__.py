@@ -51,4 +51,4 @@ AT_FIRST_USE = {
 }
 """Module of each exported name that is imported at its first use."""
 
-__getattr__ = at_first_use(__name__, AT_FIRST_USE)
+__getattr__, __dir__ = at_first_use(__name__, AT_FIRST_USE)

@@ -117,7 +117,7 @@ class Peak:
 
     @property
     def outward_sign(self) -> float:
-        """Sign of the direction in which peaks are farther out: -1 for a smallest value, else 1."""
+        """Sign of the direction in which peaks are farther out, -1 for smallest values, else 1."""
         return -1.0 if self.is_least else 1.0
 
     @property

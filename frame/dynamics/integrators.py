@@ -175,6 +175,7 @@ class Exact:
 
 Integrator = Midpoint | Exact
 INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), Exact())}
+"""The integrators by the words that a case file has for them."""
 
 
 def state_matrix(m: Matrices) -> Jet:

@@ -260,7 +260,7 @@ class Identified:
 
     @property
     def claim(self) -> JointClaim:
-        """Coverage of the boxes: the claims, and the conditions under which they hold."""
+        """The claims on the coverage of the boxes, and the conditions under which they hold."""
         joint = JointClaim.from_inputs(self.evidence.numbers)
         conditions = (*joint.conditions, "the structure is such a storey frame")
         return JointClaim(self.evidence.joint, conditions, joint.opinions)

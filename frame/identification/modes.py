@@ -171,7 +171,7 @@ class MeasuredMode:
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
-        """Measured quantities by name: "f1" for mode 1, and "shape1_3" for its third floor."""
+        """Measured quantities by name, such as "f1" of mode 1 and "shape1_3" of its third floor."""
         amplitudes = {f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()}
         return {f"f{self.mode}": self.frequency, **amplitudes}
 

@@ -72,7 +72,7 @@ class Output(str):
 
     @property
     def words(self) -> str:
-        """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
+        """The output in words, as "displacement of floor 3 (q3)", or its name if it has none."""
         kind, floor = self._parts
         _, words = OUTPUTS.get(kind, ("", ""))
         return f"{words} {floor} ({self})" if words and floor else self.replace("_", " ")

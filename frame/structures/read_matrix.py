@@ -43,11 +43,11 @@ def read_matrix(
     """Read a matrix, as of masses or stiffnesses, from a file; a sparse one becomes dense.
 
     Args:
-        path: File of Matrix Market or of Abaqus's *MATRIX OUTPUT (.mtx), of CalculiX's *FREQUENCY,
-            SOLVER=MATRIXSTORAGE (.sti and .mas, with .dof beside), of Nastran's DMIG cards (.pch,
-            .bdf or .nas) or OUTPUT4 (.op4), of MAPDL (.full), of `scipy.sparse.save_npz` or
-            `numpy.savez` (.npz), of `numpy.save` (.npy), or of numbers between commas, semicolons
-            or blanks (.csv).
+        path: File of Matrix Market or of Abaqus's ``*MATRIX OUTPUT`` (.mtx), of CalculiX's
+            ``*FREQUENCY, SOLVER=MATRIXSTORAGE`` (.sti and .mas, with .dof beside), of Nastran's
+            DMIG cards (.pch, .bdf or .nas) or OUTPUT4 (.op4), of MAPDL (.full), of
+            `scipy.sparse.save_npz` or `numpy.savez` (.npz), of `numpy.save` (.npy), or of numbers
+            between commas, semicolons or blanks (.csv).
         name: Name of the array in a .npz, .pch or .op4 file of several; K or M of a .full file.
         max_rows: Largest number of rows and of columns, as the number of unknowns.
         unknowns: Names of the rows to return, in their order, where the file names its own

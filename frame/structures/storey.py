@@ -288,7 +288,7 @@ class StoreyFrame(LinearSystem):
 
     @property
     def moments(self) -> tuple[float, ...]:
-        """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
+        """Second moments of area, one for all storeys or one for each; empty with a stiffness."""
         if self.second_moment is None:
             return ()
         return tuple(np.atleast_1d(self.second_moment))

@@ -64,7 +64,7 @@ class FuzzyNumber(ABC):
 
     @cached_property
     def nominal(self) -> float:
-        """The nominal value: of membership 1, or the midpoint of the interval of such values."""
+        """The value of membership 1, or the midpoint of the interval of such values."""
         lower, upper = self.cut(1.0)
         return lower if lower == upper else (lower + upper) / 2
 
@@ -193,7 +193,7 @@ class _Corners(FuzzyNumber):
 
     @cached_property
     def cuts(self) -> Cuts:
-        """The support, and the values of membership 1: the middle corner, or the middle two."""
+        """The support and the values of membership 1, which are the middle corner or middle two."""
         corners = [getattr(self, corner.name) for corner in fields(self)]
         left = corners[(len(corners) - 1) // 2]
         right = corners[len(corners) // 2]

@@ -207,7 +207,10 @@ class Cell:
 
     @property
     def square(self) -> bool:
-        """Whether C11 = C22 without coupling to shear: round and isotropic, on no rectangle."""
+        """Whether C11 = C22 holds without coupling to shear.
+
+        It does where both phases are isotropic, the outline is round and the cell is no rectangle.
+        """
         is_isotropic = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
         return is_isotropic and is_round(self.outline) and self.lattice.is_square
 

@@ -31,9 +31,9 @@ class ImageFields:
         lengths: Sides of a pixel or voxel in m, along the axes of `phase`.
         phase: Number of the phase of each pixel, dark first, shape (y, x) or (z, y, x).
         strain: Strains under each unit mean strain, of displacements that bound the stiffness from
-            above, shape (loads, components, *grid); None where a phase is rigid.
+            above, shape (loads, components, ...grid); None where a phase is rigid.
         stress: Stresses under each unit mean stress, in equilibrium exactly, which bound the
-            stiffness from below, shape (loads, components, *grid); None where pores percolate.
+            stiffness from below, shape (loads, components, ...grid); None where pores percolate.
     """
 
     lengths: tuple[float, ...]
@@ -83,7 +83,7 @@ def image_fields(
 
     Returns:
         Means over each pixel or voxel of the strain under each unit mean strain, and of the stress
-        under each unit mean stress, shape (loads, components, *grid) in Voigt's order; the strain
+        under each unit mean stress, shape (loads, components, ...grid) in Voigt's order; the strain
         is None beside rigid phases, the stress where pores percolate. And the phases, shape (y, x)
         or (z, y, x).
 

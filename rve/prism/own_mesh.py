@@ -248,7 +248,8 @@ def _mesh_problem(path: str, _changed: int, parallel: bool, refine: bool) -> Pri
 class LevelSetModel(_NamedModel):
     """Particles of any number and shape by the sign of a function, on a mesh that ignores them.
 
-    The error is of first order in the mesh size, the result too stiff.
+    The error is of first order in the mesh size. Particles that are stiffer than the matrix make
+    the result too stiff, as a rule; softer ones make it too stiff or too soft.
 
     Args:
         z: Takes x1, x2 and θ; negative in the particles, positive in the matrix, such as a

@@ -268,12 +268,12 @@ class HomogenisedStiffness:
 
     @property
     def has_isotropic_constants(self) -> bool:
-        """Whether an isotropic solid has these moduli: of the plane 2 G_T < 3 (C11 + C12)."""
+        """Whether an isotropic solid has these moduli; in the plane if 2 G_T < 3 (C11 + C12)."""
         return self.modulus > 0
 
     @property
     def shear(self) -> float:
-        """Shear modulus of the average, in Pa: G_T of fibres."""
+        """Shear modulus of the average, in Pa; of fibres it is G_T."""
         return self.shear_of(self.moduli)
 
     @property

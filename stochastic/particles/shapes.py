@@ -60,6 +60,7 @@ DISCS = Shape(
     sequential=0.45,
     densest=0.82,
 )
+"""Discs in a plane, as of fibres or of a plane section."""
 SPHERES = Shape(
     particles="spheres",
     cells="volume",
@@ -69,3 +70,4 @@ SPHERES = Shape(
     sequential=0.25,
     densest=0.58,
 )
+"""Spheres in space."""
