@@ -11,8 +11,8 @@ import pytest
 import scipy.io
 
 from alphacut.frame import read_matrix
-from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
+from tests.refused import refuses
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "tools.md"
@@ -33,8 +33,8 @@ def test_a_thin_volume_saved_as_colour_or_as_pages_is_refused(tmp_path):
     Image.fromarray(slices).save(tmp_path / "three.tif")
     first, *others = (Image.fromarray(np.full((8, 8), k, np.uint8)) for k in range(5))
     first.save(tmp_path / "five.tif", save_all=True, append_images=others)
-    for name, words in (("three.tif", "in colours"), ("five.tif", "5 pages")):
-        with pytest.raises(RefusedError, match=words):
+    for name, key in (("three.tif", "three.tif"), ("five.tif", "five.tif")):
+        with refuses(key):
             read_image(tmp_path / name, spacing=(1.0, 1.0))
 
 
@@ -43,7 +43,7 @@ def test_pixels_that_the_file_says_are_not_square_are_refused(tmp_path):
 
     picture = Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8))
     picture.save(tmp_path / "a.tif", dpi=(100, 300))
-    with pytest.raises(RefusedError, match=r"100 by 300 per inch"):
+    with refuses("a.tif"):
         read_image(tmp_path / "a.tif", spacing=1.0)
 
 
@@ -83,7 +83,7 @@ def test_integers_whose_sign_pillow_changes_are_refused(tmp_path, kind):
         content = (tmp_path / "labels.tif").read_bytes()
         signed, unsigned = (struct.pack("<HHIHH", 339, 3, 1, x, 0) for x in (2, 1))
         (tmp_path / "labels.tif").write_bytes(content.replace(signed, unsigned))
-    with pytest.raises(RefusedError, match="sign"):
+    with refuses("labels.tif"):
         read_image(tmp_path / "labels.tif", spacing=1.0)
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import RefusedError
 from alphacut.rve import (
     STRAIN,
     Phase,
@@ -15,6 +14,7 @@ from alphacut.rve import (
     reference_bounds,
 )
 from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule
+from tests.refused import refuses
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -50,9 +50,9 @@ def test_a_phase_of_bulk_and_shear_has_them():
     assert quartz.bulk_and_shear == pytest.approx([37e9, 44e9], rel=1e-14)
     assert (quartz.modulus, quartz.poisson) == pytest.approx((94.535e9, 0.0742), rel=1e-3)
     for moduli, key in (((37e9, 0.0), "shear modulus"), ((np.inf, 44e9), "bulk modulus")):
-        with pytest.raises(RefusedError, match=key):
+        with refuses(key):
             Phase.of_bulk_and_shear(*moduli)
-    with pytest.raises(RefusedError, match="Poisson's ratio"):
+    with refuses("Poisson's ratio"):
         Phase.of_bulk_and_shear(37e9, 1e-8)
 
 
@@ -88,7 +88,7 @@ def test_eq_16_is_the_average_along_the_axes_with_or_without_the_whole_stiffness
     bare = replace(whole, curve=replace(whole.curve, stiffness=None))
     assert (bare.modulus, bare.poisson) == pytest.approx((whole.modulus, whole.poisson), rel=1e-12)
     assert bare.estimated_error == pytest.approx(whole.estimated_error)
-    with pytest.raises(RefusedError, match="let the model make the whole plane stiffness"):
+    with refuses("average"):
         bare.with_average("isotropic")
 
 

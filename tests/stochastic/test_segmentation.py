@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import RefusedError
 from alphacut.stochastic.segmentation import CONFIDENT, segment
+from tests.refused import refuses
 
 SIZE = 96
 
@@ -60,20 +60,20 @@ def test_a_border_is_open_by_the_deviations_of_the_noise():
 @pytest.mark.parametrize(("noise", "drift"), [(0.15, 0.0), (0.02, 0.9)])
 def test_what_noise_and_light_leave_too_open_is_refused(noise, drift):
     grey, _ = picture(np.random.default_rng(2), noise=noise, drift=drift)
-    with pytest.raises(RefusedError) as error:
+    with refuses("threshold") as error:
         segment(grey, [110]).require_certain()
     assert error.value.key == "threshold"
 
 
 def test_a_threshold_beyond_the_grey_values_is_refused():
-    with pytest.raises(RefusedError, match="leave each class some pixels"):
+    with refuses("threshold"):
         segment(np.random.default_rng(0).normal(size=(9, 9)), [30])
 
 
 @pytest.mark.parametrize("ends", [(60, 255), (0, 160), (75, 255), (55, 150), (62, 158)])
 def test_clipped_grey_values_are_refused(ends):
     grey, _ = picture(np.random.default_rng(6), noise=0.05)
-    with pytest.raises(RefusedError, match="not clipped"):
+    with refuses("image"):
         segment(np.clip(grey, *ends), [110])
 
 
@@ -109,7 +109,7 @@ def test_impulses_and_scratches_are_in_doubt(spoilt, noise):
     assert (first < last)[places].mean() > 0.9
     assert (first < last)[~places].mean() < before + 0.02
     grey[rng.random(grey.shape) < 0.06] = 255
-    with pytest.raises(RefusedError, match="impulses or scratches on"):
+    with refuses("threshold"):
         segment(grey, [110]).require_certain()
 
 

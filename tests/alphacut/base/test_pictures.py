@@ -9,6 +9,7 @@ from alphacut.base import memory, pictures
 from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
 from alphacut.stochastic.particles.measured import section_picture
+from tests.refused import refuses
 
 Image = pytest.importorskip("PIL.Image")
 READERS = {
@@ -31,14 +32,14 @@ def test_a_head_that_promises_more_pixels_than_its_file_holds_is_refused(tmp_pat
     png(tmp_path / "a.png", (5, 7))
     assert read(tmp_path / "a.png").shape == (7, 5)
     png(tmp_path / "a.png", (30000, 30000))
-    with pytest.raises(RefusedError, match=r"30000 × 30000 pixels in a file of \d+ bytes"):
+    with refuses("a.png"):
         read(tmp_path / "a.png")
 
 
 def test_a_picture_that_does_not_fit_the_free_memory_is_refused(tmp_path, monkeypatch):
     Image.fromarray(np.zeros((40, 50), np.uint8)).save(tmp_path / "a.png")
     monkeypatch.setattr(memory, "free_memory", lambda: 3e4)
-    with pytest.raises(RefusedError, match=r"50 × 40 pixels, which takes 3\.2e-05 GB"):
+    with refuses("a.png"):
         read_image(tmp_path / "a.png", spacing=1.0)
 
 
@@ -63,5 +64,5 @@ def test_every_format_has_a_most_of_pixels(tmp_path, monkeypatch, name):
     assert section_picture(tmp_path / name).shape == (40, 50)
     monkeypatch.setattr(pictures, "MAX_PIXELS", 1999)
     monkeypatch.setattr(pictures, "MAX_BYTES_PER_BYTE", dict.fromkeys(("GIF", "raw"), 1e-3))
-    with pytest.raises(RefusedError, match="50 × 40 pixels in a file of"):
+    with refuses(name):
         section_picture(tmp_path / name)

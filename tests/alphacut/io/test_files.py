@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from alphacut.base.kept_files import locked, whole_file, write_text
-from alphacut.fuzzy import FailedError, RefusedError
+from alphacut.fuzzy import FailedError
+from tests.refused import refuses
 
 
 def test_a_link_stays_and_its_target_is_replaced(tmp_path):
@@ -43,7 +44,7 @@ def test_a_file_that_fails_leaves_the_old_one(tmp_path):
 
 def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp_path):
     place = tmp_path / "out"
-    with locked("--out", place), pytest.raises(RefusedError, match="another run is writing into"):
+    with locked("--out", place), refuses("--out"):
         locked("--out", place).__enter__()
     with locked("--out", place):
         assert not list(place.iterdir())

@@ -12,9 +12,9 @@ import sqlite3
 import pytest
 
 from alphacut import main
-from alphacut.fuzzy import RefusedError
 from alphacut.io.results import Listed, ResultsFolder
 from tests.alphacut.small import CELL, summary_of, written
+from tests.refused import refuses
 
 
 def run(case, folder, *options):
@@ -219,7 +219,7 @@ def test_a_file_that_no_manifest_lists_is_not_replaced(tmp_path, capfd):
     assert run(case, tmp_path / "out") == 2
     assert file.read_text() == "precious"
     assert "no manifest lists" in capfd.readouterr().err
-    with pytest.raises(RefusedError, match="no manifest lists"):
+    with refuses("notes.json"):
         ResultsFolder(tmp_path / "out").put_text("notes.json", "text")
 
 

@@ -18,7 +18,7 @@ import pytest
 from alphacut import main
 from alphacut.base.number_text import Table, range_text
 from alphacut.frame import Limit, Peak, SuitePeaks, decide
-from alphacut.fuzzy import Nature, RefusedError
+from alphacut.fuzzy import Nature
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import caption, named_words, render_page, render_template
 from alphacut.report.results import answers, comparison, drivers, peak_table, run_text
@@ -26,6 +26,7 @@ from alphacut.report.tables import frames, latex, shown, write_csv, write_tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import FrameResult, Parts, Summary
 from tests.alphacut.small import summary_of
+from tests.refused import refuses
 
 
 def changed(two_floors, folder, **keys):
@@ -79,7 +80,7 @@ def test_a_script_in_a_drawing_does_not_reach_the_page(two_floors, tmp_path):
 def test_a_name_that_leads_out_of_the_folder_is_refused(two_floors, tmp_path, key, name):
     study = summary_of(two_floors)["envelopes"]["all"]
     copy = changed(two_floors, tmp_path, **{key: {name: study}})
-    with pytest.raises(RefusedError, match="damaged"):
+    with refuses("copy"):
         render_page(copy)
 
 

@@ -23,6 +23,7 @@ from alphacut.frame.analyses.limits import about_limit
 from alphacut.frame.analyses.peaks import loose_peaks, tightest
 from alphacut.fuzzy import Crisp, Interval, Nature, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points
+from tests.refused import refuses
 
 ANY = "any of them"
 OUTPUTS = ("q1", "drift2", "base_shear")
@@ -249,30 +250,30 @@ def test_the_interval_without_random_inputs_contains_the_bounds_and_what_lies_be
 
 def test_a_mean_takes_one_value_and_several_records():
     band = envelope(ONE, {"m1": Interval(900, 1100)}, duration=1, step=0.05, progress=False)
-    with pytest.raises(RefusedError, match=r"limits is mean q1 <= 0.01; .* one value"):
+    with refuses("limits"):
         decide(band, Limit("q1", (0.01, 0.1), mean=True))
-    with pytest.raises(RefusedError, match="output is mean q1; allowed: q1"):
+    with refuses("output"):
         decide(band, Limit("q1", 0.1, mean=True))
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "key"),
     [
-        ({"suite": []}, "suite is missing; allowed: one record or more"),
-        ({"duration": -1.0}, "duration is -1 s; allowed: above 0 s"),
-        ({"duration": np.nan}, "duration is nan s"),
-        ({"step": 0.0}, "step is 0"),
+        ({"suite": []}, "suite"),
+        ({"duration": -1.0}, "duration"),
+        ({"duration": np.nan}, "duration"),
+        ({"step": 0.0}, "step"),
     ],
 )
-def test_suites_without_records_and_times_are_refused(changes, message):
+def test_suites_without_records_and_times_are_refused(changes, key):
     arguments = {"suite": [Accelerogram(0.05, np.ones(20))], "duration": 1.0, "step": 0.05}
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         over_records(ONE, {"m1": Interval(900, 1100)}, **(arguments | changes))
 
 
 def test_two_records_of_one_name_are_refused():
     twice = [Accelerogram(0.05, scale * np.ones(20), name="push") for scale in (1.0, 3.0)]
-    with pytest.raises(RefusedError, match="suite is push; allowed: a name of its own"):
+    with refuses("suite"):
         over_records(ONE, {"m1": Interval(900, 1100)}, twice, duration=1, step=0.05)
 
 
@@ -288,7 +289,7 @@ def test_records_need_a_structure_that_oscillates():
     free = np.array([[1e3, -1e3], [-1e3, 1e3]])
     drifting = MatrixStructure({"k": 1.0}, [(1.0, np.eye(2))], [("k", free)], {"q2": [0.0, 1.0]})
     record = Accelerogram(0.05, np.ones(20))
-    with pytest.raises(RefusedError, match="stiffness is one that lets the structure drift"):
+    with refuses("stiffness"):
         over_records(drifting, {"k": Interval(0.9, 1.1)}, [record], duration=1, step=0.05)
 
 

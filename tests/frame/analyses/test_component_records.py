@@ -13,8 +13,9 @@ from alphacut.frame import (
     rotated_spectra,
 )
 from alphacut.frame.analyses.suites import nominal_mode
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points
+from tests.refused import refuses
 
 SEED = int(np.random.SeedSequence().generate_state(1)[0])
 INPUTS = {"k": Interval(144.0, 156.0)}
@@ -107,17 +108,17 @@ def test_what_has_too_few_components_is_one_line():
     model = plan(rng)
     single = replace(model, components=())
     (pair,) = records(rng, 1, 2)
-    for message, structure, suite, options in [
-        ("ground is of 1 components; allowed: 2, one for each", model, pair[:1], {}),
-        ("ground is of 2 components; allowed: 1, one for each", single, [pair], {}),
-        ("record r0x is of one component; .* for all angles", single, pair[:1], {"all_angles": 1}),
-        ("of one component; .* for RotD50", single, pair[:1], {"measure": "RotD50(T1)"}),
+    for key, structure, suite, options in [
+        ("ground", model, pair[:1], {}),
+        ("ground", single, [pair], {}),
+        ("record r0x", single, pair[:1], {"all_angles": 1}),
+        ("record r0x", single, pair[:1], {"measure": "RotD50(T1)"}),
         ("samples of components", model, [(pair[0], Accelerogram(0.05, np.ones(4)))], {}),
     ]:
-        with pytest.raises(RefusedError, match=message):
+        with refuses(key):
             over_records(structure, INPUTS, suite, **MOTION, **options)
     frame = StoreyFrame(
         stiffness=[8e6], masses=[2e4], yield_force=[3e4], damping_ratio=0.05, outputs=["drift1"]
     )
-    with pytest.raises(RefusedError, match="ground is of 2 components; allowed: one component"):
+    with refuses("ground"):
         over_records(frame, {"k1": Interval(7e6, 9e6)}, [pair], **MOTION, all_angles=True)

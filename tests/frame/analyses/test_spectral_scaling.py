@@ -12,7 +12,7 @@ from alphacut.frame import (
     response_spectrum,
     scale_suite,
 )
-from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
 
 SUITE = read_suite("cases/suite/record-200[1-4].AT2", baseline="mean")
 
@@ -50,16 +50,16 @@ def test_at_a_period_each_record_has_the_value_of_the_target():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("wrong", "key"),
     [
-        ({"period": 2.5}, r"period is .* those of the elastic spectrum .* 0 … 4 s"),
-        ({"period": 0.0}, "period is 0"),
-        ({"fit": "best"}, "fit is best; allowed: record, suite, period"),
-        ({"over": (1.5, 2.0)}, "over is"),
-        ({"suite": [Accelerogram(0.01, np.zeros(9))]}, "zero throughout"),
+        ({"period": 2.5}, "period"),
+        ({"period": 0.0}, "period"),
+        ({"fit": "best"}, "fit"),
+        ({"over": (1.5, 2.0)}, "over"),
+        ({"suite": [Accelerogram(0.01, np.zeros(9))]}, "suite"),
     ],
 )
-def test_what_cannot_be_scaled_is_one_line(wrong, message):
+def test_what_cannot_be_scaled_is_one_line(wrong, key):
     right = {"suite": SUITE, "target": eurocode8_spectrum(2.0, "B"), "period": 0.5}
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         scale_suite(**(right | wrong))

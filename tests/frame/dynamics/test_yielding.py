@@ -21,6 +21,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics import yielding
 from alphacut.frame.dynamics.nonlinear import make_flow
 from alphacut.fuzzy import Interval, Nature, RefusedError, Triangular
+from tests.refused import refuses
 
 MASS, STIFFNESS, YIELD_FORCE = 2.0, 50.0, 3.0
 OMEGA, YIELD_DRIFT = (STIFFNESS / MASS) ** 0.5, YIELD_FORCE / STIFFNESS
@@ -114,7 +115,7 @@ def test_without_yielding_or_with_hardening_1_the_motion_is_the_linear_one(rng):
     for changes in ({"yield_force": [1e15] * 3}, {"hardening": [1.0] * 3}):
         found = motion(replace(frame, **changes), 5.98, 0.02)
         assert (np.abs(found - expected).max(0) <= 1e-11 * np.abs(expected).max(0)).all()
-    with pytest.raises(RefusedError, match="yield"):
+    with refuses("flow"):
         LinearFlow(frame, (), 6.0, 0.02, Exact())
 
 
@@ -169,7 +170,7 @@ def test_weight_on_a_soft_yielding_storey_turns_it_or_brings_it_down(speed):
     yields = phase(elastic.y[:, -1], 1e5, 0.99e5, ends)
     time = elastic.t[-1] + yields.t[-1]
     if speed == 5:
-        with pytest.raises(RefusedError, match=rf"storey 1 .*collapsing .*t = {time:.6g} s"):
+        with pytest.raises(RefusedError, match=rf"storey 1 .* t = {time:.6g} s"):
             motion(frame, 1.0, 0.1)
         return
     peak = yields.y[0, -1]
@@ -205,7 +206,7 @@ def test_peaks_are_searched_and_proofs_are_refused(rng):
     assert flat.nature is Nature.ESTIMATED
     assert flat.lower == pytest.approx(flat.upper, rel=1e-12)
     for method in ("dual", "improved-graph-follower"):
-        with pytest.raises(RefusedError, match="auto, proof or quasi-monte-carlo"):
+        with refuses("method"):
             envelope(frame, inputs, method, **nodes)
     with pytest.raises(UnprovedError, match="one storey"):
         envelope(frame, inputs, "proof", **nodes)

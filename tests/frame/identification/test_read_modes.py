@@ -5,6 +5,7 @@ import pytest
 from alphacut.frame import StoreyFrame, identify, read_modes
 from alphacut.fuzzy import Crisp, Interval, RefusedError
 from tests.frame.records.samples import uff55
+from tests.refused import refuses
 
 MODES = "mode,frequency [Hz],q1,q2\n1,1.5,0.5,1\n1,1.6,0.52,1\n2,4,-1,0.5\n"
 
@@ -57,7 +58,7 @@ def test_a_mode_without_scatter_can_be_held_out_and_not_learned_from(tmp_path):
     learned = identify(frame, inputs, modes, held_out=[2])
     (prediction,) = learned.predictions().held_out
     assert (prediction.mode, prediction.measured) == (2, 4.0)
-    with pytest.raises(RefusedError, match=r"f2 = 4 without scatter; .* frequency_deviation"):
+    with refuses("mode 2"):
         identify(frame, inputs, modes)
 
 
@@ -70,14 +71,14 @@ def test_a_universal_file_is_read_by_the_floors_of_its_unknowns(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "message"),
+    ("name", "options", "key"),
     [
-        ("modes.csv", {"floors": {"1.x": 1}}, "floors is .*; allowed: left out beside a CSV file"),
-        ("modes.uff", {}, "floors is missing; allowed: the floors of its unknowns"),
-        ("modes.csv", {"frequency_deviation": 0}, "frequency_deviation is 0; .* greater than 0"),
-        ("modes.csv", {"shape_deviation": -0.1}, "shape_deviation is -0.1; .* greater than 0"),
+        ("modes.csv", {"floors": {"1.x": 1}}, "floors"),
+        ("modes.uff", {}, "floors"),
+        ("modes.csv", {"frequency_deviation": 0}, "frequency_deviation"),
+        ("modes.csv", {"shape_deviation": -0.1}, "shape_deviation"),
     ],
 )
-def test_other_arguments_are_refused(tmp_path, name, options, message):
-    with pytest.raises(RefusedError, match=message):
+def test_other_arguments_are_refused(tmp_path, name, options, key):
+    with refuses(key):
         read_modes(written(tmp_path, name=name), **options)

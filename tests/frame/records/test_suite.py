@@ -5,6 +5,7 @@ import pytest
 
 from alphacut.frame import Accelerogram, read_matrix, read_modes, read_record, read_suite
 from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
 
 
 def write_column(path, samples):
@@ -47,29 +48,29 @@ def test_what_is_unusual_is_a_remark(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("files", "options", "message"),
+    ("files", "options", "key"),
     [
-        ("*.none", {}, r"files is .*\*.none; allowed: 1 to 500 files, and 0 match"),
-        ([], {}, "files is .*0 match"),
-        (["a.txt", "a.txt"], {}, "files is a; allowed: each file once"),
-        ("a.txt", {"step": 0.0}, "step is 0.0; allowed: finite numbers greater than 0"),
-        ("a.txt", {"step": float("nan")}, "step is nan"),
-        ("a.txt", {"step": 200}, "of 200 samples in a second it is 0.005 s, and 200 ms are 0.2 s"),
-        ("a.txt", {"step": 1e-5}, "a step of 1e-05 s; .*state it in s"),
-        ("a.txt", {"baseline": "median"}, "baseline is median; allowed: none, mean, linear"),
-        ("a.txt", {"unit": "furlongs"}, "furlongs"),
-        ("a.txt", {"unit": 9.81}, "unit is 9.81; allowed: a unit of g"),
-        ("a.txt", {"channel": 2}, 'channel is 2; allowed: a name in quotes, as "2"'),
-        ("a.txt", {"step": "0.01"}, "step is '0.01'; allowed: finite numbers"),
-        (300 * "a", {}, "files is .*0 match"),
-        ("missing.txt", {}, "0 match"),
+        ("*.none", {}, "files"),
+        ([], {}, "files"),
+        (["a.txt", "a.txt"], {}, "files"),
+        ("a.txt", {"step": 0.0}, "step"),
+        ("a.txt", {"step": float("nan")}, "step"),
+        ("a.txt", {"step": 200}, "step"),
+        ("a.txt", {"step": 1e-5}, "step"),
+        ("a.txt", {"baseline": "median"}, "baseline"),
+        ("a.txt", {"unit": "furlongs"}, "unit"),
+        ("a.txt", {"unit": 9.81}, "unit"),
+        ("a.txt", {"channel": 2}, "channel"),
+        ("a.txt", {"step": "0.01"}, "step"),
+        (300 * "a", {}, "files"),
+        ("missing.txt", {}, "files"),
     ],
 )
-def test_other_files_and_arguments_are_refused(tmp_path, files, options, message):
+def test_other_files_and_arguments_are_refused(tmp_path, files, options, key):
     write_column(tmp_path / "a.txt", [1.0, 2.0])
     is_one = isinstance(files, str)
     paths = f"{tmp_path}/{files}" if is_one else [f"{tmp_path}/{name}" for name in files]
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         read_suite(paths, **{"step": 0.02, "unit": "g"} | options)
 
 
@@ -82,5 +83,7 @@ def test_what_is_no_path_is_refused_before_it_is_opened(read, path):
 
 @pytest.mark.parametrize("read", [read_record, read_matrix])
 def test_a_name_that_is_too_long_is_said_to_be(read):
-    with pytest.raises(RefusedError, match=r"(?i)aaa… is file name too long"):
+    with refuses(
+        "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa…"
+    ):
         read(300 * "a" + ".csv")

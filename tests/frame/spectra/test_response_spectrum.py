@@ -12,7 +12,8 @@ from alphacut.frame import (
     rotated_spectra,
     spectral_acceleration,
 )
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import Interval
+from tests.refused import refuses
 
 
 @pytest.mark.parametrize("period", [0.05, 0.3, 2.0])
@@ -49,28 +50,28 @@ def test_the_spectrum_begins_with_the_largest_ground_acceleration():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("wrong", "key"),
     [
-        ({"periods": [0.1, -1.0]}, "periods is -1 s; allowed: 0 s, and"),
-        ({"periods": ["long"]}, "periods is 'long'; allowed: finite numbers"),
-        ({"damping": 1.0}, "damping is 1.0"),
+        ({"periods": [0.1, -1.0]}, "periods"),
+        ({"periods": ["long"]}, "periods"),
+        ({"damping": 1.0}, "damping"),
     ],
 )
-def test_what_has_no_spectrum_is_one_line(wrong, message):
-    with pytest.raises(RefusedError, match=message):
+def test_what_has_no_spectrum_is_one_line(wrong, key):
+    with refuses(key):
         response_spectrum(Accelerogram(0.02, np.ones(3)), **({"periods": 0.3} | wrong))
 
 
 @pytest.mark.parametrize("period", [0.0, -1.0, np.nan, np.inf])
 def test_periods_are_positive_numbers(period):
-    with pytest.raises(RefusedError, match="period is"):
+    with refuses("period"):
         spectral_acceleration(Accelerogram(0.02, np.ones(3)), period, 0.05)
 
 
 def test_a_period_that_no_structure_has_is_refused_before_it_takes_minutes():
     frame = StoreyFrame((50e3,), stiffness=(0.09,), dampers=(0.0,), damper_placement="storey")
     record = Accelerogram(0.02, np.ones(40))
-    with pytest.raises(RefusedError, match=r"first natural period .* as t and MN/m"):
+    with refuses("structure"):
         over_records(frame, {"m1": Interval(49e3, 51e3)}, [record], duration=20.0, step=0.02)
 
 
@@ -90,13 +91,13 @@ def test_rotated_spectra_are_those_of_records_turned_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("second", "periods", "message"),
+    ("second", "periods", "key"),
     [
-        (Accelerogram(0.02, np.ones(4)), 0.3, "3 every 0.02 s and 4 every 0.02 s; allowed: the"),
-        (Accelerogram(0.01, np.ones(3)), 0.3, "3 every 0.02 s and 3 every 0.01 s; allowed: the"),
-        (Accelerogram(0.02, np.ones(3)), -1.0, "periods is -1 s"),
+        (Accelerogram(0.02, np.ones(4)), 0.3, "samples of components"),
+        (Accelerogram(0.01, np.ones(3)), 0.3, "samples of components"),
+        (Accelerogram(0.02, np.ones(3)), -1.0, "periods"),
     ],
 )
-def test_what_cannot_be_rotated_is_one_line(second, periods, message):
-    with pytest.raises(RefusedError, match=message):
+def test_what_cannot_be_rotated_is_one_line(second, periods, key):
+    with refuses(key):
         rotated_spectra(Accelerogram(0.02, np.ones(3)), second, periods)

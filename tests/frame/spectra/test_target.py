@@ -10,7 +10,7 @@ from alphacut.frame import (
     eurocode8_spectrum,
     read_spectrum,
 )
-from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
 
 # Tables 3.2 and 3.3 of EN 1998-1: type, ground type, S, and T_B, T_C, T_D in s.
 EN_1998 = """
@@ -64,30 +64,30 @@ def test_a_table_of_ones_own_is_linear_and_in_the_unit_of_its_head(tmp_path):
     spectrum = read_spectrum(file, damping=0.03)
     assert spectrum(0.2) == pytest.approx(0.4 * 9.80665)
     assert str(spectrum) == "site (of one's own), damping 3.0%, T = 0.1 … 0.3 s"
-    for text, message in (
-        ("T,Sa\n1,2\n", r"site.csv, head is T,Sa; allowed: period \[s\],acc"),
-        ("T [s],Sa [g]\n1,x\n", "row 2, column 2"),
-        ("T [s],Sa [g]\n0,1,5\n1,1\n", "row 2 is 0,1,5; allowed: two numbers"),
-        ("T [s],Sa [g]\n1,2\n0.5,1\n", "spectrum is .* rising"),
+    for text, key in (
+        ("T,Sa\n1,2\n", "site.csv, head"),
+        ("T [s],Sa [g]\n1,x\n", "site.csv, row 2, column 2"),
+        ("T [s],Sa [g]\n0,1,5\n1,1\n", "site.csv, row 2"),
+        ("T [s],Sa [g]\n1,2\n0.5,1\n", "spectrum"),
     ):
         file.write_text(text)
-        with pytest.raises(RefusedError, match=message):
+        with refuses(key):
             read_spectrum(file)
 
 
 @pytest.mark.parametrize(
-    ("build", "message"),
+    ("build", "key"),
     [
-        (lambda: eurocode8_spectrum(2.0, "F"), "ground_type is F; allowed: A, B, C, D, E"),
-        (lambda: eurocode8_spectrum(2.0, "A", spectrum_type=3), "spectrum_type is 3"),
-        (lambda: eurocode8_spectrum(0.0, "A"), "ag is 0"),
-        (lambda: eurocode8_spectrum(2.0, "A", q=5.0, beta=0.6), "beta is 0.6"),
-        (lambda: eurocode8_spectrum(2.0, "A")([1.0, 4.5]), r"period is \[4.5\] s; .* 0 … 4 s"),
-        (lambda: asce7_multi_period(np.ones(21)), "spectrum is .* acceleration for each"),
-        (lambda: asce7_two_period(10.0, 6.0, 0.5), "long_period is 0.5"),
-        (lambda: TargetSpectrum([0.0, 1.0], [1.0, 0.0]), "spectrum is .* positive"),
+        (lambda: eurocode8_spectrum(2.0, "F"), "ground_type"),
+        (lambda: eurocode8_spectrum(2.0, "A", spectrum_type=3), "spectrum_type"),
+        (lambda: eurocode8_spectrum(0.0, "A"), "ag"),
+        (lambda: eurocode8_spectrum(2.0, "A", q=5.0, beta=0.6), "beta"),
+        (lambda: eurocode8_spectrum(2.0, "A")([1.0, 4.5]), "period"),
+        (lambda: asce7_multi_period(np.ones(21)), "spectrum"),
+        (lambda: asce7_two_period(10.0, 6.0, 0.5), "long_period"),
+        (lambda: TargetSpectrum([0.0, 1.0], [1.0, 0.0]), "spectrum"),
     ],
 )
-def test_what_makes_no_spectrum_is_one_line(build, message):
-    with pytest.raises(RefusedError, match=message):
+def test_what_makes_no_spectrum_is_one_line(build, key):
+    with refuses(key):
         build()

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, Force, History, MatrixStructure, envelope, over_records
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points, require_inside
+from tests.refused import refuses
 
 RNG = np.random.default_rng(61)
 X, Y, OTHER = (Accelerogram(0.04, RNG.normal(size=26)) for _ in range(3))
@@ -66,20 +67,20 @@ def test_copies_make_inertia_forces_anew():
 
 
 @pytest.mark.parametrize(
-    ("components", "message"),
+    ("components", "key"),
     [
-        ([(Accelerogram(0.04, np.ones(9)), NORTH)], "26 every 0.04 s and 9 every 0.04 s; allowed"),
-        ([(Accelerogram(0.02, Y.samples), NORTH)], "26 every 0.04 s and 26 every 0.02 s; allowed"),
-        ([(Y, NORTH[:2])], r"influence vector is of shape \(2,\); allowed: \(3,\)"),
-        ([Y], "components is Accelerogram; allowed: a list of pairs"),
-        ([(NORTH, Y)], "components is tuple; allowed: a list of pairs"),
+        ([(Accelerogram(0.04, np.ones(9)), NORTH)], "samples of components"),
+        ([(Accelerogram(0.02, Y.samples), NORTH)], "samples of components"),
+        ([(Y, NORTH[:2])], "influence vector"),
+        ([Y], "components"),
+        ([(NORTH, Y)], "components"),
     ],
 )
-def test_what_is_no_component_is_one_line(components, message):
-    with pytest.raises(RefusedError, match=message):
+def test_what_is_no_component_is_one_line(components, key):
+    with refuses(key):
         replace(PLAN, components=components)
 
 
 def test_a_suite_of_single_records_lacks_a_component():
-    with pytest.raises(RefusedError, match="ground is of 1 components; allowed: 2, one"):
+    with refuses("ground"):
         over_records(PLAN, INPUTS, [OTHER], duration=1.0, step=0.05)

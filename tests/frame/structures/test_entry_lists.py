@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import read_matrix, read_unknowns
-from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
 
 NAMES = ("2.1", "2.2", "10.1")
 MATRIX = np.array([[4.0, -1.5, 0.25], [-1.5, 3.0, 0.0], [0.25, 0.0, 2.0]])
@@ -39,7 +39,7 @@ def test_abaqus_writes_coordinates_without_names(tmp_path, is_full):
     path = tmp_path / "job_STIF1.mtx"
     path.write_text(abaqus_text(MATRIX, "123", is_full=is_full, separator=" "))
     assert np.array_equal(read_matrix(path), MATRIX)
-    with pytest.raises(RefusedError, match=r"without names of unknowns; .* FORMAT=LABELS"):
+    with refuses("job_STIF1.mtx"):
         read_unknowns(path)
 
 
@@ -61,9 +61,9 @@ def test_rows_come_in_the_order_of_the_names_asked_for(tmp_path):
     order = [2, 0, 1]
     matrix = read_matrix(tmp_path / "k.mtx", unknowns=[NAMES[k] for k in order])
     assert np.array_equal(matrix, MATRIX[np.ix_(order, order)])
-    with pytest.raises(RefusedError, match=r"of unknowns 2.1, 2.2, 10.1 .* by number"):
+    with refuses("k.mtx"):
         read_matrix(tmp_path / "k.mtx", unknowns=["2.x", "2.y", "10.x"])
-    with pytest.raises(RefusedError, match="up to 2 rows"):
+    with refuses("k.mtx"):
         read_matrix(tmp_path / "k.mtx", max_rows=2)
 
 
@@ -86,46 +86,46 @@ def test_calculix_names_unknowns_in_a_file_beside(tmp_path, ending):
     assert read_unknowns(path) == NAMES
     path.with_suffix(".dof").unlink()
     assert np.array_equal(read_matrix(path), MATRIX)
-    with pytest.raises(RefusedError, match=r"keep the file .dof of the same name"):
+    with refuses(path.name):
         read_unknowns(path)
 
 
 @pytest.mark.parametrize(
-    ("names", "words"),
+    ("names", "key"),
     [
-        (NAMES[:2], r"beam.dof is of 2 names in 2 lines; allowed: 3 names"),
-        (("2.1", "2.1", "2.2"), "of 2 names in 3 lines; .* the files of one run"),
-        (("2.1", "2-2", "2.3"), "line 2 is 2-2; allowed: NODE.DIRECTION"),
+        (NAMES[:2], "beam.dof"),
+        (("2.1", "2.1", "2.2"), "beam.dof"),
+        (("2.1", "2-2", "2.3"), "beam.dof, line 2"),
     ],
 )
-def test_names_that_do_not_fit_the_matrix_are_refused(tmp_path, names, words):
-    with pytest.raises(RefusedError, match=words):
+def test_names_that_do_not_fit_the_matrix_are_refused(tmp_path, names, key):
+    with refuses(key):
         read_matrix(calculix(tmp_path, names=names))
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "key"),
     [
-        ("1,1, 1,1, 2.0\n1,1, 1,1\n", "with the line '1,1, 1,1'; allowed: 5 numbers"),
-        ("1,1, 1,1, 2.0\n1,1, 1,1, x\n", "mend this line"),
-        ("1,1, 1,1, 2D3\n", "with points and e"),
-        ("1 2\n", "allowed: 5 numbers"),
-        ("*MATRIX,TYPE=STIFFNESS\n1.0\n", r"\*MATRIX OUTPUT writes, as JOB_STIF1.mtx"),
-        ("1,1, 1,1, 2.0\n1,1, 1,1, 3.0\n", r"2 entries at \[1.1, 1.1\]"),
-        ("1,1, 1,1, 2.0\n2,1, 1,1, 3.0\n", r"without \[2.1, 2.1\]; allowed: a diagonal"),
-        ("1 1 2.0\n2 1 3.0\n", r"without \[2, 2\]"),
-        ("0 0 2.0\n", "row or column 0; allowed: 1 or more"),
-        ("1 1.5 2.0\n", "row, column or node 1.5"),
-        ("1 99999999999 2.0\n", "row, column or node 1e"),
-        ("1 900000000 2.0\n", "up to 5000 rows"),
-        ("3 3 3\n1 1 2.0\n2 2 5.0\n3 3 1.0\n", "headed by sizes; .* %%MatrixMarket"),
-        ("1 1 1\n2 2 1\n3 3 1\n2 1 .5\n1 2 .5\n3 1 .5\n", "both triangles at 1 places, one at 1"),
-        ("1 1 1-2\n", "could not convert"),
-        ("1 1 1e999\n", "inf at row 1, column 1"),
+        ("1,1, 1,1, 2.0\n1,1, 1,1\n", "k.mtx"),
+        ("1,1, 1,1, 2.0\n1,1, 1,1, x\n", "k.mtx"),
+        ("1,1, 1,1, 2D3\n", "k.mtx"),
+        ("1 2\n", "k.mtx"),
+        ("*MATRIX,TYPE=STIFFNESS\n1.0\n", "k.mtx"),
+        ("1,1, 1,1, 2.0\n1,1, 1,1, 3.0\n", "k.mtx"),
+        ("1,1, 1,1, 2.0\n2,1, 1,1, 3.0\n", "k.mtx"),
+        ("1 1 2.0\n2 1 3.0\n", "k.mtx"),
+        ("0 0 2.0\n", "k.mtx"),
+        ("1 1.5 2.0\n", "k.mtx"),
+        ("1 99999999999 2.0\n", "k.mtx"),
+        ("1 900000000 2.0\n", "k.mtx"),
+        ("3 3 3\n1 1 2.0\n2 2 5.0\n3 3 1.0\n", "k.mtx"),
+        ("1 1 1\n2 2 1\n3 3 1\n2 1 .5\n1 2 .5\n3 1 .5\n", "k.mtx"),
+        ("1 1 1-2\n", "k.mtx"),
+        ("1 1 1e999\n", "k.mtx"),
     ],
 )
-def test_lists_that_make_no_matrix_are_one_line_with_the_cure(tmp_path, text, words):
+def test_lists_that_make_no_matrix_are_one_line_with_the_cure(tmp_path, text, key):
     (tmp_path / "k.mtx").write_text(text)
-    with pytest.raises(RefusedError, match=words) as caught:
+    with refuses(key) as caught:
         read_matrix(tmp_path / "k.mtx")
     assert len(str(caught.value).splitlines()) == 1

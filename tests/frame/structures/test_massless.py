@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, UnprovedError, envelope
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions
+from tests.refused import refuses
 
 K = np.array([[3.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 1.5, -0.4], [0, 0, -0.4, 1.0]])
 SOIL = np.diag([0, 0, 0, 1.0])
@@ -45,14 +46,14 @@ def test_the_dual_proof_bounds_outputs_that_read_them():
 
 
 @pytest.mark.parametrize(
-    ("values", "match"),
+    ("values", "key"),
     [
-        ({"damping": [(1.0, np.diag([0, 0, 1.0, 0]))]}, "damping is of unknowns.*without mass"),
-        ({"stiffness": [("k", 100 * np.diag([1.0, 1, 1, 0]))]}, "stiffness is not positive"),
-        ({"mass": [(1.0, np.diag([1.0, -1.0, 0, 0]))]}, "mass is not positive definite"),
+        ({"damping": [(1.0, np.diag([0, 0, 1.0, 0]))]}, "damping"),
+        ({"stiffness": [("k", 100 * np.diag([1.0, 1, 1, 0]))]}, "stiffness"),
+        ({"mass": [(1.0, np.diag([1.0, -1.0, 0, 0]))]}, "mass"),
     ],
 )
-def test_what_has_no_motion_is_refused_in_one_line(values, match):
-    with pytest.raises(RefusedError, match=match) as failure:
+def test_what_has_no_motion_is_refused_in_one_line(values, key):
+    with refuses(key) as failure:
         frame(**values)
     assert "\n" not in str(failure.value)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import damping_from_loss
-from alphacut.fuzzy import RefusedError, Triangular
+from alphacut.fuzzy import Triangular
+from tests.refused import refuses
 
 
 def test_joints_come_on_top_on_every_level():
@@ -18,5 +19,5 @@ def test_joints_come_on_top_on_every_level():
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.1, float("nan")])
 def test_a_fraction_of_the_energy_lies_within_0_and_1(fraction):
-    with pytest.raises(RefusedError, match="energy_fraction"):
+    with refuses("energy_fraction"):
         damping_from_loss(0.02, energy_fraction=fraction)

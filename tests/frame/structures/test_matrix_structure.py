@@ -19,7 +19,8 @@ from alphacut.frame import (
     require_envelope,
 )
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions
-from alphacut.fuzzy import Interval, RefusedError
+from alphacut.fuzzy import Interval
+from tests.refused import refuses
 
 MOTION = {"dampers": (0.1, 0.2), "damper_placement": "storey", "q0": (0.1, 0.0), "v0": (0.0, 0.4)}
 HISTORIES = (History(0.3, [1.0, 1.6, 0.4], is_static=True), History.harmonic(1.3, 0.4, 0.35), None)
@@ -100,9 +101,9 @@ def signed_structure(*, mass, stiffness):
 
 
 def test_a_matrix_of_the_other_sign_is_told_to_turn_it():
-    with pytest.raises(RefusedError, match=r"mass is not positive definite: .* seems to be −M"):
+    with refuses("mass"):
         signed_structure(mass=-1.0, stiffness=0.0)
-    with pytest.raises(RefusedError, match=r"negative diagonal in term 2; .* it seems to be −K"):
+    with refuses("stiffness"):
         signed_structure(mass=1.0, stiffness=-3.0)
     assert signed_structure(mass=1.0, stiffness=-0.5).size == 2  # a weight takes some stiffness
 
@@ -117,7 +118,7 @@ def test_the_first_point_without_a_positive_mass_is_told():
         q0=np.array([0.1, 0.0]),
     )
     inputs = {"a": Interval(-1.0, 2.0), "b": Interval(1.0, 3.0)}
-    with pytest.raises(RefusedError, match="mass is not positive definite at a = 2, b = 1;"):
+    with refuses("mass"):
         require_envelope(structure, inputs, duration=1.0, step=0.1)
     inputs["a"] = Interval(-1.0, 1.0)
     require_envelope(structure, inputs, duration=1.0, step=0.1)
@@ -149,7 +150,7 @@ def test_monomials_are_read(text, value):
     ],
 )
 def test_other_expressions_are_refused(text):
-    with pytest.raises(RefusedError):
+    with refuses("factor"):
         Monomial.parse(text)
 
 

@@ -10,6 +10,7 @@ import scipy.sparse
 from alphacut.base import memory
 from alphacut.frame import read_matrix
 from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
 
 MATRIX = np.array([[4.0, -1.5, 0.0], [-1.5, 3.0, -0.25], [0.0, -0.25, 2.0]])
 WRITE = {
@@ -32,26 +33,27 @@ def test_one_of_several_arrays_is_named(tmp_path):
     np.savez(tmp_path / "both.npz", mass=np.eye(3), stiffness=MATRIX)
     assert np.array_equal(read_matrix(tmp_path / "both.npz", name="stiffness"), MATRIX)
     for name in ("", "damping"):
-        with pytest.raises(RefusedError, match="one of mass, stiffness"):
+        with refuses("both.npz"):
             read_matrix(tmp_path / "both.npz", name=name)
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "words"),
+    ("name", "content", "key"),
     [
-        ("k.txt", "1 2\n", "of type .txt"),
-        ("k.csv", "1,2\n3\n", "1 of 2 rows have 2"),
-        ("k.csv", "1,nan\n", "nan at row 1, column 2"),
-        ("k.mtx", "no matrix\n", "k.mtx is no matrix; allowed: %%MatrixMarket"),
-        ("k.npy", "no array", "an array of real numbers as numpy.save"),
+        ("k.txt", "1 2\n", "k.txt"),
+        ("k.csv", "1,2\n3\n", "k.csv, line 2"),
+        ("k.csv", "1,nan\n", "k.csv"),
+        ("k.mtx", "no matrix\n", "k.mtx"),
+        ("k.npy", "no array", "k.npy"),
     ],
 )
-def test_what_is_no_matrix_is_refused(tmp_path, name, content, words):
+def test_what_is_no_matrix_is_refused(tmp_path, name, content, key):
     (tmp_path / name).write_text(content)
-    with pytest.raises(RefusedError, match=words):
+    with refuses(key):
         read_matrix(tmp_path / name)
-    with pytest.raises(RefusedError, match=f"missing{tmp_path.joinpath(name).suffix}"):
-        read_matrix(tmp_path / f"missing{tmp_path.joinpath(name).suffix}")
+    missing = f"missing{tmp_path.joinpath(name).suffix}"
+    with refuses(missing):
+        read_matrix(tmp_path / missing)
 
 
 def refuse_calls(*_, **__):
@@ -105,52 +107,51 @@ HEAD = "%%MatrixMarket matrix coordinate real general\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "key"),
     [
-        (HEAD + "2 2 1\n3 1 5.0\n", "index 3 of rows, counted from 1; allowed: .* from 1 to 2"),
-        (HEAD + "2 2 1\n3 1 5.0\n", "the file states 2 × 2: mend the line of sizes, or the index"),
-        (HEAD + "2 2 1\n1 0 5.0\n", "index 0 of columns, .* count from 0 need 1 added"),
+        (HEAD + "2 2 1\n3 1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 0 5.0\n", "k.mtx"),
         (
             HEAD.replace("general", "symmetric") + "2 2 3\n1 1 5.0\n2 1 1.0\n1 2 1.0\n",
-            "write general in the first line, or leave one triangle out",
+            "k.mtx",
         ),
-        (HEAD.replace("general", "symmetric") + "2 3 1\n1 1 5.0\n", "mend the line of sizes"),
-        (HEAD + "2 2 1\n1 1 5,0\n", "write decimal points"),
-        (HEAD + "2 2 1\n1 1 5D3\n", "1e3 in place of 1D3"),
-        (HEAD + "2 2\n1 1 5.0\n", "as 18 18 42 for 18 rows, 18 columns and 42 entries"),
-        (HEAD.replace("general", "symetric") + "1 1 1\n1 1 5.0\n", "mend or write the first line"),
-        (HEAD + "2 2 1\n1 1.5 5.0\n", "index 1.5 of columns"),
-        (HEAD + "2 2 1\n1 -1 5.0\n", "index -1 of columns"),
-        (HEAD + "2 2 1\n1 1 5.0x\n", "with '1 1 5.0x'"),
-        (HEAD + "2 2 1\n1 1 nan\n", "with '1 1 nan'"),
-        (HEAD + "2 2 1\n1 1 1e\n", "could not convert string to float"),
-        (HEAD + "2 2 2\n1 1 5.0\n", "of 1 entries, where its line of sizes states 2; .* mend the last number"),
-        (HEAD + "2 2 -1\n1 1 5.0\n", "sizes .* whole numbers"),
-        (HEAD + "900000000 900000000 1\n1 1 5.0\n", "900000000 × 900000000; allowed: up to 5000"),
-        (HEAD + "2 2 99999999999999\n1 1 5.0\n", "of 1 entries, where its line of sizes states 99999999999999"),
-        (HEAD.replace("real", "complex") + "1 1 1\n1 1 1 0\n", "coordinate complex"),
-        (HEAD, "sizes"),
+        (HEAD.replace("general", "symmetric") + "2 3 1\n1 1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1 5,0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1 5D3\n", "k.mtx"),
+        (HEAD + "2 2\n1 1 5.0\n", "k.mtx"),
+        (HEAD.replace("general", "symetric") + "1 1 1\n1 1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1.5 5.0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 -1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1 5.0x\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1 nan\n", "k.mtx"),
+        (HEAD + "2 2 1\n1 1 1e\n", "k.mtx"),
+        (HEAD + "2 2 2\n1 1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 -1\n1 1 5.0\n", "k.mtx"),
+        (HEAD + "900000000 900000000 1\n1 1 5.0\n", "k.mtx"),
+        (HEAD + "2 2 99999999999999\n1 1 5.0\n", "k.mtx"),
+        (HEAD.replace("real", "complex") + "1 1 1\n1 1 1 0\n", "k.mtx"),
+        (HEAD, "k.mtx"),
     ],
 )  # fmt: skip
-def test_texts_that_contradict_themselves_are_refused(tmp_path, text, words):
+def test_texts_that_contradict_themselves_are_refused(tmp_path, text, key):
     path = tmp_path / "k.mtx"
     path.write_text(text)
-    with pytest.raises(RefusedError, match=words):
+    with refuses(key):
         read_matrix(path)
 
 
 @pytest.mark.parametrize(
     ("key", "values", "words"),
     [
-        ("indices", [0, 3, 1, 2, 0], "index 4 of columns"),
-        ("indices", [0, -1, 1, 2, 0], "index 0 of columns"),
-        ("indices", [0, 1], "different lengths"),
-        ("indptr", [0, 2, 1, 5], "pointers that do not rise"),
-        ("indptr", [0, 2, 4, 900000000], "pointers that do not rise"),
-        ("indptr", [0, 1, 2, 3, 5], "index 4 of rows"),
-        ("shape", [900000000, 900000000], "up to 5000"),
-        ("shape", [3, 3, 3], "of 3 sides"),
-        ("format", b"bsr", r"of form bsr; .* matrix\.tocsr"),
+        ("indices", [0, 3, 1, 2, 0], "k.npz"),
+        ("indices", [0, -1, 1, 2, 0], "k.npz"),
+        ("indices", [0, 1], "k.npz"),
+        ("indptr", [0, 2, 1, 5], "k.npz"),
+        ("indptr", [0, 2, 4, 900000000], "k.npz"),
+        ("indptr", [0, 1, 2, 3, 5], "k.npz"),
+        ("shape", [900000000, 900000000], "k.npz"),
+        ("shape", [3, 3, 3], "k.npz"),
+        ("format", b"bsr", "k.npz"),
     ],
 )  # fmt: skip
 def test_sparse_arrays_that_contradict_one_another_are_refused(tmp_path, key, values, words):
@@ -164,7 +165,7 @@ def test_sparse_arrays_that_contradict_one_another_are_refused(tmp_path, key, va
     np.savez(tmp_path / "k.npz", **arrays)
     assert read_matrix(tmp_path / "k.npz").sum() == 5
     np.savez(tmp_path / "k.npz", **(arrays | {key: values}))
-    with pytest.raises(RefusedError, match=words):
+    with refuses(words):
         read_matrix(tmp_path / "k.npz")
 
 
@@ -194,17 +195,17 @@ def test_objects_are_no_matrix_and_no_pickle_is_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("array", "cure"),
+    ("array", "key"),
     [
-        (MATRIX[np.newaxis], r"save two dimensions, as array\[0\]"),
-        (MATRIX + 1j, "save its real part"),
-        (MATRIX.astype(object), "save numbers"),
-        (np.where(MATRIX == 0, np.nan, MATRIX), "write finite numbers there"),
+        (MATRIX[np.newaxis], "k.npy"),
+        (MATRIX + 1j, "k.npy"),
+        (MATRIX.astype(object), "k.npy"),
+        (np.where(MATRIX == 0, np.nan, MATRIX), "k.npy"),
     ],
 )
-def test_arrays_that_are_no_matrix_tell_their_cure(tmp_path, array, cure):
+def test_arrays_that_are_no_matrix_tell_their_cure(tmp_path, array, key):
     np.save(tmp_path / "k.npy", array, allow_pickle=True)
-    with pytest.raises(RefusedError, match=cure):
+    with refuses(key):
         read_matrix(tmp_path / "k.npy")
 
 
@@ -212,7 +213,7 @@ def test_a_matrix_larger_than_the_unknowns_is_refused(tmp_path):
     for name, write in WRITE.items():
         write(tmp_path / name)
         assert read_matrix(tmp_path / name, max_rows=3).shape == (3, 3)
-        with pytest.raises(RefusedError, match="3 × 3; allowed: up to 2 rows"):
+        with refuses(name):
             read_matrix(tmp_path / name, max_rows=2)
 
 
@@ -220,5 +221,5 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
     np.savez_compressed(tmp_path / "k.npz", k=np.zeros((200, 200)))
     assert read_matrix(tmp_path / "k.npz").shape == (200, 200)
     monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
-    with pytest.raises(RefusedError, match=r"takes 0\.00064 GB"):
+    with refuses("k.npz:k"):
         read_matrix(tmp_path / "k.npz")

@@ -21,7 +21,8 @@ from alphacut.frame import (
     pendulum,
 )
 from alphacut.frame.verification.step_error import MARGIN, node_deviation
-from alphacut.fuzzy import FailedError, Interval, RefusedError, Triangular
+from alphacut.fuzzy import FailedError, Interval, Triangular
+from tests.refused import refuses
 
 DUFFING = LagrangianSystem(
     1,
@@ -87,7 +88,7 @@ def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be(rng):
 
 def test_motions_that_do_not_exist_and_steps_that_fail_are_named():
     frame = StoreyFrame((10.0, 20.0), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.1))
-    with pytest.raises(RefusedError, match=r"singular matrix at m1 = 0"):
+    with refuses("trajectory"):
         LinearFlow(frame, ("m1",), 1, 0.1, Exact()).values(np.array([[1e4], [0.0], [2e4]]))
     with pytest.raises(FailedError, match=r"did not converge.*it failed at a = 1e\+30"):
         LagrangianFlow(DUFFING, ("a",), 4, 1.0).values(np.array([[0.5], [0.4], [1e30], [0.3]]))

@@ -14,10 +14,10 @@ from alphacut.fuzzy import (
     FailedError,
     General,
     Reduced,
-    RefusedError,
     Triangular,
     propagate,
 )
+from tests.refused import refuses
 
 calls = []
 INPUTS = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
@@ -48,15 +48,15 @@ def run(function=model, method=None, **options):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "key"),
     [
-        ({"alpha": 5}, "alpha is 5; allowed: a list of levels"),
-        ({"knowledge": {"a": 1}}, "knowledge is .*; allowed: facts"),
-        ({"store": 3, "identity": {"version": 1}}, "store is 3; allowed: the path"),
+        ({"alpha": 5}, "alpha"),
+        ({"knowledge": {"a": 1}}, "knowledge"),
+        ({"store": 3, "identity": {"version": 1}}, "store"),
     ],
 )
-def test_arguments_of_another_kind_are_refused(options, message):
-    with pytest.raises(RefusedError, match=message):
+def test_arguments_of_another_kind_are_refused(options, key):
+    with refuses(key):
         run(**options)
 
 
@@ -92,7 +92,7 @@ def test_a_cluster_of_dask_is_an_executor():
         distributed.Client(cluster) as client,
     ):
         assert bits(run(executor=client.get_executor())) == bits(run())
-        with pytest.raises(RefusedError, match=r"client.get_executor\(\)"):
+        with refuses("executor"):
             run(executor=client)
 
 

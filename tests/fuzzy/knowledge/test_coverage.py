@@ -10,6 +10,7 @@ from scipy import stats
 from alphacut.fuzzy import RefusedError, from_data, propagate
 from alphacut.fuzzy.knowledge.order_statistics import windows
 from benchmarks.fuzzy.coverage import LAWS, held, ways
+from tests.refused import refuses
 
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
 
@@ -94,13 +95,13 @@ def test_the_mean_of_normal_values_scales_with_their_unit(unit):
 
 @pytest.mark.parametrize("values", [[True, 0.5], [(1.0, 2.0), 0.5], [np.True_, 1.0], [10**400]])
 def test_truth_values_pairs_and_numbers_beyond_floats_are_no_measurements(values):
-    with pytest.raises(RefusedError, match="value 1"):
+    with refuses("value 1"):
         from_data(values, "next value")
 
 
 @pytest.mark.parametrize("values", [5, None, {1.0, 2.0}, iter([1.0, 2.0])])
 def test_what_has_no_order_is_no_list_of_measurements(values):
-    with pytest.raises(RefusedError, match=r"values is .*; allowed: a list"):
+    with refuses("values"):
         from_data(values, "next value")
 
 
@@ -115,5 +116,5 @@ def test_a_column_of_pandas_is_a_list_of_measurements_and_of_levels():
 
 @pytest.mark.parametrize("bounds", [5, (1,), (0, 3, 9), (3, 0)])
 def test_bounds_are_two(bounds):
-    with pytest.raises(RefusedError, match=r"bounds is .*; allowed: \(lower, upper\)"):
+    with refuses("bounds"):
         from_data([1.0, 2.0], "median", bounds=bounds)

@@ -6,7 +6,6 @@ import pytest
 from alphacut.fuzzy import (
     Automatic,
     Knowledge,
-    RefusedError,
     Signed,
     Triangular,
     from_data,
@@ -14,6 +13,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from benchmarks.fuzzy.coverage import jointly_held
+from tests.refused import refuses
 
 BOUNDS = (0, 100)
 FIRST = from_data(np.arange(1.0, 20.0), "next value", bounds=BOUNDS)
@@ -71,7 +71,7 @@ def test_a_result_hands_its_claim_on_in_steps():
 
 
 def test_kinds_are_mixed_only_under_a_name():
-    with pytest.raises(RefusedError) as refused:
+    with refuses("claims of the inputs") as refused:
         propagate(total, {"x": FIRST, "y": MEAN})
     assert refused.value.value == ["mean", "next value"]
     named = jointly({"x": FIRST, "y": MEAN}, means="drift of the next frame")
@@ -80,14 +80,14 @@ def test_kinds_are_mixed_only_under_a_name():
 
 
 def test_one_sample_is_not_independent_of_itself():
-    with pytest.raises(RefusedError) as refused:
+    with refuses("independent") as refused:
         jointly({"x": FIRST, "y": FIRST}, independent=True)
     assert refused.value.cure == "x and y rest on the same values"
 
 
 def test_what_values_do_not_decide_is_refused_at_the_joint_level():
     few = from_data([1.0, 2.0, 3.0, 4.0, 5.0], "next value")
-    with pytest.raises(RefusedError, match=r"levels from 0.6667 on"):
+    with refuses("alpha of the next value"):
         propagate(total, {"x": few, "y": few}, alpha=[0.5, 0.75])
     result = propagate(total, {"x": few, "y": few}, Signed(), alpha=[0.7])
     assert result.upper[0, 0] == 10

@@ -14,6 +14,7 @@ from alphacut.fuzzy import RefusedError
 from alphacut.rve import read_image
 from alphacut.rve.image.files import files_of
 from alphacut.rve.image.memory import needed_memory, require_memory
+from tests.refused import refuses
 
 tifffile = pytest.importorskip("tifffile")
 SHAPE = 12, 5, 7
@@ -164,7 +165,7 @@ def test_what_is_no_volume_of_numbers_is_one_line(tmp_path, name, write, message
 def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
     slices(tmp_path / "slices", np.zeros((3, 5, 6), np.uint8))
     Image.fromarray(np.zeros((5, 7), np.uint8)).save(tmp_path / "slices/slice4.png")
-    with pytest.raises(RefusedError, match=r"slice4\.png"):
+    with refuses("slice4.png"):
         voxels_of(tmp_path / "slices")
     meta_image(tmp_path / "c.mhd", np.zeros(SHAPE, "u1"), head="ElementSpacing = 1 1 2\n")
     assert voxels_of(tmp_path / "c.mhd", (2, 1, 1)).shape == SHAPE
@@ -176,7 +177,7 @@ def test_slices_that_are_not_alike_and_bent_voxels_are_told(tmp_path):
     [((10**4,) * 3, "10000 × 10000 × 10000 voxels"), ((10**6,) * 2, "1000000 × 1000000 pixels")],
 )
 def test_a_grid_too_large_is_told_what_fits(shape, what):
-    with pytest.raises(RefusedError, match=rf"{what}.*crop a piece of \d+ × "):
+    with refuses("image"):
         require_memory(shape)
 
 
@@ -213,7 +214,7 @@ def test_a_mask_whose_white_is_zero_is_refused_with_its_fraction(tmp_path):
         if photometric:
             assert pixels_of(tmp_path / "mask.tif").mean() == 0.25
             continue
-        with pytest.raises(RefusedError, match=r"white as zero, bright on 0\.25"):
+        with refuses("mask.tif"):
             pixels_of(tmp_path / "mask.tif")
 
 
@@ -236,9 +237,8 @@ def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
         np.save(path, content)
     else:
         pytest.importorskip("PIL.Image").fromarray(content).save(path)
-    with pytest.raises(RefusedError) as error:
+    with refuses(name):
         pixels_of(path)
-    assert error.value.key == name
 
 
 @pytest.mark.parametrize("word", ["True", "true", "T", "1", "t"])
@@ -270,7 +270,7 @@ def test_compressed_volumes_and_those_at_the_end_of_a_file_are_read(tmp_path, rn
     assert np.array_equal(voxels_of(tmp_path / "gzip.nrrd"), values)
     for packed in (gzip.compress(bytes(10**7)), gzip.compress(b"few")):
         (tmp_path / "gzip.nrrd").write_bytes(head + packed)
-        with pytest.raises(RefusedError, match="bytes unpacked; allowed: 420 for"):
+        with refuses("gzip.nrrd"):
             voxels_of(tmp_path / "gzip.nrrd")
 
 
@@ -343,7 +343,7 @@ def test_a_stack_that_promises_more_than_its_file_holds_is_refused(tmp_path):
     for place in places:
         content = content[:place] + (4000).to_bytes(4, "little") + content[place + 4 :]
     (tmp_path / "a.tif").write_bytes(content)
-    with pytest.raises(RefusedError, match=r"3 × 4000 × 50; allowed: what \d+ bytes can hold"):
+    with refuses("a.tif"):
         voxels_of(tmp_path / "a.tif")
 
 
@@ -362,7 +362,7 @@ def test_pages_of_pillow_are_a_stack_whatever_their_compression(tmp_path, rng):
         with tifffile.TiffWriter(tmp_path / "unlike.tif") as file:
             for page in (values[0], values[1, 1:]):
                 file.write(page, contiguous=False)
-        with pytest.raises(RefusedError, match="2 series"):
+        with refuses("unlike.tif"):
             voxels_of(tmp_path / "unlike.tif")
 
 
@@ -377,7 +377,7 @@ def test_colours_that_are_equal_are_grey_values(tmp_path, rng):
     clear = grey.convert("RGBA")
     clear.putpixel((0, 0), (7, 7, 7, 100))
     clear.save(tmp_path / "clear.png")
-    with pytest.raises(RefusedError, match="transparent in places"):
+    with refuses("clear.png"):
         pixels_of(tmp_path / "clear.png")
 
 
@@ -392,11 +392,11 @@ def test_the_number_that_changes_in_names_is_that_of_the_slice(tmp_path, rng, na
 @pytest.mark.parametrize("spacing", [0, np.inf, "1", (), (1e-3, np.nan), (1e-3, "1")])
 def test_lengths_of_pixels_that_are_no_positive_numbers_are_refused(tmp_path, spacing):
     np.save(tmp_path / "a.npy", np.eye(4))
-    with pytest.raises(RefusedError, match="spacing is"):
+    with refuses("spacing"):
         read_image(tmp_path / "a.npy", spacing=spacing)
 
 
-@pytest.mark.parametrize("name", ["b.npy", "b.png", "b.mhd"])
-def test_a_missing_image_is_refused_by_its_name(tmp_path, name):
-    with pytest.raises(RefusedError, match=name):
-        read_image(tmp_path / name, spacing=np.float32(1.0))
+@pytest.mark.parametrize("key", ["b.npy", "b.png", "b.mhd"])
+def test_a_missing_image_is_refused_by_its_name(tmp_path, key):
+    with refuses(key):
+        read_image(tmp_path / key, spacing=np.float32(1.0))

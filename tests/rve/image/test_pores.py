@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.fuzzy import Interval, RefusedError, Triangular, from_data
+from alphacut.fuzzy import Interval, Triangular, from_data
 from alphacut.rve import GreyImage, fuzzy_image_stiffness
+from tests.refused import refuses
 from tests.rve.image.test_fields import closed_pores
 
 E, NU = 1e9, 0.25
@@ -130,7 +131,7 @@ def test_cuts_of_pores_of_a_fuzzy_extent_are_nested():
 def test_an_image_that_may_be_void_throughout_is_refused():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     phase = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
-    with pytest.raises(RefusedError, match="modulus of the phases is 0"):
+    with refuses("modulus of the phases"):
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
     found = fuzzy_image_stiffness(
         image, [phase, phase], labels=(0, 1), alpha=(0.5, 1.0), progress=False
@@ -142,7 +143,7 @@ def test_an_image_of_pores_and_what_may_be_rigid_is_refused():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     pore = {"modulus": Triangular(0.0, 1e9, 2e9), "poisson": 0.3}
     rigid = {"modulus": Interval(1e9, 1e18), "poisson": 0.3}
-    with pytest.raises(RefusedError, match="modulus of the phases is 0 or infinite throughout"):
+    with refuses("modulus of the phases"):
         fuzzy_image_stiffness(image, [pore, rigid], labels=(0, 1), progress=False)
 
 
@@ -150,47 +151,47 @@ def test_an_image_of_pores_and_what_may_be_rigid_is_refused():
 def test_levels_of_an_image_that_do_not_rise_are_refused(alpha):
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     phases = [{"modulus": modulus, "poisson": 0.3} for modulus in (1e9, 2e9)]
-    with pytest.raises(RefusedError, match="alpha is"):
+    with refuses("alpha"):
         fuzzy_image_stiffness(image, phases, labels=(0, 1), alpha=alpha, progress=False)
 
 
 @pytest.mark.parametrize(
-    ("lengths", "modulus", "message"),
+    ("lengths", "modulus", "key"),
     [
-        ((1e-3, 0.0), 1e9, "lengths is .* positive"),
-        ((1e-3, 1e-3), "1 GPa", "modulus of a phase is '1 GPa'"),
-        ((1e-3, 1e-3), None, "modulus of a phase is None"),
+        ((1e-3, 0.0), 1e9, "lengths"),
+        ((1e-3, 1e-3), "1 GPa", "modulus of a phase"),
+        ((1e-3, 1e-3), None, "modulus of a phase"),
     ],
 )
-def test_lengths_and_moduli_that_are_no_numbers_are_refused(lengths, modulus, message):
+def test_lengths_and_moduli_that_are_no_numbers_are_refused(lengths, modulus, key):
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), lengths)
     phases = [{"modulus": x, "poisson": 0.3} for x in (modulus, 2e9)]
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         fuzzy_image_stiffness(image, phases, labels=(0, 1), progress=False)
 
 
 def test_a_loss_factor_of_a_phase_that_may_be_negative_is_refused():
     image = GreyImage(np.kron([[0, 1], [1, 0]], np.ones((4, 4))), (1e-3, 1e-3))
     phase = {"modulus": 1e9, "poisson": 0.3, "loss": Triangular(-0.01, 0.0, 0.05)}
-    with pytest.raises(RefusedError, match=r"loss of a phase is from -0\.01"):
+    with refuses("loss of a phase"):
         fuzzy_image_stiffness(image, [phase, phase], labels=(0, 1), progress=False)
 
 
 @pytest.mark.parametrize(
-    ("modulus", "loss", "message"),
+    ("modulus", "loss", "key"),
     [
-        (0.0, 0.01, "none beside pores that percolate or a rigid phase"),
-        (1e18, 0.01, "none beside pores that percolate or a rigid phase"),
-        (2e9, None, "loss is of 1 phases; allowed: each"),
+        (0.0, 0.01, "loss"),
+        (1e18, 0.01, "loss"),
+        (2e9, None, "loss"),
     ],
 )
-def test_loss_factors_without_both_bounds_of_the_stiffness_are_refused(modulus, loss, message):
+def test_loss_factors_without_both_bounds_of_the_stiffness_are_refused(modulus, loss, key):
     image = GreyImage(np.kron([[0, 1], [0, 1]], np.ones((4, 4))), (1e-3, 1e-3))
     phases = [{"modulus": x, "poisson": 0.3} for x in (1e9, modulus)]
     phases[0]["loss"] = 0.02
     if loss is not None:
         phases[1]["loss"] = loss
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         fuzzy_image_stiffness(image, phases, labels=(0, 1), progress=False)
 
 

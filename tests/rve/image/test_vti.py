@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import RefusedError
 from alphacut.rve import GreyImage, image_fields
+from tests.refused import refuses
 
 PHASES = [{"modulus": 20e9, "poisson": 0.3}, {"modulus": 60e9, "poisson": 0.2}]
 
@@ -74,5 +74,5 @@ def test_bounds_that_are_missing_have_no_field(tmp_path):
     fields = fields_of(labels, (1e-6, 1e-6), pores)
     assert fields.stress is None
     fields.write(tmp_path / "a.vti")
-    with pytest.raises(RefusedError, match=r"ends in \.vti"):
+    with refuses("file"):
         fields.write(tmp_path / "a.vtk")

@@ -5,9 +5,9 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy import RefusedError
 from alphacut.rve import LevelSetModel, Phase, SeriesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+from tests.refused import refuses
 
 CONE, LAW = HermiteMap(0.2, 0.1, 0.7, 0.1), TruncatedNormal(-3, 3)
 PHASES = {"inclusion": Phase(80e9), "matrix": Phase(20e9)}
@@ -35,19 +35,19 @@ def test_the_cone_of_a_map_is_too_stiff_by_first_order_and_declares_no_error():
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "key"),
     [
-        (lambda: solve(lambda x, y, t: np.sqrt(x), 0.5), "level set is NaN"),
-        (lambda: solve(lambda x, y, t: 1.0, 0.5), r"gives shape \(\) at points of shape"),
-        (lambda: solve(lambda x, y, t: np.hypot(x, y) < 0.5, 0.5), r"a mask .*0\.5 - mask"),
-        (lambda: solve(lambda x, y, t: (np.hypot(x, y) < 0.5) * 1, 0.5), r"from 0 to 1 .*- mask"),
-        (lambda: solve(lambda x, y, t: 500 - np.hypot(x, y), 0.5), "without a change of sign"),
-        (lambda: solve(lambda x, y, t: np.hypot(x, y) - 500, 0.5), "without a change of sign"),
-        (lambda: solve(cone, 0.5, law=CONE), "law of θ is HermiteMap"),
-        (lambda: solve(cone, 0.5, phases={"matrix": Phase(1e9)}), "without 'inclusion'"),
+        (lambda: solve(lambda x, y, t: np.sqrt(x), 0.5), "level set"),
+        (lambda: solve(lambda x, y, t: 1.0, 0.5), "level set"),
+        (lambda: solve(lambda x, y, t: np.hypot(x, y) < 0.5, 0.5), "level set"),
+        (lambda: solve(lambda x, y, t: (np.hypot(x, y) < 0.5) * 1, 0.5), "level set"),
+        (lambda: solve(lambda x, y, t: 500 - np.hypot(x, y), 0.5), "level set"),
+        (lambda: solve(lambda x, y, t: np.hypot(x, y) - 500, 0.5), "level set"),
+        (lambda: solve(cone, 0.5, law=CONE), "law of θ"),
+        (lambda: solve(cone, 0.5, phases={"matrix": Phase(1e9)}), "phase"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value")
-def test_what_is_no_level_set_is_refused(make, message):
-    with pytest.raises(RefusedError, match=message):
+def test_what_is_no_level_set_is_refused(make, key):
+    with refuses(key):
         make()

@@ -16,6 +16,7 @@ from alphacut.rve import Ellipse, MeshModel, Phase, PrismModel, SeriesModel
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import write
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+from tests.refused import refuses
 
 MESHES = Path(__file__).parents[3] / "meshes"
 LAW, PAPER = TruncatedNormal(-3, 3), HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -182,25 +183,25 @@ def test_levels_may_be_uneven(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("law", "phases", "message"),
+    ("law", "phases", "key"),
     [
-        (LAW, {"matrix": SOFT}, "phase is without 'ring'; .* matrix, ring, particle"),
+        (LAW, {"matrix": SOFT}, "phase"),
         (
             LAW,
             dict.fromkeys(("matrix", "ring", "particle", "glue"), SOFT),
-            "phase is 'glue'; .*write the names of the mesh",
+            "phase",
         ),
-        (LAW, SOFT, "phases of the mesh is Phase"),
-        (LAW, {"matrix": SOFT, "ring": 3, "particle": HARD}, "phase 'ring' is 3"),
+        (LAW, SOFT, "phases of the mesh"),
+        (LAW, {"matrix": SOFT, "ring": 3, "particle": HARD}, "phase 'ring'"),
         (
             TruncatedNormal(-2, 3),
             dict.fromkeys(("matrix", "ring", "particle"), SOFT),
-            "law of θ is on -2 … 3; allowed: laws on -3 … 3, .*a case has radius.theta = .-3, 3.",
+            "law of θ",
         ),
     ],
 )
-def test_law_and_phases_that_do_not_fit_are_refused(law, phases, message):
-    with pytest.raises(RefusedError, match=message):
+def test_law_and_phases_that_do_not_fit_are_refused(law, phases, key):
+    with refuses(key):
         MeshModel(MESHES / "ring.msh").solve(law, phases)
 
 
@@ -303,7 +304,7 @@ def test_gmsh_is_handed_nothing_but_meshes(tmp_path, monkeypatch, content):
     for name in ("cell.msh", "cell.geo", "cell"):
         path = tmp_path / name
         path.write_text(content)
-        with pytest.raises(RefusedError, match=r"without \$MeshFormat at its start"):
+        with refuses("mesh.file"):
             grid_of(path)
 
 
@@ -367,34 +368,34 @@ $EndElements
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "key"),
     [
-        ("4.1 0 8", "4 0 8", "of version 4 .*write it as MSH 4.1 or 2.2"),
-        ("4.1 0 8", "4.1 0 4", "numbers of 4 bytes"),
-        ("4.1 0 8", "text", 'without the line "4.1 0 8" .*write it anew'),
-        ("4.1 0 8\n", "", 'without the line "4.1 0 8"'),
-        ("4.1 0 8", "4.1 1 8", r"in text, where .* says bytes \(1\)"),
-        ("0 0 0\n$End", "0 0 \0\n$End", r"in bytes, where .* says text \(0\)"),
-        ("$EndNodes", "", "cut off inside .Nodes.*copy the file anew"),
-        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 999999999", "promised and fewer there"),
-        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 -1", "below 0"),
-        ("1 1 1 1\n3 1 0 1", "1 2 1 1\n3 1 0 1", "2 nodes promised and 1 there"),
-        ("1 1 1 1\n3 1 15 1", "99 1 1 1\n3 1 15 1", "promised and fewer there"),
-        ("3 1 15 1", "3 1 77 1", "of the unknown type 77"),
-        ("1 1\n$EndE", "1 9\n$EndE", "whose node is not there"),
-        ("1 1\n$EndE", "1 1.5\n$EndE", "no whole number"),
-        ("0 0 0\n$End", "0 0 nan\n$End", "whose place is no number"),
-        ("0 0 0\n$End", "0 0 0x\n$End", "could not convert"),
-        ("0 0 0\n$End", "0 0,5 0\n$End", "decimal commas: write points"),
-        ("$EndElements", "", "cut off inside .Elements"),
-        ("$Nodes", "$Knots", "cut off inside .Knots"),
-        ("$EndNodes\n", "$EndNodes\n$Nodes\n0\n$EndNodes\n", "two meshes in one file"),
+        ("4.1 0 8", "4 0 8", "mesh.file"),
+        ("4.1 0 8", "4.1 0 4", "mesh.file"),
+        ("4.1 0 8", "text", "mesh.file"),
+        ("4.1 0 8\n", "", "mesh.file"),
+        ("4.1 0 8", "4.1 1 8", "mesh.file"),
+        ("0 0 0\n$End", "0 0 \0\n$End", "mesh.file"),
+        ("$EndNodes", "", "mesh.file"),
+        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 999999999", "mesh.file"),
+        ("1 1 1 1\n3 1 0 1", "1 1 1 1\n3 1 0 -1", "mesh.file"),
+        ("1 1 1 1\n3 1 0 1", "1 2 1 1\n3 1 0 1", "mesh.file"),
+        ("1 1 1 1\n3 1 15 1", "99 1 1 1\n3 1 15 1", "mesh.file"),
+        ("3 1 15 1", "3 1 77 1", "mesh.file"),
+        ("1 1\n$EndE", "1 9\n$EndE", "mesh.file"),
+        ("1 1\n$EndE", "1 1.5\n$EndE", "mesh.file"),
+        ("0 0 0\n$End", "0 0 nan\n$End", "mesh.file"),
+        ("0 0 0\n$End", "0 0 0x\n$End", "mesh.file"),
+        ("0 0 0\n$End", "0 0,5 0\n$End", "mesh.file"),
+        ("$EndElements", "", "mesh.file"),
+        ("$Nodes", "$Knots", "mesh.file"),
+        ("$EndNodes\n", "$EndNodes\n$Nodes\n0\n$EndNodes\n", "mesh.file"),
     ],
 )  # fmt: skip
-def test_a_mesh_that_contradicts_itself_is_refused(tmp_path, old, new, message):
+def test_a_mesh_that_contradicts_itself_is_refused(tmp_path, old, new, key):
     assert old in TEXT
     (tmp_path / "cell.msh").write_text(TEXT.replace(old, new, 1))
-    with pytest.raises(RefusedError, match=message):
+    with refuses(key):
         grid_of(tmp_path / "cell.msh")
 
 
@@ -409,7 +410,7 @@ def test_a_node_of_version_2_without_a_whole_tag_is_refused(tmp_path, tag):
     head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
     nodes = f"$Nodes\n1\n{tag} 0 0 0\n$EndNodes\n$Elements\n0\n$EndElements\n"
     (tmp_path / "cell.msh").write_text(head + nodes)
-    with pytest.raises(RefusedError, match="no whole number"):
+    with refuses("mesh.file"):
         grid_of(tmp_path / "cell.msh")
 
 
@@ -476,7 +477,7 @@ def centres(grid):
 
 
 def test_refine_is_a_bool():
-    with pytest.raises(RefusedError, match="refine is 'no'; allowed: True or False"):
+    with refuses("refine"):
         MeshModel("own.msh", refine="no")
 
 

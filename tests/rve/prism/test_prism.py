@@ -19,6 +19,7 @@ from alphacut.rve import (
 )
 from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.stochastic import HermiteMap
+from tests.refused import refuses
 from tests.rve.series.test_series import EXACT
 from tests.stochastic.test_laws import Own
 
@@ -251,7 +252,7 @@ def test_a_solver_that_needs_entries_gets_the_form_over_prisms():
 
 
 def test_nearly_incompressible_phases_are_referred_to_the_series():
-    with pytest.raises(RefusedError, match=r"Poisson's ratio is 0.46; .* take the series"):
+    with refuses("Poisson's ratio"):
         solve(particle=Phase(80e9, 0.46))
 
 
@@ -263,7 +264,7 @@ class Empty(Own):
 
 
 def test_layers_without_probability_are_refused():
-    with pytest.raises(RefusedError, match=r"density of θ at .* is 0; allowed: positive densities"):
+    with refuses("density of θ at 0.02818"):
         solve(HermiteMap(0.2, 0.1, 0.8, 0.2, Empty()), mesh_size=0.3, layers=4)
 
 
