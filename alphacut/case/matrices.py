@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -82,10 +83,12 @@ def _array(file: str, info: ValidationInfo) -> Array:
     rows = len(unknowns) or MAX_ROWS
     array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
     if unknowns:
+        names = unknowns
         with suppress(RefusedError):  # of files that name no unknowns
-            context = {} if info.context is None else info.context
-            unnamed = [x for x in read_unknowns(path, name=member) if x not in unknowns]
-            context["unnamed"] = context.get("unnamed", {}) | dict.fromkeys(unnamed)
+            names = read_unknowns(path, name=member)
+        context = {} if info.context is None else info.context
+        of_files = context.setdefault("names_of_files", {}).setdefault(info.field_name, {})
+        of_files.update(dict.fromkeys(names))
         _require_shape(path.name, array, rows)
         require_symmetric(path.name, array, unknowns)
     # A term of zeros does nothing: its author meant another array.
@@ -289,12 +292,14 @@ class MatricesSection(StructureSection):
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
-    _unnamed: tuple[str, ...] = ()
+    # Names of unknowns in the files of "mass", "stiffness" and "damping". A file without names
+    # counts as one that names all unknowns of the case.
+    _names_of_files: Mapping[str, Collection[str]] = {}
 
     @model_validator(mode="after")
-    def _keep_unnamed(self, info: ValidationInfo) -> Self:
-        """Keep the names of unknowns of the files that the case does not name, for a warning."""
-        self._unnamed = tuple((info.context or {}).get("unnamed", ()))
+    def _keep_names_of_files(self, info: ValidationInfo) -> Self:
+        """Keep the names of unknowns that the files have, for warnings."""
+        self._names_of_files = (info.context or {}).get("names_of_files", {})
         return self
 
     @property
@@ -378,12 +383,26 @@ class MatricesSection(StructureSection):
             used.update(dict(factor.powers))
         for output in self.outputs.values():
             used.update(dict(output.factor.powers))
-        if names := self._unnamed:
-            shown = ", ".join(names[:6])
-            yield f"{len(names)} unknowns of the files are not named, and so are held: {shown}"
+        yield from self.file_warnings()
         for name, number in self.parameters.items():
             if number.support.width > 0 and name not in used:
                 yield f"matrices.parameters.{name} is in no factor: is a name misspelt?"
+
+    def file_warnings(self) -> Iterator[str]:
+        """Yield sentences on unknowns that the case, or only one of M and K, does not name."""
+        names = dict.fromkeys(chain.from_iterable(self._names_of_files.values()))
+        if unnamed := [name for name in names if name not in self.unknowns]:
+            shown = ", ".join(unnamed[:6])
+            yield f"{len(unnamed)} unknowns of the files are not named, and so are held: {shown}"
+        for key, other in (("mass", "stiffness"), ("stiffness", "mass")):
+            of_key = self._names_of_files.get(key, ())
+            of_other = self._names_of_files.get(other, ())
+            if missing := [x for x in self.unknowns if x in of_other and x not in of_key]:
+                shown = ", ".join(missing[:6])
+                yield (
+                    f"the files of matrices.{key} do not name {len(missing)} unknowns that those "
+                    f"of {other} name, whose rows are zeros: {shown}; is a file cut off?"
+                )
 
     def _direction_warnings(self, structure: Structure | None) -> Iterator[str]:
         """Yield a sentence on two horizontal directions that are no motions of one ground.

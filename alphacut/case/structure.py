@@ -297,6 +297,10 @@ class StructureSection(Section):
         """
         yield from ()
 
+    def file_warnings(self) -> Iterator[str]:
+        """Yield a sentence for each doubt about the files of the section; a run tells them too."""
+        yield from ()
+
 
 class Frame(StructureSection):
     """Storey frame: rigid floors on elastic columns, numbered from the ground.

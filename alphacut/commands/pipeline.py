@@ -146,6 +146,9 @@ class Pipeline:
         results = self.results
         stages = self.content.stages
         self.store.progress.foresee(self._kinds_of_stages())
+        if (section := self.content.structure_section) is not None:
+            for warning in section.file_warnings():
+                say(f"warning: {warning}")
         if "microstructure" in stages:
             results.microstructure = self.compute_microstructure()
             numbers = results.microstructure.numbers["radius"]

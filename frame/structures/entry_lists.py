@@ -19,7 +19,7 @@ from alphacut.base.array_files import Numbers
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.memory import require_free_memory, require_text
-from alphacut.frame.structures.matrix_market import numbers_in, require_size
+from alphacut.frame.structures.matrix_market import numbers_in, require_last_line, require_size
 
 
 class NamedMatrix(NamedTuple):
@@ -73,7 +73,8 @@ def read_calculix(path: Path, content: bytes, *, max_rows: int) -> NamedMatrix:
 
     Raises:
         RefusedError: A line is not of row, column and value; the entries make no symmetric matrix;
-            or the file .dof has other lines than NODE.DIRECTION, or not one for each row.
+            or the file .dof has other lines than NODE.DIRECTION, or not one for each row, or its
+            last line does not end.
         OSError: The file .dof cannot be read.
     """
     lines = [line for line in content.splitlines() if line.strip()]
@@ -84,7 +85,9 @@ def read_calculix(path: Path, content: bytes, *, max_rows: int) -> NamedMatrix:
     if not beside.exists():
         return NamedMatrix(array)
     require_text(beside)
-    unknowns = tuple(beside.read_text(encoding="ascii", errors="replace").split())
+    text = beside.read_bytes()
+    require_last_line(beside.name, text)
+    unknowns = tuple(text.decode("ascii", "replace").split())
     for line, unknown in enumerate(unknowns, 1):
         is_name = re.fullmatch(r"-?\d+\.\d+", unknown)
         allowed = "NODE.DIRECTION, as 12.1"

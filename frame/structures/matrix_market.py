@@ -88,6 +88,23 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     return matrix
 
 
+def require_last_line(name: str, content: bytes) -> None:
+    """Raise RefusedError for a text whose last line does not end, as of a file that is cut off.
+
+    Programs end each line with a line feed. A number that is cut off may be read as another one,
+    such as 6.0e+0 of 6.0e+06, and nothing else tells that digits are missing. An empty text passes.
+
+    Args:
+        name: Name of the file, for the message.
+        content: The text.
+    """
+    is_whole = not content or content.endswith(b"\n")
+    cure = "load it anew if it was cut off; if it was written by hand, end it with a line feed"
+    allowed = "a last line that ends with a line feed"
+    value = f"cut off at {content[-60:].splitlines()[-1].decode('latin-1')!r}" if content else ""
+    require(is_whole, name, value, allowed, cure)
+
+
 def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
     """Check that lines have no characters but those of numbers, signs, points, e, E and blanks.
 

@@ -26,7 +26,12 @@ from alphacut.frame.structures.entry_lists import (
     read_calculix,
 )
 from alphacut.frame.structures.mapdl import read_full
-from alphacut.frame.structures.matrix_market import dense_of_entries, matrix_market, require_size
+from alphacut.frame.structures.matrix_market import (
+    dense_of_entries,
+    matrix_market,
+    require_last_line,
+    require_size,
+)
 from alphacut.frame.structures.nastran import read_dmig, read_op4
 
 # The allowed value in messages of all formats.
@@ -168,7 +173,8 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
             file with names may have as many as `MAX_ROWS`, of which the caller takes some.
 
     Raises:
-        RefusedError: The file is of another type, with a hint for known ones, or holds no matrix.
+        RefusedError: The file is of another type, with a hint for known ones, or holds no matrix;
+            or its last line does not end, as of a file of text that is cut off.
         Exception: Whatever readers of files and archives raise for damaged or missing ones.
     """
     ending = path.suffix.lower()
@@ -179,6 +185,7 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
     if ending in (".mtx", ".sti", ".mas"):
         require_text(path)
         content = path.read_bytes()
+        require_last_line(path.name, content)
         max_named_rows = max(max_rows, MAX_ROWS)
         if ending != ".mtx":
             return read_calculix(path, content, max_rows=max_named_rows)
@@ -188,6 +195,8 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
     if ending in (".op4", ".pch", ".bdf", ".nas", ".full"):
         require_text(path)
         content = path.read_bytes()
+        if b"\0" not in content:  # .full is binary, and .op4 may be
+            require_last_line(path.name, content)
         if ending == ".op4":
             return NamedMatrix(read_op4(path, content, member=name, max_rows=max_rows))
         if ending == ".full":
