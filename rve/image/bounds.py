@@ -30,7 +30,7 @@ class LoewnerBounds:
     """Bounds lower ≤ C ≤ upper of a symmetric tensor, as quadratic forms.
 
     Args:
-        lower: Lower bound, shape (n, n); 0 where there is none, as beside pores that percolate.
+        lower: Lower bound, shape (n, n); 0 in directions in which no solid percolates.
         upper: Upper bound, of the same shape; its diagonal is infinite where there is none, as
             beside rigid or perfectly conducting phases.
     """
@@ -40,8 +40,8 @@ class LoewnerBounds:
 
     @property
     def has_lower(self) -> bool:
-        """Whether the lower bound is positive: not where pores percolate."""
-        return bool(self.lower.any())
+        """Whether the lower bound is positive: not where nothing percolates along some axis."""
+        return bool((np.diagonal(self.lower) > 0).all())
 
     @property
     def has_upper(self) -> bool:

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.rve.image.bounds import Enclosure, StiffnessBounds, inverse_below
+from alphacut.rve.image.bounds import Enclosure, StiffnessBounds
 from alphacut.rve.image.fields.energy import UNIT
 from alphacut.rve.image.model import ImageModel, ImageSolution
 from alphacut.rve.image.phases import ModuliImages
@@ -127,8 +127,7 @@ def _lower_bounds_with(
     # Only the lower bound is needed, which stresses give: half the work of both sides.
     stresses = model.solve_side(factors * images.lower, dual=True, start=solution.lower)
     assert stresses is not None  # None beside pores that percolate alone
-    stiffness = inverse_below(stresses.energy.upper)
-    bounds = concave_constants(StiffnessBounds(stiffness, stiffness), model.average)
+    bounds = concave_constants(StiffnessBounds(stresses.bound, stresses.bound), model.average)
     return {name: ends.lower for name, ends in bounds.items()}
 
 

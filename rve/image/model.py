@@ -24,6 +24,7 @@ from alphacut.rve.image.bounds import (
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import SideSolution, solve_side
+from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
 from alphacut.rve.image.phases import ModuliImages
@@ -172,10 +173,10 @@ class GridModel(Generic[Bounds]):
                 is_stopped.set()
         lower_bound: Array = np.zeros(components)
         if lower is not None:
-            lower_bound = inverse_below(lower.energy.upper)
+            lower_bound = lower.bound
         upper_bound = np.diag(np.full(len(lower_bound), np.inf))
         if upper is not None:
-            upper_bound = upper.energy.upper
+            upper_bound = upper.bound
         bounds: Bounds = self.bounds_type(lower_bound, upper_bound)
         return ImageSolution(bounds, upper, lower)
 
@@ -210,16 +211,33 @@ class GridModel(Generic[Bounds]):
             RefusedError: The device "cuda" is missing.
         """
         to_device = device_array(self.device)
+        solver = replace(self.solver, watch=watch or self.solver.watch)
         first_guess = None
-        if start is not None:
+        # Fields beside pores are of another kind than those without.
+        beside_pores = dual and not moduli.all()
+        if start is not None and start.beside_pores == beside_pores:
             first_guess = start.fields
-        return solve_side(
+        if beside_pores and self.conduction:
+            (fine,) = self._divided(moduli)
+            return solve_fluxes(fine, self.sides, solver=solver, start=first_guess)
+        solution = solve_side(
             self._element(dual=dual),
-            [to_device(modulus) for modulus in moduli],
-            solver=replace(self.solver, watch=watch or self.solver.watch),
-            division=self.division,
+            [to_device(modulus) for modulus in self._divided(moduli)],
+            solver=solver,
             start=first_guess,
         )
+        if solution is None:
+            return None
+        bound = solution.energy.upper
+        if dual:
+            bound = inverse_below(bound)
+        return SideSolution(solution.fields, bound)
+
+    def _divided(self, moduli: Array) -> Array:
+        """Return moduli of pixels on the grid of their elements, both of shape (moduli, *grid)."""
+        for axis in range(1, moduli.ndim):
+            moduli = np.repeat(moduli, self.division, axis=axis)
+        return moduli
 
     def bounds_at_levels(
         self,

@@ -35,6 +35,8 @@ UNIT = 2.0**-53
 """Rounding unit of doubles."""
 SAFETY = 1.01
 """Factor for the rounding of an error bound itself and for terms of second order."""
+SAFETY_OF_SUMS = 1 + 2.0**-40
+"""Factor for the rounding of a few sums and quotients of positive numbers."""
 COEFFICIENT = 8
 """Rounding units by which a coefficient of the energy may be off."""
 
@@ -84,6 +86,49 @@ class Energies:
         # symmetric matrix whose entries are that small. D makes loads of any size count alike.
         scale = np.sqrt(np.maximum(np.diagonal(value), np.finfo(float).tiny))
         return np.asarray(value + np.diag(SAFETY * (error / scale).sum(axis=1) * scale))
+
+
+def bound_of_trials(means: Array, energy: Energies) -> Array:
+    """Return a lower bound of a stiffness or conductivity from trial stresses or fluxes.
+
+    With the means Q of the loads, one a column, and their energies E, the means Q X of any
+    combinations X prove K ≥ Q X (Xᵀ E X)⁻¹ Xᵀ Qᵀ in the Loewner order (Thomson's principle). Here
+    X are eigenvectors of E over the roots of the eigenvalues, so that Xᵀ E X is near the unit
+    matrix: it is at most its largest row sum. Loads without energy are left out, as are
+    combinations whose energy is lost in rounding: this only lowers the bound.
+
+    Args:
+        means: Means of the components, each off by at most 4 rounding units, shape (components,
+            loads).
+        energy: Energies of all pairs of loads.
+
+    Returns:
+        Symmetric matrix, shape (components, components). Where all means of a component are 0, so
+        are its row and column.
+    """
+    diagonal = np.diagonal(energy.upper)
+    # Powers of two, by which nothing is rounded, let loads of any size count alike.
+    scale = np.exp2(-np.round(np.log2(np.where(diagonal > 0, diagonal, 1.0)) / 2))
+    scale *= diagonal > 0
+    scaled = scale[:, np.newaxis] * energy.upper * scale
+    eigenvalues, vectors = np.linalg.eigh(scaled)
+    # No bound rests on the limit, below which combinations count as lost in rounding.
+    is_kept = eigenvalues > 1e-9 * max(eigenvalues[-1], np.finfo(float).tiny)
+    x = vectors[:, is_kept] / np.sqrt(eigenvalues[is_kept])
+    trials = (means * scale) @ x
+    # A sum of n products is off by n units of the sum of their magnitudes (Higham, section 3.1);
+    # twice two of them, in Xᵀ E X.
+    n = len(scale)
+    slack = 2 * (n + 1) * UNIT * abs(x).T @ abs(scaled) @ abs(x)
+    row_sums = (abs(x.T @ scaled @ x) + slack).sum(axis=1, initial=0.0)
+    largest = SAFETY_OF_SUMS * max(row_sums, default=1.0)
+    trial_errors = (n + 5) * UNIT * abs(means * scale) @ abs(x)
+    products = abs(trials) @ trial_errors.T
+    error = products + products.T + trial_errors @ trial_errors.T
+    error += (n + 3) * UNIT * abs(trials) @ abs(trials).T
+    # By Gershgorin's circles the row sums of the errors bound the error in the Loewner order.
+    margin = SAFETY * error.sum(axis=1) / largest
+    return np.asarray(trials @ trials.T / largest - np.diag(margin))
 
 
 def _outer(first: Array, second: Array) -> Array:
@@ -302,8 +347,8 @@ def coefficients_of(element: Element, moduli: Sequence[Fields]) -> list[Fields]:
 
 
 @dataclass(frozen=True, eq=False)
-class SideSolution:
-    """Solution of one side of the bounds.
+class FieldSolution:
+    """Fields of nearly least energy.
 
     Args:
         fields: Fields for unit loads, of strains and stresses in Voigt order, shape (loads,
@@ -316,14 +361,30 @@ class SideSolution:
     energy: Energies
 
 
+@dataclass(frozen=True, eq=False)
+class SideSolution:
+    """Solution of one side of the bounds.
+
+    Args:
+        fields: Unknowns for each load, shape (loads, unknowns, *grid). Those of elements are of
+            unit loads, of strains and stresses in Voigt order.
+        bound: What they prove of the stiffness or conductivity, from above or from below in the
+            Loewner order.
+        beside_pores: Whether the fields are those of a method for pores, for the lower bound.
+    """
+
+    fields: Fields
+    bound: Array
+    beside_pores: bool = False
+
+
 def solve_side(
     element: Element,
     moduli: Sequence[Fields],
     *,
     solver: ConjugateGradient,
-    division: int = 1,
     start: Fields | None = None,
-) -> SideSolution | None:
+) -> FieldSolution | None:
     """Return fields of nearly least energy under unit loads: one side of the bounds.
 
     Fields of displacements bound the stiffness from above, those of temperatures the conductivity.
@@ -336,21 +397,17 @@ def solve_side(
             conductivity alone. They are in any unit, of shape (y, x) or (z, y, x), and finite. A
             cell where one is 0 is a pore, which is allowed for stresses and fluxes alone.
         solver: Solver with its stopping rule.
-        division: Number of elements along each side of a cell: the same image, a larger space of
-            fields.
         start: Fields to start from, in the shape of the result's fields; None for zero.
 
     Returns:
-        `fields`, shape (loads, unknowns of a cell, *grid), the grid being finer by `division`, with
-        the unit loads in Voigt's order; and `energy`, that of all pairs of these fields. None for
-        stresses and fluxes where a pore meets its own periodic image.
+        `fields`, shape (loads, unknowns of a cell, *grid), with the unit loads in Voigt's order;
+        and `energy`, that of all pairs of these fields. None for stresses and fluxes where a pore
+        meets its own periodic image.
 
     Raises:
         FailedError: The solver does not converge.
     """
     xp = namespace(moduli[0])
-    for axis in range(element.dimension):
-        moduli = [xp.repeat(modulus, division, axis=axis) for modulus in moduli]
     is_pore = reduce(xp.logical_or, [modulus == 0 for modulus in moduli])
     potentials = None
     if element.dual and bool(is_pore.any()):
@@ -372,7 +429,7 @@ def solve_side(
         coefficients = [xp.where(is_pore, 0.0, coefficient) for coefficient in coefficients]
     unit_modes = element.mean_modes(np.eye(len(fields)))
     energy = energies(element, fields, unit_modes, coefficients, field_errors)
-    return SideSolution(fields, energy)
+    return FieldSolution(fields, energy)
 
 
 def _least_energy_fields(

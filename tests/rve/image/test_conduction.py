@@ -131,7 +131,8 @@ def finite_volumes(conductivity):
     rows, columns, entries = [], [], []
     for axis in range(k.ndim):
         other = np.roll(k, -1, axis)
-        link = (2 * k * other / (k + other)).ravel()
+        link = np.divide(2 * k * other, k + other, out=np.zeros(k.shape), where=k * other > 0)
+        link = link.ravel()
         here, there = number.ravel(), np.roll(number, -1, axis).ravel()
         rows += [here, there, here, there]
         columns += [here, there, there, here]
@@ -203,8 +204,12 @@ def test_insulators_and_perfect_conductors(shape, rng):
         assert full.mean.lower * high > 0.99
         assert full.mean.lower * low < 1
     image[:] = 1.0
-    image[0] = 0.0  # a layer of insulator that percolates
-    assert not solve_conduction(image).bounds.has_lower
+    image[0] = 0.0  # a layer of insulator: the other ones conduct along it
+    bounds = solve_conduction(image).bounds
+    along = 1 - 1 / len(image)
+    assert not bounds.has_lower
+    assert np.diag(bounds.lower)[:-1] == pytest.approx(along, rel=1e-9)
+    assert bounds.lower[-1, -1] == 0
 
 
 def test_a_fuzzy_image_holds_every_image_of_its_cuts(rng, tmp_path):
