@@ -59,8 +59,8 @@ class BoxBounds:
     # known
     attained: Array
     attained_at: Array  # inputs of these trajectories, (T, m, 2, n), in SI units
-    # guaranteed bound of how far an output exceeds both its values at the ends of the step before
-    # each node, (T, m); where no force jumps there, of its distance from the straight line as well
+    # guaranteed bound of the distance of an output from the straight line between its values at the
+    # ends of the step before each node, (T, m)
     between_nodes: Array
     # fraction of the gap of each peak that each input accounts for, (m, 2, n)
     gap_fractions: Array

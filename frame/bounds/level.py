@@ -5,7 +5,7 @@ A side of an output q is −q (number 0) or q (number 1); bounds are upper bound
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -23,19 +23,13 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import ModalResponseModels
 from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.response.chord_deviation import (
-    Response,
-    load_deviation,
-    narrowed_at_jumps,
-    narrowed_deviation,
-)
+from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,
     Oscillators,
     grid_over,
     is_fed_through,
-    read_response,
 )
 
 
@@ -163,139 +157,46 @@ class LevelModels:
         return cls(structure, models, grids, tables, excitation)
 
     def interpolation_error(self) -> Array:
-        """Bound how far outputs exceed both their values at the ends of a time step, shape (T, m).
+        """Bound the distance of outputs from a straight line within each time step, shape (T, m).
 
-        Row j belongs to the step that ends at node j. Where no force jumps in the step, the number
-        also bounds the distance of the outputs from a straight line. All is in the units of the
-        outputs and holds for every input of the box.
-
-        Raises:
-            UnprovedError: An oscillator is out of the range in which responses are computed to
-                rounding.
+        Row j belongs to the step that ends at node j. All is in the units of the outputs and holds
+        for every input of the box.
         """
-        # Contributions whose signs within a step are not known, so that they cannot cancel.
-        unresolved = self.models.interpolation_error + sum(
+        error: Array = self.models.interpolation_error + sum(
             x.interpolation_error for x in self.models.truncated
         )
-        by_magnitude: Array = np.array(unresolved)
         for o, order in enumerate(self.structure.derivative_orders):
-            errors = self.tables[int(order)].interpolation_error
-            for mode, error in zip(self.models.oscillators, errors, strict=True):
-                by_magnitude[:, o] += mode.participation.magnitude()[:, o] @ error
-        # The tables of oscillators contain what forces add at once through these; what they add
-        # through all other modes is the difference to M⁻¹ b f.
-        time = self.excitation.time
-        feedthroughs = dict(self._feedthroughs())
-        for source, response in feedthroughs.items():
-            assert response.load is not None
-            of_others = self._feedthrough_of_truncated_modes(source, response)
-            by_magnitude += np.outer(load_deviation(response.load, time), of_others)
-        responses = [x for mode in self.models.oscillators for x in self._responses(mode)]
-        responses += feedthroughs.values()
-        # `by_magnitude` adds all contributions as if none cancelled another one; now those in
-        # `responses`, which are known as functions of time, are added with their signs.
-        narrowed = narrowed_deviation(responses, time, by_magnitude, unresolved)
-        if unresolved.any():
-            # The bound for steps in which a force jumps needs the change of all contributions
-            # within the step, which of unresolved ones is not known.
-            return narrowed
-        return narrowed_at_jumps(responses, time, narrowed)
+            of_modes = self.tables[int(order)].interpolation_error
+            for mode, of_mode in zip(self.models.oscillators, of_modes, strict=True):
+                error[:, o] += mode.participation.magnitude()[:, o] @ of_mode
+        # The tables of oscillators contain what forces add at once through these.
+        for source in self.excitation.sources:
+            if is_fed_through(source, 2):
+                deviation = load_deviation(self.excitation.loads[source], self.excitation.time)
+                error += np.outer(deviation, self._feedthrough_of_truncated_modes(source))
+        return error
 
-    def _feedthrough_of_truncated_modes(self, source: str, feedthrough: Response) -> Array:
+    def _feedthrough_of_truncated_modes(self, source: str) -> Array:
         """Bound what a unit of a force adds to outputs at once by truncated modes, shape (m,).
 
         A force acts on accelerations at once, by M⁻¹ b f, of which the participation factors of the
-        oscillators are a part. The rest belongs to the truncated modes, which are not enclosed one
-        by one.
+        oscillators are a part. The difference belongs to the truncated modes, which are not
+        enclosed one by one. Bounds of outputs that are no accelerations are 0.
 
         Args:
             source: Name of the force, "force1", "force2", …
-            feedthrough: What the force adds by all modes: `coefficient` is its factor for each
-                output at the midpoint of the box, shape (m, 1, 1), and `coefficient_error[0]`
-                bounds its change over the box, shape (m,).
-
-        Returns:
-            Bounds of the magnitude; those of outputs that are no accelerations are 0.
         """
         index = self.excitation.sources.index(source)
-        is_acceleration = self.structure.derivative_orders == 2
-        midpoint: Array = feedthrough.coefficient.real[:, 0, 0]
-        radius: Array = feedthrough.coefficient_error[0]
+        structure = self.structure
+        coefficient = structure.force_accelerations[source][None] @ structure.output_rows.T
+        feedthrough = coefficient[0] * structure.output_factors
+        midpoint: Array = feedthrough.value
+        radius = feedthrough.deviation()
         for mode in self.models.oscillators:
             participation = mode.participation[index]
-            midpoint = midpoint - np.where(is_acceleration, participation.value, 0.0)
-            radius = radius + np.where(is_acceleration, participation.deviation(), 0.0)
-        return np.asarray(np.abs(midpoint) + radius)
-
-    def _feedthroughs(self) -> Iterator[tuple[str, Response]]:
-        """Yield what each force adds to accelerations at once, M⁻¹ b f, with the name of the force.
-
-        Nothing is yielded if no output is an acceleration. Loads of the ground and initial states
-        add nothing at once.
-
-        Yields:
-            The name, "force1", "force2", …, and the response: `sigma` None, the load f itself times
-            `coefficient`, its factor for each output at the midpoint of the box, shape (m, 1, 1),
-            with `coefficient_error`, bounds of the change of its real and imaginary parts over the
-            box, shape (2, m). Factors of outputs that are no accelerations are 0.
-        """
-        structure = self.structure
-        takes_acceleration = (structure.derivative_orders == 2)[:, np.newaxis]
-        rows = np.where(takes_acceleration, structure.output_rows, 0.0)
-        if not rows.any():
-            return
-        for source in self.excitation.sources:
-            if is_fed_through(source, 2):
-                accelerations = structure.force_accelerations[source]
-                coefficient = (accelerations[None] @ rows.T)[0] * structure.output_factors
-                real_radius = coefficient.deviation()
-                response = Response(
-                    sigma=None,
-                    load=self.excitation.loads[source],
-                    order=2,
-                    coefficient=coefficient.value[:, np.newaxis, np.newaxis],
-                    coefficient_error=np.stack([real_radius, 0 * real_radius]),
-                )
-                yield source, response
-
-    def _responses(self, mode: Oscillator) -> Iterator[Response]:
-        """Yield what one mode adds to outputs, by each source and derivative, without feedthrough.
-
-        Each item is Re κ G with G = σ^order ρ, ρ the Duhamel integral of the source's load, on a
-        coarse grid over the mode's exponents σ = −g + iω.
-
-        Args:
-            mode: Ranges of ω and of g/ω over the box, and participation factors as Taylor models of
-                shape (sources, m).
-
-        Yields:
-            For each source, and each derivative of the displacements that some output takes, the
-            response with the grid's `sigma`, shape (Q, W); its `load`, None for an initial state;
-            its `order`; `coefficient`, κ for each output at the points of the grid, shape (m, Q,
-            W), 0 for outputs of other derivatives; and `coefficient_error`, bounds of the change of
-            Re κ and Im κ over the box, shape (2, m).
-        """
-        loads, _, sources = self.excitation
-        orders = self.structure.derivative_orders
-        points = int(numbers.DEVIATION_POINTS), 3
-        sigma = grid_over(mode.omega_range, mode.quotient_range, points).sigma
-        midpoints = mode.participation.value
-        radii = mode.participation.deviation()
-        for source, midpoint, radius in zip(sources, midpoints, radii, strict=True):
-            # e = Re κ G with κ = κ_r + i κ_i: κ_r is what e is for G = 1, κ_i for G = −i.
-            real = read_response(source, sigma, np.full_like(sigma, 1))
-            imag = read_response(source, sigma, np.full_like(sigma, -1j))
-            largest = [np.abs(real).max(), np.abs(imag).max()]
-            for order in self.structure.distinct_orders:
-                of_order = orders == order
-                participation = (midpoint * of_order)[:, np.newaxis, np.newaxis]
-                yield Response(
-                    sigma=sigma,
-                    load=loads.get(source),
-                    order=order,
-                    coefficient=participation * (real + 1j * imag),
-                    coefficient_error=np.outer(largest, radius * of_order),
-                )
+            midpoint = midpoint - participation.value
+            radius = radius + participation.deviation()
+        return np.where(structure.derivative_orders == 2, np.abs(midpoint) + radius, 0.0)
 
 
 @dataclass(eq=False)

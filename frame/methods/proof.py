@@ -44,7 +44,7 @@ from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
-from alphacut.frame.response.chord_deviation import Response, narrowed_at_jumps, narrowed_deviation
+from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.result import Envelope
@@ -378,10 +378,9 @@ def bound_levels(
 
 
 def _line_deviation(model: ModalModel) -> Array:
-    """Return a bound of how far outputs of a modal model leave their values at both ends of a step.
+    """Return a bound of the distance of a modal model's outputs from straight lines within steps.
 
-    It holds for all inputs of the widest box. If no force jumps in the step, it bounds the distance
-    from the straight line between both values; else how far the output lies beyond both values.
+    It holds for all inputs of the widest box; lines run between the values at both ends of a step.
 
     Args:
         model: Sum over modes of a coefficient times an exponential, or a Duhamel integral of a
@@ -414,29 +413,28 @@ def _line_deviation(model: ModalModel) -> Array:
         along_q = np.linspace(q_lower[k], q_upper[k], 3)
         grids.append(np.multiply.outer(-along_q + 1j, along_omega))
 
-    responses = []
+    time = model.flow.time
+    deviation = np.zeros((len(time), len(model.flow.outputs)))
     for part in response_parts(model, growth):
+        # A mode and its conjugate add twice the real part of one of them, 2 Re C w.
+        real = 2 * part.coefficient.real.magnitude()
+        imag = 2 * part.coefficient.imag.magnitude()
         load = None
         if part.load is not None:
             load = part.load.history
-        deviations = [part.coefficient.real.deviation(), part.coefficient.imag.deviation()]
-        # A mode and its conjugate add twice the real part of one of them.
-        radii = 2 * np.stack(deviations, axis=1)  # (modes, 2, outputs)
-        # What a force adds at once is proportional to the force, with the first coefficient.
+        # What a force adds at once is the force itself times the first coefficient.
         if isinstance(part.load, Direct):
-            # A load itself has no grid: shape (outputs, 1, 1).
-            coefficient = np.multiply.outer(2 * part.coefficient.value[0], np.ones((1, 1)))
-            responses.append(Response(None, load, 0, coefficient, radii[0]))
+            deviation += np.outer(load_deviation(part.load.history, time), real[0])
             continue
         for k, sigma in enumerate(grids):
-            coefficient = np.multiply.outer(2 * part.coefficient.value[k], np.ones(sigma.shape))
-            responses.append(Response(sigma, load, 0, coefficient, radii[k]))
-    time = model.flow.time
-    # The sum of the magnitudes of all modes bounds the deviation; where it is large, the signs of
-    # the modes are used, which often cancel.
-    by_magnitude = np.sum([x.line_deviation(time) for x in responses], axis=0)
-    deviation = narrowed_deviation(responses, time, by_magnitude)
-    return narrowed_at_jumps(responses, time, deviation)
+            of_modulus, of_imaginary = line_deviations(sigma, load, time, (0,))[0]
+            # With H, which is the wave w less its chord, |Re C H| ≤ |C| |H|, and also
+            # |Re C H| ≤ |Re C| |H| + |ω Im C| |Im H/ω|.
+            by_parts = np.outer(of_modulus, real[k])
+            by_parts += np.outer(of_imaginary, sigma.imag.max() * imag[k])
+            by_modulus = np.outer(of_modulus, np.hypot(real[k], imag[k]))
+            deviation += np.minimum(by_modulus, by_parts)
+    return deviation
 
 
 def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:

@@ -155,10 +155,6 @@ class History:
         """Return f at times in s, in the same shape; where it jumps, its value before the jump."""
         return self.envelope(time, -1.0) * self.wave(time)
 
-    def jumps_at(self, time: Array) -> Mask:
-        """Return whether f may jump at each of the times, in the same shape."""
-        return np.asarray(self.envelope(time, -1.0) != self.envelope(time))
-
     def jumps_in_steps(self, time: Array) -> Mask:
         """Return whether the history f may jump in the step before each of rising times.
 
