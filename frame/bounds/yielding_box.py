@@ -16,9 +16,10 @@ from alphacut.frame.bounds.yielding_outputs import Found, Observed
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.truncated_polynomials import product_table
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.yielding import YieldingFlow, load_substeps
+from alphacut.frame.dynamics.yielding import LoadSubsteps, YieldingFlow, load_substeps
 from alphacut.frame.structures.linear import histories
 from alphacut.frame.structures.storey import MOMENT
+from alphacut.fuzzy.sets.boxes import corners
 
 # Degree of the polynomials by the number of inputs (tuned: more inputs have many more monomials).
 DEGREES = {0: 1, 1: 7, 2: 5, 3: 4}
@@ -120,14 +121,22 @@ class YieldingStorey:
         return DEGREES[len(self.active)]
 
     @cached_property
-    def loads(self) -> tuple[Load, Ints, int]:
-        """Load per unit of mass, time node at each of its edges, −1 for none, and the last edge."""
+    def substeps(self) -> LoadSubsteps:
+        """Substeps in which all loads are linear, each no longer than 1 / `max_frequency`."""
+        loads = list(histories(self.flow.system).values())
+        return load_substeps(loads, self.flow.time, longest=1 / self.max_frequency)
+
+    def loads(self, values: Array) -> tuple[Load, Ints, int]:
+        """Return the load, the time node at each of its edges, −1 for none, and the last edge.
+
+        Args:
+            values: Values of all inputs in SI units, shape (d,). The load per unit of mass must be
+                the same at all values of the active inputs, see `_require_loads`.
+        """
         flow = self.flow
         system = flow.system
-        nominal = system.parameters
-        steps = load_substeps(
-            list(histories(system).values()), flow.time, longest=1 / self.max_frequency
-        )
+        parameters = system.parameters | dict(zip(flow.names, values, strict=True))
+        steps = self.substeps
         n_loads = steps.first.shape[1]
         pushes = np.zeros(n_loads)
         column = 0
@@ -138,7 +147,7 @@ class YieldingStorey:
         for name, force in zip(system.force_names, system.loads, strict=True):
             assert force.history is not None
             place = [x.identity for x in keys].index(force.history.identity)
-            pushes[column + place] += nominal[name] / nominal["m1"]
+            pushes[column + place] += parameters[name] / parameters["m1"]
         first = steps.first @ pushes
         last = steps.last @ pushes
         width = np.diff(steps.edges)
@@ -178,17 +187,24 @@ class YieldingStorey:
             high: Upper ends; those of inputs that are not active must be equal.
 
         Raises:
-            UnprovedError: A quantity that must be positive is not known to be so over the box.
+            UnprovedError: A quantity that must be positive is not so at a corner of the box.
         """
-        found = self._coefficients(self._parameters(low, high))
-        storey = self._storey(found)
-        load, node, last = self.loads
+        m = len(self.flow.outputs)
+        shape = (len(self.flow.time), m, 2)
+        try:
+            found = self._coefficients(self._parameters(low, high))
+            storey = self._storey(found)
+            rows, remainder, weights = self._observed(found)
+        except UnprovedError:
+            # It may be positive nevertheless, which is then known of sub-boxes.
+            for corner in corners(low, high):
+                self._storey(self._coefficients(self._parameters(corner, corner)))
+            unknown = np.full((2, *shape), np.inf)
+            return BoxBounds(*unknown, unknown[0, 0], np.zeros((0, 3)), np.inf)
+        load, node, last = self.loads(low)
         step: Ints = np.cumsum((node >= 0).astype(np.int64))
-        rows, remainder, weights = self._observed(found)
         terms = rows.shape[-1]
         observed = Observed(rows, remainder, weights, last, node, step)
-        m = len(rows)
-        shape = (len(self.flow.time), m, 2)
         result = Found(
             bounds=np.full(shape, -np.inf),
             steps=np.full(shape, -np.inf),
@@ -264,15 +280,24 @@ class YieldingStorey:
             found.yield_drift,
         ]
         terms = comb(len(self.active) + self.degree, self.degree)
-        lower = [float(x.bounds()[0]) for x in models]
+        # The lower end of a product may be negative where all factors are positive. So those of the
+        # factors are multiplied as well: K_z = (1 − a) k / m, and so on.
+        least_stiffness = _lower_end(found.stiffness)
+        greatest_mass = -_lower_end(-found.mass)
+        min_drift = _lower_end(found.yield_drift)
+        min_slider = _lower_end(1.0 - found.hardening) * least_stiffness / greatest_mass
+        after_yielding = _lower_end(found.hardening) * least_stiffness + _lower_end(-found.softening)
+        by_factors = np.array([after_yielding / greatest_mass, min_slider, min_slider * min_drift])
+        by_factors -= 1e-15 * np.abs(by_factors)
+        lower = np.maximum(by_factors, [_lower_end(x) for x in models[2:5]])
         # Without hardening rounding alone may make this negative.
-        if lower[2] < -1e-12 * float(models[1].magnitude()):
+        if lower[0] < -1e-12 * float(models[1].magnitude()):
             what = "the stiffness after yielding, less weight over height, may be negative"
             raise UnprovedError(what, "take more hardening, or less weight")
-        if not min(lower[3], lower[5]) > 0:
+        if not min(min_drift, *lower[1:]) > 0:
             what = "hardening below 1 and a positive yield drift are needed at all inputs"
             raise UnprovedError(what, "narrow them")
-        if not float(found.start[0].magnitude()) < lower[5]:
+        if not float(found.start[0].magnitude()) < min_drift:
             what = "the storey may be displaced beyond its yield drift at the start"
             raise UnprovedError(what, "take a smaller q1_0, or none")
         return Storey(
@@ -280,9 +305,9 @@ class YieldingStorey:
             remainder=np.array([float(x.remainder) for x in models]),
             magnitude=np.array([float(x.magnitude()) for x in models]),
             table=product_table(len(self.active), self.degree),
-            min_yielded=max(lower[2], 0.0),
-            min_slider=lower[3],
-            min_force=lower[4],
+            min_yielded=max(float(lower[0]), 0.0),
+            min_slider=float(lower[1]),
+            min_force=float(lower[2]),
         )
 
     def _observed(self, found: _Coefficients) -> tuple[Array, Array, Array]:
@@ -346,6 +371,11 @@ class YieldingStorey:
             if self.flow.system.quantity(name)[0] == "residual":
                 of_output = values[..., column, :]
                 of_output[...] = np.clip(of_output, -low, high)
+
+
+def _lower_end(model: TaylorModel) -> float:
+    """Return the lower bound of one function over the box."""
+    return float(model.bounds()[0])
 
 
 def _padded(model: TaylorModel, terms: int) -> Array:

@@ -16,7 +16,8 @@ the slider. Let Δ be the approximate less the exact motion, at the same inputs,
 Then S S' = −c Δv² + Δv δ_v + (K_p Δu + K_z Δz) δ_u + K_z Δz δ_z − K_z Δz Δp'. Damping takes energy,
 and so does the last term, since both flows obey the rule: −Δz Δp' = p' (z̃ − z) + p̃' (z − z̃) ≤ 0.
 By Cauchy's inequality S' ≤ |δ_v| + √(K_p + K_z) |δ_u| + √K_z |δ_z|: errors add up over time and do
-not grow. With K_p ≥ 0, |Δv| ≤ S, |Δz| ≤ S/√K_z, and |Δu| is at most S/√K_p and ∫ S dt.
+not grow. With K_p ≥ 0, |Δv| ≤ S, |Δz| ≤ S/√K_z, and |Δu| is at most S/√K_p and
+∫ S dt + ∫ |δ_u| dt.
 
 *Yield condition.* If z̃ passes y by η while it counts as elastic, the slider of the approximate
 motion is held at y. It flows while z̃ rises, as it may, and is moved by at most η when z̃ falls:

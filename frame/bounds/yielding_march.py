@@ -431,7 +431,8 @@ def _add_defects(
             moved += residual
     error += root_slider * moved
     numbers[ERROR] += error
-    numbers[INTEGRAL] += longest * numbers[ERROR]
+    # |Δu| ≤ ∫ S dt + ∫ |δ_u| dt, as Δu' = Δv + δ_u
+    numbers[INTEGRAL] += longest * numbers[ERROR] + element.series.numbers[1]
     numbers[PATH] += 2 * moved
 
     # The balance of energy of the motion is off by the work of the defects, and differs from that
