@@ -164,12 +164,10 @@ class CriticalMeasures:
         high = critical([bounds.lower for bounds in min_peaks])
         # The largest peak of a cut is no smaller than its smallest peak.
         low_reached = np.minimum(critical([bounds.lower for bounds in max_peaks]), high)
-        # The structure with the largest attained peak keeps the limit below its critical measure.
-        high_reached = critical([bounds.upper for bounds in min_peaks])
         return cls(
             low=critical([bounds.upper for bounds in max_peaks]),
             low_reached=low_reached,
-            high_reached=np.maximum(high_reached, low_reached),
+            high_reached=critical([bounds.upper for bounds in min_peaks]),
             high=high,
         )
 
@@ -225,7 +223,7 @@ class CriticalMeasures:
         """Return the critical measures of the event that any of several limits is exceeded.
 
         The event is reached with the first limit, so that bounds are the smallest ones of all
-        limits. `high_reached` is `low_reached`: no larger measure is known to be attained.
+        limits. `high_reached` is `low`: different structures may keep the limits up to more.
 
         Args:
             limits: Critical measures of each limit, for the same levels and records.
@@ -233,10 +231,8 @@ class CriticalMeasures:
         low = np.min([limit.low for limit in limits], axis=0)
         reached = np.min([limit.low_reached for limit in limits], axis=0)
         high = np.min([limit.high for limit in limits], axis=0)
-        # Different limits may attain their high measures by different structures, so that no larger
-        # measure is known to be attained. Rounding may leave the attained one above `high`, which
-        # is raised to it.
-        return cls(low, reached, reached, np.maximum(high, reached))
+        # Rounding may leave an attained measure above `high`, which is raised to it.
+        return cls(low, reached, low, np.maximum(high, reached))
 
     def counts(self, measure: Array) -> Ends:
         """Return the number of records under which all, and under which some structures exceed.

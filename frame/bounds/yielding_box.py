@@ -199,8 +199,8 @@ class YieldingStorey:
             # It may be positive nevertheless, which is then known of sub-boxes.
             for corner in corners(low, high):
                 self._storey(self._coefficients(self._parameters(corner, corner)))
-            unknown = np.full((2, *shape), np.inf)
-            return BoxBounds(*unknown, unknown[0, 0], np.zeros((0, 3)), np.inf)
+            unknown = np.full(shape, np.inf)
+            return BoxBounds(unknown, unknown, unknown[0], np.zeros((0, 3)), np.inf)
         load, node, last = self.loads(low)
         step: Ints = np.cumsum((node >= 0).astype(np.int64))
         terms = rows.shape[-1]
@@ -286,7 +286,8 @@ class YieldingStorey:
         greatest_mass = -_lower_end(-found.mass)
         min_drift = _lower_end(found.yield_drift)
         min_slider = _lower_end(1.0 - found.hardening) * least_stiffness / greatest_mass
-        after_yielding = _lower_end(found.hardening) * least_stiffness + _lower_end(-found.softening)
+        after_yielding = _lower_end(found.hardening) * least_stiffness
+        after_yielding += _lower_end(-found.softening)
         by_factors = np.array([after_yielding / greatest_mass, min_slider, min_slider * min_drift])
         by_factors -= 1e-15 * np.abs(by_factors)
         lower = np.maximum(by_factors, [_lower_end(x) for x in models[2:5]])

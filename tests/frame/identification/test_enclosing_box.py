@@ -102,7 +102,8 @@ def test_measures_are_critical_where_all_structures_of_the_box_exceed_a_limit(fo
     measures = CriticalMeasures.from_peaks([peak], [2.0], 0.01)
     np.testing.assert_allclose(measures.low[:, 0], 0.02 / peak.upper)
     np.testing.assert_array_equal(measures.low_reached, measures.high)
-    np.testing.assert_array_equal(measures.high_reached, measures.high)
+    # Some structure of the set lies in the narrowest box, and keeps the limit up to its `low`.
+    np.testing.assert_allclose(measures.high_reached[:, 0], measures.low[-1, 0])
 
 
 def test_the_box_is_remembered_by_claims_and_by_results(learned):
