@@ -20,8 +20,9 @@ import numpy as np
 from alphacut.base.kept_files import digest_of
 from alphacut.io.files import INSIDE
 
-FORMAT = 4
-"""Format of a folder of results. 4: a manifest of files by name, JSON beside NetCDF files."""
+FORMAT = 5
+"""Format of a folder of results. 5: arrays are in the classic format of NetCDF, no longer in HDF5,
+whose files may refer to other files; 4: a manifest of files by name, JSON beside NetCDF files."""
 NESTED = ("stochastic", "rve", "fuzzy", "frame")
 """Packages that are linked into alphacut and have folders of their own."""
 

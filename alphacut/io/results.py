@@ -13,10 +13,13 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 
-from alphacut.base.errors import RefusedError, require
+import numpy as np
+
+from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.kept_files import digest_of, is_regular, read_regular, whole_file
 from alphacut.io.files import as_json
 from alphacut.io.provenance import FORMAT, command_to_paste
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 MANIFEST = "manifest.json"
 COMPLETE = "whole results of a run"
 """Allowed state of a folder of results."""
+EMPTY = "variables_without_entries"
+"""Attribute of a dataset in a file for variables that the format has no place for."""
 RUN_AGAIN = f"make it anew by {command_to_paste('run', 'CASE.toml')}"
 """Cure of files that were changed."""
 
@@ -61,6 +66,26 @@ class Listed(NamedTuple):
 
     digest: str
     source: str
+
+
+def write_arrays(data: xarray.Dataset, path: Path) -> None:
+    """Write a dataset in the classic format of NetCDF, which `ResultsFolder.dataset` reads.
+
+    The format has no axes of length 0, such as that of the loads of a structure without loads:
+    variables without entries become an attribute with the length of each of their axes.
+
+    Args:
+        data: The dataset, of numbers and texts. Integers must fit into 32 bits.
+        path: The file, which is written anew.
+
+    Raises:
+        ValueError: An integer does not fit.
+        OSError: The file cannot be written.
+    """
+    empty = {name: dict(x.sizes) for name, x in data.variables.items() if x.size == 0}
+    if empty:
+        data = data.drop_vars(empty).assign_attrs({EMPTY: json.dumps(empty)})
+    data.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
 
 
 @dataclass
@@ -112,7 +137,7 @@ class ResultsFolder:
         version = document.get("format_version")
         value = f"of format {version}"
         allowed = f"files of format {FORMAT}"
-        cure = "name another folder" if version is None else RUN_AGAIN
+        cure = "name another folder" if version is None else f"{RUN_AGAIN} in another folder"
         require(version == FORMAT, str(file), value, allowed, cure=cure)
         files = document.get("files")
         try:
@@ -176,15 +201,27 @@ class ResultsFolder:
             name: Name of the file in this folder, such as "envelope.nc".
 
         Raises:
-            RefusedError: The file is not listed, missing, changed or a link.
-            OSError: The file, which is as a run has written it, is no NetCDF file.
+            RefusedError: The file is not listed, missing, changed or a link; or it is no file in
+                the classic format of NetCDF.
         """
-        import netCDF4
+        content = self.content(name)
+        # A folder may come from elsewhere, with a list of its own. HDF5, the format of NetCDF-4,
+        # can take values from other files by external storage and links: a page that shows them
+        # would show any file of the user. The classic format has values of its own alone.
+        is_classic = content[:4] in (b"CDF\x01", b"CDF\x02")
+        value = "no file in the classic format of NetCDF"
+        require(is_classic, str(self.path / name), value, COMPLETE, RUN_AGAIN)
         import xarray
 
-        backends: Any = xarray.backends  # whose classes have no types
-        file = netCDF4.Dataset("results", memory=self.content(name))  # which loading closes
-        return xarray.load_dataset(backends.NetCDF4DataStore(file))
+        try:
+            data = xarray.load_dataset(BytesIO(content), engine="scipy")
+            sizes_of = json.loads(data.attrs.pop(EMPTY, "{}"))
+            for variable, sizes in sizes_of.items():
+                data[variable] = (tuple(sizes), np.empty(tuple(sizes.values())))
+            return data
+        except Exception as error:  # whatever the reader raises for a damaged file
+            value = f"damaged ({printable(error, 80)})"
+            raise RefusedError(str(self.path / name), value, COMPLETE, RUN_AGAIN) from None
 
     def require_free(self, name: str) -> None:
         """Raise RefusedError if a new file of a name would replace what this program has not made.

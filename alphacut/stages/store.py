@@ -19,7 +19,7 @@ from alphacut.base.kept_files import whole_file, write_text
 from alphacut.base.progress_bar import Progress, subprogress
 from alphacut.io.files import as_json, rank, say
 from alphacut.io.provenance import build_provenance, fingerprint
-from alphacut.io.results import Listed, ResultsFolder
+from alphacut.io.results import Listed, ResultsFolder, write_arrays
 from alphacut.io.typed_json import from_document, to_document
 
 if TYPE_CHECKING:
@@ -269,6 +269,7 @@ class StageStore:
         try:
             contents = {file: folder.content(file) for file in files}
             numbers = from_document(stage.kind, json.loads(contents[numbers_file])["result"])
+            data = folder.dataset(arrays_file) if arrays_file in files else None
         except RefusedError as error:
             problem = f"{Path(error.key).name} is {error.value or 'missing'}"
             say(f"warning: {problem}; {stage.name} is computed anew")
@@ -277,9 +278,6 @@ class StageStore:
             return None
         self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
-        data = None
-        if arrays_file in files:
-            data = folder.dataset(arrays_file)
         return StageResult(numbers, data, files, key)
 
     def _compute(self, stage: Stage[T], tick: Progress) -> StageResult[T]:
@@ -362,7 +360,7 @@ class StageStore:
         write_text(files / name, as_json(document, indent=1))
         if computed.data is not None:
             with whole_file(files / f"{stage.name}.nc") as partial:
-                computed.data.to_netcdf(partial)
+                write_arrays(computed.data, partial)
         # `before` is the digest of what the earlier result was made from. Files of it that this
         # result does not replace are removed.
         before = ""
