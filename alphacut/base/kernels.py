@@ -28,6 +28,8 @@ from alphacut.base.user_cache import remove_unused, user_folder
 
 with_kernels = set[str]()
 """Names of the modules that have kernels, in the order of their import."""
+before_compiling = list[Callable[[], None]]()
+"""Functions that are called each time before Numba compiles a kernel, without arguments."""
 prange = range
 """The loop of parallel kernels, until Numba is imported and its own prange takes its place."""
 _creation_lock = RLock()
@@ -82,6 +84,7 @@ class _Kernel:
             folder = shared_folder(function.__module__) or code.cache_path
             stamp = digest(function.__module__)
             code._cache_file = _shared_index(str(folder), code._impl.filename_base, stamp)
+            dispatcher._compiler.compile = _announced(dispatcher._compiler.compile)
         # Numba raises a RuntimeError if no folder can be written. Its cache is no public interface:
         # with NUMBA_DISABLE_JIT, or in a later version, the attributes above may be missing.
         except (RuntimeError, AttributeError):
@@ -97,6 +100,20 @@ class _Kernel:
     def __reduce__(self) -> str:
         """Pickle the kernel as the global of its name."""
         return str(self.__qualname__)
+
+
+def _announced(compile_types: Callable[..., Any]) -> Callable[..., Any]:
+    """Return Numba's function that compiles for types, with a call of `before_compiling` before.
+
+    Numba does not call it where it takes compiled code from the cache.
+    """
+
+    def compile_announced(*types: Any) -> Any:
+        for announce in tuple(before_compiling):
+            announce()
+        return compile_types(*types)
+
+    return compile_announced
 
 
 def kernel(**options: object) -> Callable[[Callable[..., Any]], Any]:

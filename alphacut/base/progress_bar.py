@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
+from alphacut.base.kernels import before_compiling
+
 Progress = Callable[[float], None]
 """A function that takes the completed fraction of a computation, 0 to 1."""
 
@@ -49,9 +51,11 @@ def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | N
         yield _rising(progress)
         return
     display = _Display()
+    before_compiling.append(display.show_compiling)
     try:
         yield _rising(display)
     finally:
+        before_compiling.remove(display.show_compiling)
         display.close()
 
 
@@ -76,6 +80,7 @@ class _Display:
         has_bar: Whether a bar stands there.
         begun: Time at which this was made, in s of a clock that never goes back.
         written: Time of the last display.
+        fraction: Completed fraction, 0 to 1.
     """
 
     def __init__(self) -> None:
@@ -83,17 +88,35 @@ class _Display:
         self.has_bar = False
         self.begun = monotonic()
         self.written = self.begun
+        self.fraction = 0.0
 
     def __call__(self, fraction: float) -> None:
-        """Show a completed fraction on standard error, unless one was shown just before.
+        """Show a completed fraction, 0 to 1, unless something was shown just before.
+
+        Elsewhere than on a terminal the line has an estimate of the time that is left, once a
+        twentieth is done.
+        """
+        self.fraction = fraction
+        elapsed = monotonic() - self.begun
+        time_left = ""
+        if fraction >= 0.05:  # before that the estimate would be of no use
+            time_left = f"some {elapsed / fraction - elapsed:.0f} s left"
+        self._show(time_left, on_terminal="")
+
+    def show_compiling(self) -> None:
+        """Say that a kernel is being compiled, unless something was shown just before."""
+        self._show("compiling, once", on_terminal=" compiling, once")
+
+    def _show(self, note: str, *, on_terminal: str) -> None:
+        """Show the completed fraction on standard error, unless one was shown just before.
 
         On a terminal (`is_terminal`) a bar is drawn over the last one, at most five times a second.
-        Elsewhere a line is written, at most every ten seconds, with an estimate of the time that is
-        left once a twentieth is done. Nothing is shown during the first second. The time of the
-        display is kept in `written`, and that there is a bar in `has_bar`.
+        Elsewhere a line is written, at most every ten seconds. Nothing is shown during the first
+        second. The time of the display is kept in `written`, and that there is a bar in `has_bar`.
 
         Args:
-            fraction: Completed fraction, 0 to 1.
+            note: What stands behind the time in a line.
+            on_terminal: What stands behind the time beside a bar.
         """
         pause = 10.0  # seconds between lines
         if self.is_terminal:
@@ -106,14 +129,12 @@ class _Display:
         if self.is_terminal:
             self.has_bar = True
             width = 30
-            full = round(width * fraction)
+            full = round(width * self.fraction)
             bar = "█" * full + "░" * (width - full)
-            _write(f"\r\x1b[K{bar} {fraction:4.0%} {elapsed:.0f} s")
+            _write(f"\r\x1b[K{bar} {self.fraction:4.0%} {elapsed:.0f} s{on_terminal}")
             return
-        time_left = ""
-        if fraction >= 0.05:  # before that the estimate would be of no use
-            time_left = f", some {elapsed / fraction - elapsed:.0f} s left"
-        _write(f"{fraction:4.0%} after {elapsed:.0f} s{time_left}\n")
+        separator = ", " if note else ""
+        _write(f"{self.fraction:4.0%} after {elapsed:.0f} s{separator}{note}\n")
 
     def close(self) -> None:
         """Remove the bar."""

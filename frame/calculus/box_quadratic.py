@@ -131,6 +131,8 @@ def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> fl
     quadratic rises. The step is tried in its full length, in half and in a quarter, each clipped to
     the box; x moves, in place, to the best of these points that gains, and stays if none does.
 
+    Loops stand in place of NumPy's expressions, which Numba takes ten times as long to compile.
+
     Args:
         g: Gradient at x = 0, shape (d,).
         H: Symmetric Hessian, shape (d, d); it may be singular.
@@ -148,22 +150,31 @@ def _newton_step(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> fl
         step[i, 0] = -slope
         if (x[i] <= lower[i] and slope <= 0) or (x[i] >= upper[i] and slope >= 0):
             # the equation of a held axis becomes −step_i = 0
-            free[i] = 0.0
-            free[:, i] = 0.0
+            for j in range(d):
+                free[i, j] = 0.0
+                free[j, i] = 0.0
             step[i, 0] = 0.0
             free[i, i] = -1.0
     # The Hessian is made more concave by 1e-13 of its largest entry, so that it is not singular; a
     # zero one as well. The Newton step is then an ascent direction of a concave quadratic.
-    shift = SHIFT * (np.abs(free).max() + 1e-100)
+    largest = 1e-100
+    for i in range(d):
+        for j in range(d):
+            largest = max(largest, abs(free[i, j]))
     for k in range(d):
-        free[k, k] -= shift
+        free[k, k] -= SHIFT * largest
     solve_in_place(free, step)
-    for length in (1.0, 0.5, 0.25):
-        trial = np.minimum(np.maximum(start + length * step[:, 0], lower), upper)
+    trial = np.empty(d)
+    length = 1.0
+    while length >= 0.25:
+        for i in range(d):
+            trial[i] = min(max(start[i] + length * step[i, 0], lower[i]), upper[i])
         value = _value(g, H, trial)
         if value > best:
             best = value
-            x[:] = trial
+            for i in range(d):
+                x[i] = trial[i]
+        length /= 2
     return float(best)
 
 

@@ -171,11 +171,11 @@ def convolve(
         inner = a.shape[-1]
     if max(len(a), len(b)) * out[0].size * inner <= few_multiplications:
         if bilinear == matmul and a.ndim == b.ndim == 3:
-            _add_matrix_products(_writable(a), _writable(b), at, out)
+            _add_matrix_products(_in_rows(a), _in_rows(b), at, out)
             return out
         if bilinear == np.multiply:
-            a_flat = _writable(_rows(a, shape))
-            b_flat = _writable(_rows(b, shape))
+            a_flat = _in_rows(_rows(a, shape))
+            b_flat = _in_rows(_rows(b, shape))
             _add_products(a_flat, b_flat, at, out.reshape(len(out), -1))
             return out
     # Each coefficient of the shorter factor is multiplied by all of the longer one. Their products
@@ -189,9 +189,12 @@ def convolve(
     return out
 
 
-def _writable(a: Array) -> Array:
-    """Return an array, or a copy if it is read-only, of which Numba would compile a new kernel."""
-    return a if a.flags.writeable else a.copy()
+def _in_rows(a: Array) -> Array:
+    """Return an array, or a copy in C order if it is read-only or in another order.
+
+    Numba would compile a kernel for each such kind.
+    """
+    return a if a.flags.writeable and a.flags.c_contiguous else a.copy()
 
 
 def _rows(coefficients: Array, shape: tuple[int, ...]) -> Array:

@@ -297,7 +297,10 @@ def _march_modes(
     n_loads = moved.shape[2]
     integrals = np.empty(4, np.complex128)
     factor = np.empty(n, np.complex128)
-    by_end, by_slope = np.empty((2, n_loads, n), np.complex128)
+    by_end = np.empty((n_loads, n), np.complex128)
+    by_slope = np.empty((n_loads, n), np.complex128)
+    real = np.empty(n)
+    imaginary = np.empty(n)
     for s in range(samples):
         for k in range(n):
             step_integrals(sigma[s, k], h, integrals)
@@ -305,8 +308,9 @@ def _march_modes(
             for load in range(n_loads):
                 by_end[load, k] = moved[s, k, load] * integrals[0]
                 by_slope[load, k] = -moved[s, k, load] * integrals[1]
-        real = start[s].real.copy()
-        imaginary = start[s].imag.copy()
+        for k in range(n):
+            real[k] = start[s, k].real
+            imaginary[k] = start[s, k].imag
         for node in range(n_nodes):
             for i in range((node - 1) * intervals if node else 0, node * intervals):
                 for k in range(n):

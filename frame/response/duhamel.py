@@ -144,7 +144,12 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
 
 def call_with_load() -> None:
     """Call a kernel that takes a load once, before there are threads; see `KernelThreads`."""
-    absolute_moments(0.0, Accelerogram(1.0, np.zeros(2)), np.ones(1))
+    _take_load(linear_pieces(Accelerogram(1.0, np.zeros(2)), np.ones(1)))
+
+
+@compiled
+def _take_load(load: LinearPieces) -> None:
+    """Do nothing; at the first call Numba adds the type of a load to its table."""
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from alphacut.base.kernels import kernel
 from alphacut.base.progress_bar import progress_reporter
 
 
@@ -21,3 +22,19 @@ def test_a_terminal_shows_the_largest_fraction(monkeypatch, capsys):
             report(fraction)
     shown = [line.split("%")[0].strip() for line in capsys.readouterr().err.splitlines()]
     assert shown == ["50", "70"]
+
+
+def test_a_line_says_that_a_kernel_is_compiled(monkeypatch, capsys, tmp_path):
+    times = iter(np.arange(0.0, 500.0, 11.0))
+    monkeypatch.setattr("alphacut.base.progress_bar.monotonic", lambda: next(times))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    _twice.__module__ = "alphacut.base.kernels"  # whose text is part of the name in the cache
+    twice = kernel()(_twice)
+    with progress_reporter(None):
+        assert twice(2) == 4
+        assert twice(3) == 6
+    assert capsys.readouterr().err == "  0% after 11 s, compiling, once\n"
+
+
+def _twice(number):
+    return 2 * number
