@@ -292,3 +292,20 @@ def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure:
     """Raise `RefusedError(key, value, allowed, cure)` unless the condition `holds`."""
     if not holds:
         raise RefusedError(key, value, allowed, cure)
+
+
+def require_ordered(what: str, lower: Array | float, upper: Array | float) -> None:
+    """Raise FailedError if a lower bound lies above its upper one, or if a bound is NaN.
+
+    Every object of bounds calls this where it is made, so that no result holds such a pair.
+
+    Args:
+        what: What is bounded, for the message.
+        lower: Lower bounds, of any shape; −∞ where nothing is known.
+        upper: Upper bounds, of a shape that fits; ∞ where nothing is known.
+    """
+    low, high = np.broadcast_arrays(lower, upper)
+    is_wrong = ~(low <= high)  # a comparison with NaN is false
+    if is_wrong.any():
+        ends = f"{low[is_wrong][0]:.6g} is not below {high[is_wrong][0]:.6g}"
+        raise FailedError(f"bounds of {what} contradict each other: {ends}")

@@ -32,6 +32,7 @@ from alphacut.frame import (
 from alphacut.frame.analyses.answer import enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
+from alphacut.rve.image.bounds import is_positive_definite
 from alphacut.stages.cell import BOTH_BOUNDS, UPPER_BOUND, constant_label
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.image import ImageResult
@@ -316,7 +317,7 @@ def width_text(image: ImageResult) -> str:
             level by its cause, in GPa. Without a lower bound the lower matrix is 0 throughout;
             without an upper bound an entry of the upper one is infinite.
     """
-    has_lower = image.lower_GPa.any()
+    has_lower = is_positive_definite(image.lower_GPa)
     has_upper = np.isfinite(image.upper_GPa).all()
     missing = []
     if not has_lower:

@@ -7,41 +7,79 @@ operations is off by at most k + 1 rounding units of itself; the bounds are move
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import FailedError
+from alphacut.base.errors import FailedError, require_ordered
 from alphacut.rve.image.fields.element import SHEARS
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
 from alphacut.rve.result.moduli import AXES, shear_modulus, square_moduli
 
 
-class Enclosure(NamedTuple):
-    """Lower and upper bound of a number."""
+class _Ends(NamedTuple):
+    """The fields of an `Enclosure`."""
 
     lower: float
     upper: float
+
+
+class Enclosure(_Ends):
+    """Lower and upper bound of a number, infinite where it has none.
+
+    Raises:
+        FailedError: The lower bound is above the upper one, or one of them is NaN.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, lower: float, upper: float) -> Self:
+        """Check the ends."""
+        require_ordered("a constant", lower, upper)
+        return super().__new__(cls, lower, upper)
 
 
 @dataclass(frozen=True, eq=False)
 class LoewnerBounds:
     """Bounds lower ≤ C ≤ upper of a symmetric tensor, as quadratic forms.
 
+    C itself is positive semidefinite. What follows from the bounds holds for all such C.
+
     Args:
         lower: Lower bound, shape (n, n); 0 in directions in which no solid percolates.
         upper: Upper bound, of the same shape; its diagonal is infinite where there is none, as
             beside rigid or perfectly conducting phases.
+
+    Raises:
+        FailedError: An entry is NaN, or `upper` − `lower` is not positive semidefinite, beyond
+            rounding.
     """
 
     lower: Array
     upper: Array
 
-    @property
+    def __post_init__(self) -> None:
+        """Check that the bounds are numbers and in order."""
+        for matrix in (self.lower, self.upper):
+            require_ordered("a tensor", matrix, np.inf)  # which NaN is not
+        diagonals = np.diagonal([self.lower, self.upper], axis1=1, axis2=2)
+        require_ordered("a tensor's diagonal", diagonals[0], diagonals[1])
+        if self.has_upper:
+            # Eigenvalues of the rounded difference are off by a few units of all entries.
+            rounding = 32 * UNIT * float(np.abs([self.lower, self.upper]).sum())
+            smallest = np.linalg.eigvalsh(self.upper - self.lower)[0]
+            require_ordered("a tensor", -rounding, smallest)
+
+    @cached_property
     def has_lower(self) -> bool:
-        """Whether the lower bound is positive: not where nothing percolates along some axis."""
-        return bool((np.diagonal(self.lower) > 0).all())
+        """Whether the lower bound is positive definite: not where some field carries nothing.
+
+        Otherwise it does not bound the inverse of the tensor.
+        """
+        return is_positive_definite(self.lower)
 
     @property
     def has_upper(self) -> bool:
@@ -49,17 +87,27 @@ class LoewnerBounds:
         return bool(np.isfinite(self.upper).all())
 
     @property
+    def has_both(self) -> bool:
+        """Whether the lower bound is positive definite and the upper one finite."""
+        return self.has_lower and self.has_upper
+
+    @property
     def width(self) -> float:
         """Largest ratio of the upper to the lower energy over all mean fields, minus one."""
-        if not (self.has_lower and self.has_upper):
+        if not self.has_both:
             return float("inf")
         from scipy.linalg import eigh  # takes time to import
 
-        return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
+        try:
+            return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
+        except np.linalg.LinAlgError:  # the lower bound is singular to rounding
+            return float("inf")
 
     def contains(self, tensor: Array) -> bool:
         """Return whether a symmetric tensor of their shape lies between the bounds."""
-        distances = np.stack([tensor - self.lower, self.upper - tensor])
+        distances = [tensor - self.lower]
+        if self.has_upper:
+            distances.append(self.upper - tensor)
         return bool((np.linalg.eigvalsh(distances)[:, 0] >= 0).all())
 
     def overlaps(self, other: LoewnerBounds) -> bool:
@@ -86,7 +134,7 @@ class ConductivityBounds(LoewnerBounds):
     def mean(self) -> Enclosure:
         """Bounds of the mean over all directions, the trace of K over the dimension."""
         n = len(self.lower)
-        low = float(np.trace(self.lower)) / n
+        low = max(float(np.trace(self.lower)) / n, 0.0)
         high = float(np.trace(self.upper)) / n
         return Enclosure(low * (1 - 4 * UNIT), high * (1 + 4 * UNIT))
 
@@ -98,7 +146,7 @@ class ConductivityBounds(LoewnerBounds):
             between −∞ and ∞ where a bound is missing.
         """
         n = len(self.lower)
-        diagonal = np.diagonal([self.lower, self.upper], 0, 1, 2).T
+        diagonal = np.maximum(np.diagonal([self.lower, self.upper], 0, 1, 2).T, 0)
         off_diagonal = [entry_bounds(self.lower, self.upper, i, j) for i, j in SHEARS[n]]
         return np.concatenate([diagonal, off_diagonal])
 
@@ -145,9 +193,9 @@ class StiffnessBounds(LoewnerBounds):
         """Bounds of K of Hill's average, in the plane of K_T = (C11 + C12)/2, in Pa."""
         if self.dimension == 3:
             return self._hill(0)
-        low = float(square_moduli(self.lower)[0]) / 2
+        low = float(square_moduli(self.lower)[0]) / 2 - 2 * _rounding(self.lower)
         high = float(square_moduli(self.upper)[0]) / 2
-        return Enclosure(low - 2 * _rounding(self.lower), high + 2 * _rounding(self.upper))
+        return Enclosure(max(low, 0.0), high + 2 * _rounding(self.upper))
 
     def shear(self, average: str = AXES) -> Enclosure:
         """Return bounds in Pa of the shear modulus of an isotropic average of the stiffness.
@@ -159,19 +207,17 @@ class StiffnessBounds(LoewnerBounds):
             average: In the plane, "axes" for C33, the modulus along the axes, or "isotropic" for
                 Hill's mean over all directions of the plane. It is not used in space, where the
                 average is Hill's.
-
-        Raises:
-            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         if self.dimension == 3:
             return self._hill(1)  # the bounds of Hill's G
         # Both averages rise in C11 − C12 and C33, each of which is the value of C at a strain.
         with np.errstate(divide="ignore"):  # a mean with a modulus of 0
-            low = float(shear_modulus(square_moduli(self.lower), average))
-            high = float(shear_modulus(square_moduli(self.upper), average))
+            low = float(shear_modulus(np.maximum(square_moduli(self.lower), 0), average))
+            high = float(shear_modulus(np.maximum(square_moduli(self.upper), 0), average))
         if average == AXES:  # C33 itself, which is not rounded
             return Enclosure(low, high)
-        return Enclosure(low - 4 * _rounding(self.lower), high + 4 * _rounding(self.upper))
+        low -= 4 * _rounding(self.lower)
+        return Enclosure(max(low, 0.0), high + 4 * _rounding(self.upper))
 
     def young(self, average: str = AXES) -> Enclosure:
         """Return bounds in Pa of Young's modulus E of an isotropic average of the stiffness.
@@ -190,9 +236,6 @@ class StiffnessBounds(LoewnerBounds):
             lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
             upper one is infinite, and in the plane, where G may then exceed any multiple of K, the
             lower one is −∞ as well.
-
-        Raises:
-            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
@@ -207,7 +250,7 @@ class StiffnessBounds(LoewnerBounds):
             softest = stiffest = [min_shear, top, max_shear]
             low = -np.inf
         # `_young` gives E, moved down (side −1) or up (side 1) by its rounding.
-        if self.has_lower:
+        if min_bulk > 0:
             low = min(self._young(shear, min_bulk, side=-1) for shear in softest)
         if self.has_upper:
             high = max(self._young(shear, max_bulk, side=1) for shear in stiffest)
@@ -231,9 +274,6 @@ class StiffnessBounds(LoewnerBounds):
         Returns:
             Lower and upper bound. Where a bound of the stiffness is missing, they are the limits of
             an isotropic solid but for rounding: −1 in space or −∞ in the plane, and 1/2.
-
-        Raises:
-            FailedError: In space, a bound of the stiffness is singular to rounding.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)
@@ -263,27 +303,29 @@ class StiffnessBounds(LoewnerBounds):
             ν_yz, ν_xz, ν_xy, G_yz, G_xz and G_xy in space. Without a lower bound of the stiffness
             moduli are bounded from below by 0, without an upper one they are infinite from above;
             without either one ratios lie between −∞ and ∞.
-
-        Raises:
-            FailedError: A bound of the stiffness is singular to rounding.
         """
         low, high = self._compliance
         n = self.dimension
         # The quotients and these numerators are off by one unit each; the lower bounds are moved
         # down and the upper ones up. The largest compliance gives the smallest modulus.
         numerators = np.array([1 - 4 * UNIT, 1 + 4 * UNIT])
+        # The compliance is positive. Rounding may take its lower bound below 0: then no modulus
+        # bounds this one from above.
+        compliances = np.maximum(np.diagonal([high, low], 0, 1, 2).T, 0)
         with np.errstate(divide="ignore"):
-            moduli = numerators / np.diagonal([high, low], 0, 1, 2).T
+            moduli = numerators / compliances
         ratios = [self._lateral_ratio(i, j) for i, j in SHEARS[n]]
-        return np.concatenate([moduli[:n], ratios, moduli[n:]])
+        found: Array = np.concatenate([moduli[:n], ratios, moduli[n:]])
+        require_ordered("constants along the axes", found[:, 0], found[:, 1])
+        return found
 
-    @property
+    @cached_property
     def _compliance(self) -> tuple[Array, Array]:
         """Lower and upper bound, in the Loewner order, of the inverse of the stiffness.
 
         Both compliances have the shape of the stiffness, (3, 3) or (6, 6), in 1/Pa. Where pores
         percolate there is no upper bound, and all its entries are infinite; beside rigid phases the
-        lower one is zero. FailedError if a bound of the stiffness is singular to rounding.
+        lower one is zero.
         """
         low = np.zeros_like(self.upper)
         high = np.full_like(self.lower, np.inf)
@@ -302,14 +344,11 @@ class StiffnessBounds(LoewnerBounds):
 
         Returns:
             Lower and upper bound; −∞ and ∞ where the lower or the upper bound of the stiffness is
-            missing.
-
-        Raises:
-            FailedError: A bound of the stiffness is singular to rounding.
+            missing, or S_ii has no positive lower bound.
         """
-        if not (self.has_lower and self.has_upper):
-            return Enclosure(-np.inf, np.inf)
         low, high = self._compliance
+        if not (self.has_lower and low[i, i] > 0):
+            return Enclosure(-np.inf, np.inf)
         # S_ij and the positive S_ii lie in intervals; their quotient is extreme at the ends.
         cross_terms = np.negative(entry_bounds(low, high, i, j))
         ratios = np.outer(cross_terms, [1 / high[i, i], 1 / low[i, i]])
@@ -326,16 +365,13 @@ class StiffnessBounds(LoewnerBounds):
 
         Returns:
             Lower and upper bound; 0 where pores percolate, infinite beside rigid phases.
-
-        Raises:
-            FailedError: A bound of the stiffness is singular to rounding.
         """
         # Voigt's modulus rises with the stiffness, Reuss's falls with the compliance.
         min_compliance, max_compliance = self._compliance
         low = 0.0
         high = float("inf")
         if self.has_lower:
-            low = hill_mean(self.lower, max_compliance, modulus, side=-1)
+            low = max(low, hill_mean(self.lower, max_compliance, modulus, side=-1))
         if self.has_upper:
             high = hill_mean(self.upper, min_compliance, modulus, side=1)
         return Enclosure(low, high)
@@ -351,7 +387,8 @@ def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -
         1/K_R = Σ S_ii + Σ S_ij,      15/G_R = 4 Σ S_ii − 2 Σ S_ij + 3 Σ S_kk.
 
     Hill's (1952) mean is (K_V + K_R)/2 or (G_V + G_R)/2. The computed mean is moved to one side by
-    a bound of its rounding error.
+    a bound of its rounding error. Where rounding leaves no upper bound of Reuss's modulus, Voigt's
+    takes its place, which is never below it.
 
     Args:
         stiffness: Stiffness C of Voigt's average, finite, shape (6, 6), in Pa.
@@ -373,9 +410,13 @@ def hill_mean(stiffness: Array, compliance: Array, modulus: int, *, side: int) -
         reuss_weights = ((6 * diagonal - 2) * is_normal + is_shear) / 15
     voigt = voigt_weights * stiffness
     reuss = reuss_weights * compliance
-    # 36 products and sums are off by fewer than 64 units of the sum of magnitudes
-    rounding = 64 * UNIT * (abs(voigt).sum() + abs(reuss).sum() / reuss.sum() ** 2)
-    return float((voigt.sum() + 1 / reuss.sum()) / 2 + side * rounding)
+    # 36 products and sums are off by fewer than 64 units of the sum of magnitudes; the other half
+    # of the margin of Reuss's sum is for the quotient and the mean.
+    inverse = reuss.sum() - side * 128 * UNIT * abs(reuss).sum()
+    reuss_modulus = voigt.sum()
+    if inverse > 0:
+        reuss_modulus = 1 / inverse
+    return float((voigt.sum() + reuss_modulus) / 2 + side * 64 * UNIT * abs(voigt).sum())
 
 
 def _rounding(stiffness: Array) -> float:
@@ -388,7 +429,7 @@ def inverse_below(matrix: Array) -> Array:
 
     The order is Loewner's: A ≤ B if B − A is positive semidefinite, and then B⁻¹ ≤ A⁻¹. The
     argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
-    `matrix` is singular to rounding.
+    `matrix` is not positive definite.
     """
     inverse, error = _inverse_with_error(matrix)
     return np.asarray(inverse - error)
@@ -399,7 +440,7 @@ def inverse_above(matrix: Array) -> Array:
 
     The order is Loewner's: A ≤ B if B − A is positive semidefinite, and then B⁻¹ ≤ A⁻¹. The
     argument, symmetric positive definite, and the result have the shape (n, n). FailedError if
-    `matrix` is singular to rounding.
+    `matrix` is not positive definite.
     """
     inverse, error = _inverse_with_error(matrix)
     return np.asarray(inverse + error)
@@ -417,12 +458,12 @@ def _inverse_with_error(matrix: Array) -> tuple[Array, Array]:
         is positive semidefinite.
 
     Raises:
-        FailedError: The matrix is singular to rounding, or has a diagonal entry that is not
-            positive.
+        FailedError: The matrix is not positive definite, so that it is singular to rounding.
     """
     # Powers of two bring the diagonal near 1 without rounding: rows of any size count alike.
-    scale = 2.0 ** -np.round(np.log2(np.diagonal(matrix)) / 2)
-    scaled = scale[:, None] * matrix * scale
+    with np.errstate(divide="ignore", invalid="ignore"):  # of diagonals that are not positive
+        scale = 2.0 ** -np.round(np.log2(np.diagonal(matrix)) / 2)
+        scaled = scale[:, None] * matrix * scale
     try:
         inverse = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:  # a pivot is exactly zero: NaN fails the test below
@@ -431,12 +472,56 @@ def _inverse_with_error(matrix: Array) -> tuple[Array, Array]:
     # With X the computed inverse and R = I − X·matrix, the true inverse is (I − R)⁻¹ X. In the
     # norm of row sums it is off by at most ‖R‖‖X‖/(1 − ‖R‖), and so is every eigenvalue.
     residual_norm = residual_above(inverse, scaled).sum(axis=1).max()
-    if not residual_norm < 0.5:
+    if residual_norm < 0.5:
+        inverse_norm = np.abs(inverse).sum(axis=1).max()
+        error = SAFETY * residual_norm / (1 - residual_norm) * inverse_norm
+        if np.linalg.eigvalsh(inverse)[0] > error:
+            return scale[:, None] * inverse * scale, np.diag(error * scale**2)
+
+    # The error hides the smallest eigenvalue of the inverse: rational numbers keep it.
+    exact = _exact_inverse(matrix)
+    if exact is None:
         what = "a bound of the compliance is singular to rounding"
         raise FailedError(what, "lower the contrast of the phases")
-    inverse_norm = np.abs(inverse).sum(axis=1).max()
-    error = SAFETY * residual_norm / (1 - residual_norm) * inverse_norm
-    return scale[:, None] * inverse * scale, np.diag(error * scale**2)
+    # Entries are rounded by a unit of their magnitudes |X_ij| ≤ √(X_ii X_jj). By Gershgorin's
+    # circles of √X_ii⁻¹ error √X_jj⁻¹ that is below n units of X_ii on the diagonal; one more is
+    # for adding it to the inverse.
+    return exact, SAFETY * (len(matrix) + 1) * UNIT * np.diag(np.diagonal(exact))
+
+
+def is_positive_definite(matrix: Array) -> bool:
+    """Return whether a symmetric matrix is positive definite, as its entries are, without rounding.
+
+    One with entries that are not finite is not.
+    """
+    return _exact_inverse(matrix) is not None
+
+
+def _exact_inverse(matrix: Array) -> Array | None:
+    """Return the inverse of a symmetric matrix, rounded once, or None if not positive definite.
+
+    Gauss's elimination is done in rational numbers. By Sylvester's criterion a matrix is positive
+    definite if, and only if, all pivots without a change of rows are positive.
+
+    Args:
+        matrix: Shape (n, n). One with entries that are not finite is not positive definite.
+    """
+    size = len(matrix)
+    if not np.isfinite(matrix).all():
+        return None
+    extended = np.hstack([matrix, np.eye(size)])
+    rows = [[Fraction(float(entry)) for entry in row] for row in extended]
+    for k, pivot_row in enumerate(rows):
+        pivot = pivot_row[k]
+        if pivot <= 0:
+            return None
+        rows[k] = [entry / pivot for entry in pivot_row]
+        for other in range(size):
+            if other != k:
+                factor = rows[other][k]
+                pairs = zip(rows[other], rows[k], strict=True)
+                rows[other] = [entry - factor * above for entry, above in pairs]
+    return np.array([row[size:] for row in rows], float)
 
 
 def residual_above(inverse: Array, matrix: Array) -> Array:

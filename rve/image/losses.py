@@ -79,14 +79,15 @@ def energy_fractions(
         the constants "E_x", "E_y", "E_z" (of a volume), "G" and "K".
 
     Raises:
-        FailedError: A solution does not converge, or its compliance is singular to rounding.
+        FailedError: A solution does not converge.
     """
     unchanged = concave_constants(solution.bounds, model.average)
     fractions = {name: np.tile([0.0, 1.0], (n_phases, 1)) for name in unchanged}
     # Each quotient is off by at most gap/t + |c″/c| t/2, which is least at t = √(2 gap/|c″/c|). Of
     # two phases in series with equal fractions |c″/c| is 1/2. Any t in (0, 1) is proved; the limits
     # keep 1 − t positive, and `ROUNDING` small beside t.
-    gap = max(ends.upper / ends.lower - 1 for ends in unchanged.values())
+    with np.errstate(divide="ignore"):  # of a lower bound that rounding has taken to 0
+        gap = max(np.divide(ends.upper, ends.lower) - 1 for ends in unchanged.values())
     t = float(np.clip(np.sqrt(2 * gap / 0.5), 1e-6, 0.5))
     for k in range(n_phases):
         stiffer = _lower_bounds_with(1 + t, k, model, solution, images, phase)
@@ -121,7 +122,7 @@ def _lower_bounds_with(
         "K".
 
     Raises:
-        FailedError: The solver does not converge, or the compliance is singular to rounding.
+        FailedError: The solver does not converge.
     """
     factors = np.where(phase == changed_phase, factor, 1.0)
     # Only the lower bound is needed, which stresses give: half the work of both sides.

@@ -260,7 +260,7 @@ class GridModel(Generic[Bounds]):
             One object a level, in the order of `images`.
 
         Raises:
-            FailedError: A solution does not converge, or a bound is singular to rounding.
+            FailedError: A solution does not converge.
             RefusedError: The images have another dimension than the model, or the device is
                 missing.
         """
@@ -355,15 +355,12 @@ class ImageModel(GridModel[StiffnessBounds]):
             `poisson` ν of the average, each with a lower and an upper end, and `constants` along
             the axes, shape (constants, 2). All but `bounds` are widened, if need be, to contain the
             intervals of higher levels.
-
-        Raises:
-            FailedError: A bound is singular to rounding.
         """
         young = nested([x.young(self.average) for x in bounds])
         poisson = nested([x.poisson(self.average) for x in bounds])
         constants = nested([x.constants() for x in bounds])
         return [
-            ImageCut(x, Enclosure._make(young[k]), Enclosure._make(poisson[k]), constants[k])
+            ImageCut(x, Enclosure(*young[k]), Enclosure(*poisson[k]), constants[k])
             for k, x in enumerate(bounds)
         ]
 

@@ -726,7 +726,7 @@ def solve_study(
 
     widths = dict[str, float]()
     references = None
-    if np.isfinite(cuts[0].bounds.width):
+    if cuts[0].bounds.has_both:
         widths = _widths_by_cause(study, model, solution, lowest=alpha[0])
         # Classical bounds are of phases with positive and finite moduli.
         if all(phase.is_solid for phase in study.phases):
@@ -805,10 +805,9 @@ def _require_losses(phases: Sequence[ImagePhase], bounds: StiffnessBounds) -> No
     """
     count = sum(phase.loss is not None for phase in phases)
     require(count in (0, len(phases)), "loss", f"of {count} phases", "each, 0 for none")
-    has_both = bounds.has_lower and bounds.has_upper
     cure = "pores in one material leave its loss factor; else take a small modulus for pores"
     allowed = "none beside pores that percolate or a rigid phase"
-    require(count == 0 or has_both, "loss", "there", allowed, cure)
+    require(count == 0 or bounds.has_both, "loss", "there", allowed, cure)
 
 
 def _proved_losses(
@@ -866,7 +865,7 @@ def _require_positive(widest: ImageCut) -> None:
     Raises:
         FailedError: The lower bound of E is not above 0; the message has the bounds along the axes.
     """
-    if widest.modulus.lower > 0 or not np.isfinite(widest.bounds.width):
+    if widest.modulus.lower > 0 or not widest.bounds.has_both:
         return  # beside pores and rigid phases there are no better ones
     low, high = (end / 1e9 for end in widest.modulus)
     texts = []

@@ -37,7 +37,7 @@ from itertools import product
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import FailedError, RefusedError, require
+from alphacut.base.errors import FailedError, RefusedError, require, require_ordered
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_above, inverse_below
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
@@ -64,10 +64,18 @@ class ThermalBounds:
         expansion: Mean strain ᾱ without mean stress, in 1/K, of the same shape. In the plane the
             stress in the plane has no mean, and ε33 = 0: nothing expands along z, so that a
             homogeneous cell has ᾱ = (1 + ν) α.
+
+    Raises:
+        FailedError: A lower bound is above its upper one, or a bound is NaN.
     """
 
     stress: Array
     expansion: Array
+
+    def __post_init__(self) -> None:
+        """Check the ends."""
+        require_ordered("the thermal stress", self.stress[..., 0], self.stress[..., 1])
+        require_ordered("the thermal expansion", self.expansion[..., 0], self.expansion[..., 1])
 
 
 def thermal_bounds(

@@ -17,7 +17,15 @@ from scipy.sparse.linalg import splu
 
 from alphacut.fuzzy import FailedError
 from alphacut.rve import Phase, SpheresModel, solve_image
-from alphacut.rve.image.bounds import StiffnessBounds, hill_mean, inverse_below, residual_above
+from alphacut.rve.image.bounds import (
+    Enclosure,
+    StiffnessBounds,
+    _exact_inverse,
+    hill_mean,
+    inverse_above,
+    inverse_below,
+    residual_above,
+)
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.losses import energy_fractions, mean_loss
 from alphacut.rve.image.model import ImageModel, usual_division
@@ -483,6 +491,98 @@ def test_a_singular_matrix_has_no_bounds_of_its_inverse(matrix):
         inverse_below(matrix)
 
 
+def diagonal_stripes(contrast, shape):
+    """Bulk and shear moduli (ν .3) of stripes of 1 GPa and of `contrast` GPa at 45° in (y, x)."""
+    index = np.indices(shape)
+    young = np.where(index[-2:].sum(axis=0) % shape[-1] < shape[-1] // 2, 1e9, contrast * 1e9)
+    bulk, shear = young / 1.2, young / 2.6
+    return (bulk, shear) if len(shape) == 3 else (bulk + shear / 3, shear)
+
+
+@pytest.mark.parametrize("contrast", [3e8, 1e9, 1e10, 1e12])
+def test_stripes_at_an_angle_keep_both_bounds_at_any_contrast(contrast):
+    bounds = solve_image(*diagonal_stripes(contrast, (8, 8))).bounds
+    assert bounds.has_lower
+    assert bounds.width < 0.2
+    young, *_ = solve_image(*diagonal_stripes(1e6, (8, 8))).bounds.constants()
+    constants = bounds.constants()
+    # beyond 1e6 the stiff layers are rigid but for a millionth
+    assert constants[0, 0] < young[1] * (1 + 1e-5)
+    assert young[0] < constants[0, 1] * (1 + 1e-5) < 1.1 * young[1]
+    assert np.isfinite(constants).all()
+
+
+@pytest.mark.parametrize("contrast", [3e8, 9e8, 1e10])
+def test_a_laminate_s_modulus_along_its_layers_is_inside_at_any_contrast(contrast):
+    bounds = solve_image(*diagonal_stripes(contrast, (2, 4, 4))).bounds
+    young = bounds.constants()[2]  # along z: the mean of both phases, of one Poisson's ratio
+    assert young[0] <= (1 + contrast) / 2 * 1e9 <= young[1] < 1.001 * contrast / 2 * 1e9
+
+
+@pytest.mark.parametrize("poisson", [-1 + 1.5e-8, -0.95, 0.49999999])
+def test_a_homogeneous_volume_at_the_ends_of_poisson_s_ratio_is_inside(poisson):
+    bulk, shear = 1 / (3 * (1 - 2 * poisson)), 1 / (2 * (1 + poisson))  # E = 1
+    bounds = solve_image(np.full((2, 3, 2), bulk), np.full((2, 3, 2), shear)).bounds
+    exact = [1.0] * 3 + [poisson] * 3 + [shear] * 3
+    for (low, high), value in zip(bounds.constants(), exact, strict=True):
+        assert low <= value <= high < value + 1e-5 * abs(value)
+    averages = bounds.bulk, bounds.shear(), bounds.young(), bounds.poisson()
+    for (low, high), value in zip(averages, (bulk, shear, 1.0, poisson), strict=True):
+        assert low <= value <= high < value + 1e-5 * abs(value)
+    assert bounds.width < 1e-4
+
+
+@pytest.mark.parametrize("size", [3, 6])
+def test_a_lower_bound_that_is_not_positive_definite_bounds_no_compliance(size, rng):
+    root = rng.normal(size=(size, size))
+    upper = root @ root.T + np.eye(size)
+    values, vectors = np.linalg.eigh(upper)
+    values[0] = -1e-9  # as rounding may leave it
+    bounds = StiffnessBounds((0.5 * values * vectors) @ vectors.T, upper)
+    assert not bounds.has_lower
+    assert bounds.width == np.inf
+    constants = bounds.constants()
+    is_ratio = np.arange(len(constants)) // bounds.dimension == 1
+    is_ratio[-1] = False
+    assert (constants[~is_ratio, 0] == 0).all()
+    assert (constants[~is_ratio, 1] > 0).all()
+    assert np.isfinite(constants[~is_ratio, 1]).all()
+    assert (constants[is_ratio] == [-np.inf, np.inf]).all()
+    averages = bounds.bulk, bounds.shear(), bounds.shear("axes"), bounds.young(), bounds.poisson()
+    for low, high in averages:
+        assert low <= high
+
+
+def test_bounds_in_the_wrong_order_are_refused_where_they_are_made():
+    one = np.eye(3)
+    turned = np.array([[1.0, 0.9, 0], [0.9, 1.0, 0], [0, 0, 1.0]])
+    none = np.full((3, 3), np.nan)
+    for lower, upper in ((2 * one, one), (one, turned), (none, one), (one, none)):
+        with pytest.raises(FailedError, match="contradict each other"):
+            StiffnessBounds(lower, upper)
+    for lower, upper in ((2.0, 1.0), (np.nan, 1.0), (1.0, np.nan)):
+        with pytest.raises(FailedError, match="contradict each other"):
+            Enclosure(lower, upper)
+    assert Enclosure(-np.inf, np.inf).lower == -np.inf
+
+
+def test_an_inverse_of_any_condition_is_below_and_positive(rng):
+    """Where the error of the floating-point inverse would hide its smallest eigenvalue."""
+    for _ in range(20):
+        turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+        matrix = (10.0 ** rng.uniform(-12, 0, 6) * turn) @ turn.T
+        matrix = (matrix + matrix.T) / 2
+        exact = _exact_inverse(matrix)
+        if exact is None:
+            continue
+        below, above = inverse_below(matrix), inverse_above(matrix)
+        assert _exact_inverse(above - below) is not None
+        scale = np.sqrt(np.diagonal(exact))
+        assert np.linalg.eigvalsh((exact - below) / np.outer(scale, scale))[0] > -1e-15
+        assert np.linalg.eigvalsh((above - exact) / np.outer(scale, scale))[0] > -1e-15
+        assert _exact_inverse(below) is not None or np.linalg.cond(matrix) > 1e13
+
+
 # cuts
 
 
@@ -706,6 +806,8 @@ def test_the_constants_of_one_stiffness(average):
         c12 = bulk - shear
         one = np.array([[c11, c12, 0], [c12, c22, 0], [0, 0, shear * np.exp(0.1 * rng.normal())]])
         bounds = StiffnessBounds(one, one)
+        if not bounds.has_lower:  # no stiffness
+            continue
         ends = bounds.bulk, bounds.shear(average), bounds.young(average), bounds.poisson(average)
         for k, ((low, high), exact) in enumerate(zip(ends, rational(one, average), strict=True)):
             assert low <= exact <= high
