@@ -183,7 +183,7 @@ def test_a_case_that_is_refused_imports_no_stages_and_a_missing_file_no_sections
 def test_a_case_is_checked_without_what_takes_longer_to_import_than_to_use():
     """Two motions of a building, and records of a suite with their spectral accelerations."""
     slow = {"numba", "pandas", "pint", "xarray", "matplotlib", "scipy", "alphacut.rve.image.study"}
-    slow |= {"alphacut.commands.foresee", "alphacut.commands.pipeline", "sympy", "h5py"}
+    slow |= {"alphacut.commands.pipeline", "sympy", "h5py"}
     slow |= {"alphacut.frame.methods.proof", "alphacut.frame.methods.dual", "sqlite3"}
     slow |= {"multiprocessing", "joblib", "jinja2"}
     commands = [["check", f"cases/{case}.toml", "--quiet"] for case in ("building", "suite")]

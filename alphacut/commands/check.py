@@ -1,32 +1,26 @@
-"""Command ``check``: a case before it runs, how it was read and what a run of it will compute."""
+"""Command ``check``: a case before it runs, and how it was read."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import pi
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
-from alphacut.base.errors import FailedError, RefusedError
-from alphacut.base.number_text import engineering, text_table
+from alphacut.base.errors import RefusedError
+from alphacut.base.number_text import text_table
 from alphacut.commands.options import read_case, write_answer
-from alphacut.fuzzy.campaign.call import CampaignError
 from alphacut.io.files import say
-
-if TYPE_CHECKING:
-    from alphacut.case.content import Content
-    from alphacut.commands.pieces import Foreseen
 
 
 def check(options: argparse.Namespace, out: TextIO) -> int:
-    """Check a case, show how it was read, and count what a run of it will compute.
+    """Check a case, and show how it was read.
 
-    All that stages need is read and built. With `time` small parts of their work are timed as well.
+    All that stages need is read and built.
 
     Args:
         options: Of the command line: the case file `case` with its changes `set`, PETSc's options
-            `petsc`, `time`, `json` and `quiet`.
+            `petsc`, `json` and `quiet`.
         out: Takes the text, or the JSON document with ``--json -``.
 
     Returns:
@@ -91,73 +85,10 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
         text += motion_text(content, structure, records)
     keys = ("key", "value", "kind")
     document["inputs"] = [dict(zip(keys, row, strict=True)) for row in rows]
-    if not options.quiet and options.json != "-":
-        # All that is known at once is shown before parts of the work are timed for seconds.
-        out.write(text)
-        out.flush()
-    else:
+    if options.quiet or options.json == "-":
         # Nobody reads the text then: warnings go to standard error, as those of other commands.
         for line in text.splitlines():
             if line.startswith("warning: "):
                 say(line)
-    last_lines = f"{options.case}: no problems\n"
-    if options.json or not options.quiet:
-        from alphacut.commands.pieces import pieces_of  # of plans, which take time to import
-
-        failure = ""
-        if options.time:
-            foreseen, failure = foreseen_stages(content, options.petsc)
-        else:
-            foreseen = list(pieces_of(content, options.petsc))
-        document["foreseen"] = [stage._asdict() for stage in foreseen]
-        last_lines = foreseen_text(foreseen) + failure + last_lines
-    write_answer(options, document, out, last_lines)
+    write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
-
-
-def foreseen_stages(content: Content, petsc: Mapping[str, str]) -> tuple[list[Foreseen], str]:
-    """Return what the stages of a run will take, and a warning if a part that was tried failed.
-
-    Args:
-        content: The case.
-        petsc: PETSc's options without their prefix.
-
-    Returns:
-        An entry for each stage until the first one that fails; and the warning as a line, else "".
-    """
-    from alphacut.commands.foresee import foresee  # it imports all stages, which takes time
-
-    found: list[Foreseen] = []
-    try:
-        found.extend(foresee(content, petsc))
-    except (FailedError, RefusedError, CampaignError) as error:
-        # The case is valid: a shortened part of the work may fail where the whole does not.
-        return found, f"warning: work that was begun to foresee its time failed: {error}\n"
-    return found, ""
-
-
-def foreseen_text(foreseen: Sequence[Foreseen]) -> str:
-    """Return a text table of what the stages of a run will compute, and how long it will take.
-
-    Args:
-        foreseen: The stages. Either all of them have a time, or none.
-
-    Returns:
-        Lines that end with a newline: the table and the sum of the times, or in its place the
-        option that times the stages. Empty without stages.
-    """
-    if not foreseen:
-        return ""
-    counts = []
-    for x in foreseen:
-        number = "" if x.number is None else f"{x.number:,} "
-        counts.append((x.stage, f"{number}{x.pieces}"))
-    times = [x.seconds for x in foreseen if x.seconds is not None]
-    if not times:
-        return f"{text_table(('stage', 'pieces'), counts)}with --time: how long a run will take\n"
-    rows = [
-        (*count, f"{engineering(seconds, '', digits=2)} s")
-        for count, seconds in zip(counts, times, strict=True)
-    ]
-    text = text_table(("stage", "pieces", "about, by one process"), rows)
-    return f"{text}a run takes about {engineering(sum(times), '', digits=2)} s, without figures\n"

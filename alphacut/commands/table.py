@@ -7,13 +7,6 @@ import argparse
 from alphacut.commands.options import Command, add_common, add_quiet, add_run
 
 
-def add_check(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``check``."""
-    add_common(parser)
-    about = "say how long a run will take, after work on parts of it for some seconds"
-    parser.add_argument("--time", action="store_true", help=about)
-
-
 def add_cell(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``cell``.
 
@@ -73,7 +66,7 @@ COMMANDS = {
     "run": Command("run every stage of a case: files, figures, summary", add_options, "run:run"),
     "check": Command(
         "check a case, and print what it was read as and its first natural period",
-        add_check,
+        add_common,
         "check:check",
     ),
     "microstructure": Command(

@@ -25,9 +25,6 @@ from alphacut.rve.result.result import HomogenisedStiffness
 from alphacut.stages.cell import CellProblem
 from alphacut.stochastic import FractionMap
 
-MOST_TIMED_STEPS = 16_000
-"""Steps of a motion beyond which `check` looks at its beginning alone."""
-
 
 class Material(NamedTuple):
     """What a structure takes from its cell; None of what the case states itself.

@@ -11,7 +11,6 @@ because they belong to the same responses.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -147,26 +146,6 @@ class IncrementalAnalysis:
     def n_demands(self) -> int:
         """Number of limits and events."""
         return len(self.limits) + len(self.events)
-
-    def foresee(self) -> tuple[float, float]:
-        """Return roughly how many responses `run` will compute, and how many seconds it will take.
-
-        The structures spread over the cuts are moved, and timed, at a scale in the middle and at
-        the end of the grid of scales, because responses take longer the more often columns yield.
-        These responses are not kept.
-        """
-        structures = self._spread_structures()
-        grid = self._grid(structures)
-        # Responses of searches over those of the grid, by inputs and demands (measured).
-        searched_fraction = 0.035 * len(self.cuts.names) * self.n_demands
-        rounds = (1 + searched_fraction) * len(grid)
-        timed = replace(self)
-        timed._move(grid[0], structures)  # compiles the kernels
-        start = time.perf_counter()
-        for scale in (grid[len(grid) // 2], grid[-1]):
-            timed._move(scale, structures)  # nothing is moved twice at a scale
-        seconds_of_round = (time.perf_counter() - start) / 2
-        return rounds * len(structures), rounds * seconds_of_round
 
     def peaks_at(self, scales: Array) -> Array:
         """Return the largest and smallest demand of structures spread over the cuts.

@@ -73,18 +73,9 @@ def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_pat
     assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
 
 
-def test_the_time_of_its_periods_is_foreseen(tmp_path, capsys):
-    assert main(["check", str(written(tmp_path)), "--time"]) == 0
-    (line,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("floor_spectrum  "))
-    assert line.split()[1:3] == ["2", "periods"]
-    assert float(line.split()[3]) < 60
-
-
-def test_a_suite_of_records_has_mean_spectra(tmp_path, capsys):
+def test_a_suite_of_records_has_mean_spectra(tmp_path):
     text = CASE.replace(RECORD, '[records]\nfiles = ["record.csv", "other.csv"]\n')
     case, out = written(tmp_path, text), tmp_path / "out"
-    assert main(["check", str(case)]) == 0
-    assert "floor_spectrum  4 spectra" in capsys.readouterr().out
     assert main(["run", str(case), "--out", str(out), "--quiet"]) == 0
     found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
     assert found.suite == ("record", "other")

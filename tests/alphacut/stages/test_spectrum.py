@@ -120,8 +120,3 @@ def test_what_does_not_fit_is_refused_by_its_key(changes, word, tmp_path):
     case.write_text(text, encoding="utf-8")
     (line, *_) = refusals(case)
     assert word in line
-
-
-def test_the_time_of_the_stage_is_foreseen(tmp_path, capsys):
-    assert main(["check", str(written(tmp_path, CASE)), "--time"]) == 0
-    assert "response_spectrum" in capsys.readouterr().out
