@@ -131,21 +131,29 @@ def main(
             message = f"{cause}; a run continues from the stages and samples that it has finished"
             return _end_with_message(message, 128 + number)  # as shells report signals
         except BrokenPipeError:
-            # The reader has gone, as with `| head`. The interpreter flushes standard output at its
-            # end, which must not fail a second time.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            _discard_output()  # the reader has gone, as with `| head`
             return 0
         except CampaignError as error:
             return _end_with_message(error.what, 3)  # its cure is an argument in Python
         except ModuleNotFoundError as error:
             return _end_with_message(missing(error), 1)
         except (FailedError, OSError, MemoryError, ImportError) as error:
+            _discard_output()  # where the disk behind it is full
             return _end_with_message(str(error) or type(error).__name__, 1)
         except Exception as error:
             # No part of this program raises it on purpose: the user is to report it whole.
             traceback.print_exc()
             what = f"{type(error).__name__} is an error of this program"
             return _end_with_message(f"{what}: report the lines above, and the case", 1)
+
+
+def _discard_output() -> None:
+    """Lead standard output to nowhere if it takes nothing: it is flushed again as Python ends."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 @contextmanager

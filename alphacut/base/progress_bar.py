@@ -44,7 +44,8 @@ def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | N
             on the terminal, or writes a line every ten seconds if standard error is not a terminal.
             False reports nothing; then None is yielded in place of a function.
     """
-    if progress is False:
+    has_stream = sys.stderr is not None  # it may have been closed before Python began
+    if progress is False or not (callable(progress) or has_stream):
         yield None
         return
     if callable(progress):

@@ -261,6 +261,8 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
     require(is_relative, "", value, allowed)
+    cure = "name the folders, as records/*/*.AT2: ** would look through all folders below"
+    require("**" not in pattern, "", value, allowed, cure)
     # Sorted, so that a suite has the same order, and the same results, on every file system.
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"

@@ -45,9 +45,9 @@ from alphacut.frame import (
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.matrix import Monomial, modal_energy_fractions, require_symmetric
 from alphacut.frame.structures.quantities import Output, require_names
-from alphacut.frame.structures.read_matrix import MAX_ROWS
+from alphacut.frame.structures.read_matrix import HELD_STIFFNESS, MAX_ROWS
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.io.quantity import parse_fuzzy_in_any_unit
+from alphacut.io.quantity import MAX_MAGNITUDE, parse_fuzzy_in_any_unit, parse_number
 
 
 def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
@@ -91,6 +91,10 @@ def _array(file: str, info: ValidationInfo) -> Array:
         of_files.update(dict.fromkeys(names))
         _require_shape(path.name, array, rows)
         require_symmetric(path.name, array, unknowns)
+    largest = float(np.abs(array).max())
+    allowed = f"entries up to {MAX_MAGNITUDE:g} in SI units"
+    cure = "leave out unknowns that are held" if largest >= HELD_STIFFNESS else ""
+    require(largest <= MAX_MAGNITUDE, path.name, f"with an entry of {largest:g}", allowed, cure)
     # A term of zeros does nothing: its author meant another array.
     require(bool(array.any()), path.name, "zeros throughout", "a matrix with entries")
     return array
@@ -185,8 +189,16 @@ Terms = Annotated[
     tuple[Annotated[tuple[Monomial, Array], PlainValidator(_term)], ...],
     BeforeValidator(_terms_of_exports),
 ]
+
+
+def _entry(value: object) -> float:
+    """Return an entry of a row; refuse a magnitude that no quantity has."""
+    return parse_number(value, "")
+
+
+Entry = Annotated[float, text(_entry)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
-Direction = Annotated[str | dict[str, float], BeforeValidator(_one_direction)]
+Direction = Annotated[str | dict[str, Entry], BeforeValidator(_one_direction)]
 """Direction of the ground: that of unknowns NODE.DIRECTION, or the influence vector by unknown."""
 
 
@@ -221,7 +233,7 @@ class ObservedRow(Section):
     """what of the unknowns the row takes"""
     unit: Annotated[str | None, text(_si_unit)] = None
     """SI unit of the output, as N or N*m; m, m/s or m/s^2 unless given, none of a drift ratio"""
-    row: dict[str, float] = Field(
+    row: dict[str, Entry] = Field(
         default_factory=dict, description='entries of the row by unknown, as {"5.x" = 1}'
     )
     upper: str = ""

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar, get_args, get_origin
 
+from numpy.linalg import LinAlgError
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
@@ -21,6 +22,10 @@ from alphacut.io.files import BadInput, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
 C = TypeVar("C", bound=Section)
+MAX_KEY_PARTS = 30
+"""Most parts of a name in a TOML file, ten times those of any key."""
+MAX_PROBLEMS = 50
+"""Most problems of a case that are told at once."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,11 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
                 place = "command line"
             problem = RefusedError(x.key, x.value, x.allowed, x.cure, place)
             problems[str(problem)] = problem
+        if (n_further := error.error_count() - MAX_PROBLEMS) > 0:
+            problem = RefusedError(
+                "the case", f"of {n_further} further problems", "", "", str(path)
+            )
+            problems[str(problem)] = problem
         raise BadInput(problems.values()) from None
     return ParsedCase(path, text, content, tuple(changes))
 
@@ -88,6 +98,13 @@ def _parse_toml(path: Path, text: str) -> dict[str, object]:
     """
     # tomllib calls itself for nested brackets, of which a text may have more than the stack holds:
     # that is RecursionError, and means bad input here.
+    # tomllib takes the square of the parts of a key in time and memory.
+    part = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+    if found := re.search(rf"(?<![\w-])(?:{part}){{{MAX_KEY_PARTS}}}", text):
+        line = text.count("\n", 0, found.start()) + 1
+        value = f"a name of more than {MAX_KEY_PARTS} parts"
+        problem = RefusedError(found[0][:20], value, "names as frame.masses", "", f"{path}:{line}")
+        raise BadInput([problem])
     try:
         return tomllib.loads(text)
     except (RecursionError, ValueError) as error:
@@ -119,7 +136,9 @@ def _refusals(model: type[Section], error: ValidationError) -> Iterator[RefusedE
         model: Class of the content that was validated.
         error: Its errors.
     """
-    details = [(_full_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
+    # Of each unknown key the nearest known one is looked for, which takes some milliseconds.
+    errors = error.errors(include_url=False)[:MAX_PROBLEMS]
+    details = [(_full_key(detail["loc"]), detail) for detail in errors]
     unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
     suggested = {key: _suggested_key(model, key) for key in unknown}
     for key, detail in details:
@@ -194,6 +213,10 @@ def _refusal(model: type[Section], key: str, detail: ErrorDetails) -> RefusedErr
     context = detail.get("ctx", {})
     cause = context.get("error")
     kind = detail["type"]
+    if isinstance(cause, LinAlgError):
+        # Its text is one of LAPACK, and the input of a whole section is no value to show.
+        cure = "is a unit wrong?"
+        return RefusedError(key or "the case", f"of matrices without modes ({cause})", "", cure)
     if isinstance(cause, RefusedError):
         return RefusedError(cause.key or key, cause.value, cause.allowed, cause.cure)
     if kind == "missing":

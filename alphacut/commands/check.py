@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from math import pi
 from typing import TextIO
 
 from alphacut.base.errors import RefusedError
@@ -73,7 +72,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
 
         modes = nominal_modes(structure.linear)
         document["modes"] = modes_document(modes)
-        document["period_s"] = 2 * pi / float(modes.frequencies[0])
+        document["period_s"] = float(modes.periods[0])
         section = content.structure_section
         others: list[NominalModes] = []
         if section is not None and isinstance(structure.linear, MatrixStructure):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import degrees, pi
+from math import degrees
 
 import numpy as np
 
@@ -95,15 +95,15 @@ def modes_document(modes: NominalModes) -> dict[str, object]:
     """Return the natural modes of a structure as a JSON document.
 
     Args:
-        modes: Undamped modes by rising frequency. A frequency of zero, which no structure of a case
-            has, would give a period above 1e300 s, since JSON has no infinity.
+        modes: Undamped modes by rising frequency. A frequency of zero has a period above 1e300 s,
+            since JSON has no infinity.
 
     Returns:
         "periods_s", "damping_ratios" and "effective_masses_kg", lists with an entry for each mode;
         and "moved_mass_kg", the mass that moves with the ground.
     """
     return {
-        "periods_s": (2 * pi / np.maximum(modes.frequencies, 1e-300)).tolist(),
+        "periods_s": modes.periods.tolist(),
         "damping_ratios": modes.damping_ratios.tolist(),
         "effective_masses_kg": modes.effective_masses.tolist(),
         "moved_mass_kg": modes.moved_mass,
@@ -128,18 +128,23 @@ def modes_text(
     Returns:
         Lines that end with a newline, with a warning if the first period is unusual.
     """
-    periods = 2 * pi / np.maximum(modes.frequencies, 1e-300)
-    first = float(2 * pi / modes.frequencies[0])
-    text = f"first natural period: {first:.4g} s, at the most plausible values\n"
+    periods = modes.periods
+    first = float(periods[0])
+    shown = f"{first:.4g} s" if modes.frequencies[0] else "infinite"
+    text = f"first natural period: {shown}, at the most plausible values\n"
     # Parts of machines have periods of some 1 ms, one-storey buildings 0.05 s, the highest towers
     # 10 s.
     shortest = 1e-3
     if is_shaken:
         shortest = 0.02
-    if not shortest <= first <= 10.0:
+    if not modes.frequencies[0]:
+        text += "warning: a mode has no stiffness within rounding: are units right, and all parts"
+        text += " joined?\n"
+    elif not shortest <= first <= 10.0:
         text += f"warning: {first:.4g} s is an unusual period: are units right, mass and stiffness"
         text += " not exchanged?\n"
-    largest = float(modes.damping_ratios.max())
+    has_stiffness = modes.frequencies > 0  # without, a mode has no damping ratio
+    largest = float(modes.damping_ratios.max(where=has_stiffness, initial=0.0))
     doubt = "are units of dampers, damping matrices and rayleigh factors right?"
     # ratios of structures are .1 to 60 %, of an undamped one below the rounding of 1e-12
     if largest > 1 or 1e-12 < largest < 1e-5:
@@ -153,8 +158,12 @@ def modes_text(
         masses = ["–"]
         if moved:
             masses = [percent_text(float(fractions[k])) for fractions in directions]
-        damping = percent_text(modes.damping_ratios[k], 2)
-        rows.append((f"{k + 1}", f"{engineering(float(periods[k]), '')} s", damping, *masses))
+        period = "infinite"
+        damping = "–"
+        if has_stiffness[k]:
+            period = f"{engineering(float(periods[k]), '')} s"
+            damping = percent_text(modes.damping_ratios[k], 2)
+        rows.append((f"{k + 1}", period, damping, *masses))
     titles = ["effective mass", *(f"direction {k + 2}" for k in range(len(others)))]
     text += text_table(("mode", "period", "damping ratio", *titles), rows)
     if moved:
@@ -175,7 +184,7 @@ def matrices_text(model: MatrixStructure, unknowns: Sequence[str], modes: Nomina
     text = f"matrices: {model.size} unknowns in N, m, kg, s, {len(massless)} of them without mass"
     if massless:
         text += f": {', '.join(massless[:8])}{', …' * (len(massless) > 8)}"
-    periods = [f"{engineering(2 * pi / max(x, 1e-300), 's')}" for x in modes.frequencies[:5]]
+    periods = [engineering(float(period), "s") for period in modes.periods[:5]]
     return f"{text}\nfirst periods: {', '.join(periods)}\n"
 
 

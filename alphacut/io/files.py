@@ -71,6 +71,9 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
             another program: then all else that is printed during the block, by C libraries too,
             goes to standard error. On other ranks this holds in any case.
     """
+    # Python has no streams for descriptors that were closed before it began, as by "alphacut >&-".
+    if sys.stdout is None:
+        raise OSError("standard output is closed")
     if not alone and rank() == 0:
         yield sys.stdout
         sys.stdout.flush()
@@ -91,7 +94,7 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
 
 def say(message: str) -> None:
     """Print one line for people on standard error; only the first MPI rank does."""
-    if rank() == 0:
+    if rank() == 0 and sys.stderr is not None:
         bar_end = "\r\x1b[K" if sys.stderr.isatty() else ""  # over a progress bar
         with suppress(OSError):  # standard error may be a closed pipe; the computation goes on
             print(f"{bar_end}alphacut: {printable(message)}", file=sys.stderr, flush=True)
@@ -119,7 +122,7 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
 def require_writable(option: str, value: str, *, folder: bool) -> None:
     """Raise RefusedError for the path of a file or folder where nothing can be written.
 
-    A device or a pipe is allowed. Nothing remains written.
+    A device or a pipe is allowed in place of a file. Nothing remains written.
 
     Args:
         option: Option that gives the path, for the message.
@@ -145,7 +148,8 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
         is_free = False
         reason = f"nothing can be written in {existing}: {error.strerror or error}".lower()
     allowed = f"the name of {'a folder' if folder else 'a file'} where you may write"
-    require(is_free or is_special(path), option, value or "empty", allowed, cure=reason)
+    is_stream = is_special(path) and not folder
+    require(is_free or is_stream, option, value or "empty", allowed, cure=reason)
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit

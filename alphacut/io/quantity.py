@@ -154,7 +154,9 @@ def _factor_by_pint(unit: str, si: str) -> Decimal:
     """
     # Units of print and fractions, which Pint takes for numbers or lengths, and tons of many kinds
     refused = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
-    if not si or re.search(refused, unit):
+    # Pint passes over other characters, as in "t,,,,", and over a point that ends a unit.
+    is_unit = re.fullmatch(r"(?:[\w\s*/^()°µμ·⁻-]|(?<=\d)\.(?=\d))*", unit)
+    if not si or is_unit is None or re.search(refused, unit):
         raise ValueError("Pint has another meaning of this unit")
     # People write cm4 and m3; Pint's powers need ^.
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)

@@ -118,7 +118,10 @@ def render_template(template: str, **content: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return templates.get_template(template).render(content)
+    page = templates.get_template(template).render(content)
+    # Titles and names may have characters that a terminal would execute when the page is printed
+    # there, and that HTML does not allow: all of the control characters but tab and line feed.
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", " ", page)
 
 
 def named_words() -> dict[str, dict[str, str]]:

@@ -34,6 +34,8 @@ class MeanRule(NamedTuple):
 
 
 PRACTICE = MeanRule()
+MAX_HEAD = 200
+"""Largest length of the head of a file of a spectrum in characters."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,6 +127,8 @@ def read_spectrum(path: str | Path, *, damping: float = 0.05) -> TargetSpectrum:
     file = path_of("path", path)
     head, *rows = fields(file)
     text = ",".join(head.cells)
+    # The pattern takes the square of the length of a text.
+    require(len(text) <= MAX_HEAD, f"{file.name}, head", text[:80], "two names with units")
     match = re.fullmatch(r"[^,]+[\[(]s[\])],[^,]+[\[(]([^,]+)[\])]\s*", text)
     factor = acceleration_factor(match[1]) if match else None
     allowed = "period [s],acceleration [g] or in another unit"

@@ -595,6 +595,11 @@ class NominalModes:
     effective_masses: Array
     moved_mass: float
 
+    @property
+    def periods(self) -> Array:
+        """Natural periods in s, shape (n,); above 1e300 s of a mode without stiffness."""
+        return np.asarray(2 * np.pi / np.maximum(self.frequencies, 1e-300))
+
 
 def nominal_modes(system: LinearSystem) -> NominalModes:
     """Return the undamped modes φ of a structure at its nominal parameters, by rising frequency.
