@@ -17,9 +17,11 @@ MAY_IMPORT = {
     "fuzzy": {"base"},
     "stochastic": {"base", "fuzzy"},
     "rve": {"base", "fuzzy", "stochastic"},
-    "frame": {"base", "fuzzy", "stochastic"},
+    "frame": {"base", "fuzzy"},
     "alphacut": {"base", "fuzzy", "stochastic", "rve", "frame"},
 }
+DOOR = ("alphacut.rve.__main__", "alphacut.__main__")
+"""The one file of a room that imports the layer, whose command it is, and what it imports."""
 HEAVY = {"pyvista", "sklearn", "scipy.stats"}.union(*EXTRAS.values())
 """What takes long to import, and what pip installs only with an extra."""
 
@@ -58,13 +60,13 @@ def graph() -> dict[str, set[str]]:
 
 
 def wrong_directions(imports: dict[str, set[str]]) -> set[tuple[str, str]]:
-    """Imports of a package that may not be imported; each __main__ may import the program."""
+    """Imports of a package that may not be imported; one door of a room may import the program."""
     return {
         (here, there)
         for here, used in imports.items()
         for there in used
         if package_of(there) not in MAY_IMPORT[package_of(here)] | {package_of(here)}
-        and not (here.endswith(".__main__") and package_of(there) == "alphacut")
+        and (here, there) != DOOR
     }
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from alphacut.base.errors import RefusedError, require
+from alphacut.case.analyses import ANALYSES
 from alphacut.case.material import (
     AnyLaw,
     Cell,
@@ -19,10 +20,17 @@ from alphacut.case.material import (
     ThetaSection,
 )
 from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
+from alphacut.io.files import suggestion
 from alphacut.io.provenance import command_to_paste
 from alphacut.stochastic import FractionMap
 
-Stage = Literal["microstructure", "modulus", "envelope", "response_spectrum"]
+
+def _stage(name: str) -> str:
+    """Return the name of a stage, if it is one; those of analyses are registered."""
+    of_analyses = [analysis.stage for analysis in ANALYSES.values()]
+    known = list(dict.fromkeys(["microstructure", "modulus", "envelope", *of_analyses]))
+    require(name in known, "", f'"{name}"', ", ".join(known), suggestion(name, known))
+    return name
 
 
 class CellContent(Section, defer_build=True):
@@ -34,7 +42,7 @@ class CellContent(Section, defer_build=True):
 
     title: str = Field(description="one line, for figures and the report")
     about: str = Field(default="", description="a paragraph: what the case shows")
-    stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)]
+    stages: Annotated[tuple[Annotated[str, after(_stage)], ...], NotEmpty, after(distinct)]
     """stages that `alphacut run` computes"""
     shares: bool = True
     """whether to compute the fraction of the widths that each input causes"""
@@ -207,7 +215,7 @@ class CellContent(Section, defer_build=True):
 class CellCase(CellContent):
     """A case of which the cell alone is built; other sections are kept as they stand in the file.
 
-    The structure's section is among them, see `with_structures`.
+    The sections of the structure and of analyses are among them, see `with_structures`.
     """
 
     records: object = None
@@ -215,9 +223,3 @@ class CellCase(CellContent):
     study: object = ()
     envelope: object = None
     identify: object = None
-    probability: object = None
-    decision: object = None
-    tolerances: object = None
-    fragility: object = None
-    floor_spectrum: object = None
-    response_spectrum: object = None

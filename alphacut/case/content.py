@@ -8,15 +8,9 @@ from functools import cached_property
 from pathlib import Path
 
 from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
-from alphacut.case.floors import FloorSpectrumSection
-from alphacut.case.limits import (
-    DecisionSection,
-    FragilitySection,
-    ProbabilitySection,
-    QuestionSection,
-    TolerancesSection,
-)
+from alphacut.case.limits import AnalysisSection, FragilitySection, QuestionSection
 from alphacut.case.loads import ForceSection, RecordsSection, with_forces
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection, Identify, Study
@@ -30,7 +24,10 @@ from alphacut.fuzzy import FuzzyNumber
 
 
 class Content(CellContent):
-    """A case, with one section of `alphacut.case.structures.STRUCTURES` for its structure."""
+    """A case, with the sections of its structure and of the analyses that it asks for.
+
+    These stand in `alphacut.case.structures.STRUCTURES` and `alphacut.case.analyses.ANALYSES`.
+    """
 
     microstructure: AtFirstUse[MicrostructureSection] | None = None
     records: AtFirstUse[RecordsSection] | None = None
@@ -38,45 +35,36 @@ class Content(CellContent):
     study: tuple[AtFirstUse[Study], ...] = ()
     envelope: AtFirstUse[EnvelopeSection] | None = None
     identify: AtFirstUse[Identify] | None = None
-    probability: AtFirstUse[ProbabilitySection] | None = None
-    decision: AtFirstUse[DecisionSection] | None = None
-    tolerances: AtFirstUse[TolerancesSection] | None = None
-    fragility: AtFirstUse[FragilitySection] | None = None
-    floor_spectrum: AtFirstUse[FloorSpectrumSection] | None = None
-    response_spectrum: AtFirstUse[ResponseSpectrumSection] | None = None
+
+    def asked(self, stage: str = "envelope") -> dict[str, AnalysisSection]:
+        """Return the sections of the analyses of a stage, by key in the order of the page.
+
+        If the case has a structure, a limit of "drift", which means every storey, is replaced by
+        one limit of each storey: drift1, drift2 …
+        """
+        # The fields of analyses are those of the class that `with_structures` derives from this.
+        found: dict[str, AnalysisSection] = {}
+        for key, analysis in ANALYSES.items():
+            section = getattr(self, key, None)
+            if section is not None and analysis.stage == stage:
+                found[key] = section
+                if self.structure is not None:
+                    found[key] = section.with_storeys(self.structure)
+        return found
 
     @property
     def questions(self) -> dict[str, QuestionSection]:
-        """Return the sections that ask about limits of the response, by key.
-
-        The keys are probability, decision, tolerances and fragility, in this order; missing
-        sections are left out. If the case has a structure, a limit of "drift", which means every
-        storey, is replaced by one limit of each storey: drift1, drift2 …
-        """
-        questions: dict[str, QuestionSection] = {}
-        for section in (self.probability, self.decision, self.tolerances, self.fragility):
-            if section is not None:
-                questions[section.key] = section
-                if self.structure is not None:
-                    questions[section.key] = section.with_storeys(self.structure)
-        return questions
-
-    @property
-    def answered(self) -> dict[str, QuestionSection | FloorSpectrumSection]:
-        """Return the sections that ask for an answer by key: the questions, and floor spectra."""
-        answered: dict[str, QuestionSection | FloorSpectrumSection] = dict(self.questions)
-        if self.floor_spectrum is not None:
-            answered[self.floor_spectrum.key] = self.floor_spectrum
-        return answered
+        """Return those of the sections about the response that state limits of it, by key."""
+        asked = self.asked().items()
+        return {key: section for key, section in asked if isinstance(section, QuestionSection)}
 
     @property
     def incremental_question(self) -> FragilitySection | None:
         """The question of fragility, with one limit of each storey, if columns yield; else None."""
-        question = self.fragility
-        structure = self.structure
-        if question is None or structure is None or not yields(structure.model):
+        question = self.questions.get(FragilitySection.key)
+        if not isinstance(question, FragilitySection) or self.structure is None:
             return None
-        return question.with_storeys(structure)
+        return question if yields(self.structure.model) else None
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:
@@ -182,8 +170,14 @@ class Content(CellContent):
             self._require_records_alone(self.records)
         if "envelope" in self.stages and self.envelope is not None:
             self._require_response(self.envelope, self._one_structure())
-        if "response_spectrum" in self.stages and self.response_spectrum is not None:
-            self._require_spectrum(self.response_spectrum, self._one_structure())
+        for stage in self.stages:
+            for section in self.asked(stage).values() if stage != "envelope" else ():
+                structure = self._one_structure()
+                if isinstance(section, ResponseSpectrumSection):
+                    self._require_spectrum(section, structure)
+                self._require_inputs(section.key, getattr(section, "fuzzy", ()), structure)
+                self._require_modulus()
+                section.require_answerable(structure, 0)
 
     def _require_excitation(self) -> None:
         """Refuse a structure that starts at rest and has no loads.
@@ -195,8 +189,8 @@ class Content(CellContent):
             RefusedError: Nothing moves the structure. Its key names the initial displacements.
         """
         section = self.structure_section
-        if "response_spectrum" in self.stages and "envelope" not in self.stages:
-            return  # the spectrum moves it
+        if "envelope" not in self.stages and any(stage in ANALYSES for stage in self.stages):
+            return  # the analysis has loads of its own
         # Without loads a structure at rest stays at rest, and bounds of that look like results.
         if section is None or section.moves_by_itself:
             return
@@ -207,7 +201,9 @@ class Content(CellContent):
 
     def _require_no_questions_to_records(self) -> None:
         """Refuse what only a suite of records answers."""
-        require(self.fragility is None, "fragility", "without records", "beside [records]")
+        for key, section in self.asked().items():
+            is_answered = section.records != "needed"
+            require(is_answered, key, "without records", "beside [records]")
         for key, question in self.questions.items():
             means = ", ".join(limit.text for limit in question.limits if limit.side == "mean")
             require(not means, f"{key}.limits", means, "a mean over records beside [records]")
@@ -233,11 +229,10 @@ class Content(CellContent):
             section.require_pattern()
             self._require_directions(records, section)
         # For these sections it is not defined how results under several records make one result.
-        for key in ("probability", "tolerances", "identify", "study"):
+        refused = [key for key, x in self.asked().items() if x.records == "refused"]
+        for key in (*refused, "identify", "study"):
             allowed = "[decision] and [fragility], of one motion for each record"
             require(not getattr(self, key), key, "beside [records]", allowed)
-        is_turned = records.has_all_angles and self.floor_spectrum is not None
-        require(not is_turned, "floor_spectrum", "over all angles", "an angle in records.angle")
 
     def _require_directions(self, records: RecordsSection, section: StructureSection) -> None:
         """Refuse records whose components are not those of the structure, and what needs two.
@@ -256,14 +251,8 @@ class Content(CellContent):
         allowed = f"{expected} a record, one for each direction of the ground"
         cure = 'name the directions in [matrices], as directions = ["x", "y"]'
         require(count == expected, "records.files", f"{count} files a record", allowed, cure)
-        for key, question in self.questions.items():
-            sides = [limit.text for limit in question.limits if limit.side in ("max", "min")]
-            is_bounded = not (sides and records.has_all_angles)
-            allowed = "magnitudes over all angles, as roof <= 40 mm"
-            require(is_bounded, f"{key}.limits", ", ".join(sides), allowed)
-        measure = "" if self.fragility is None else self.fragility.measure
-        is_measured = count > 1 or not measure.startswith("RotD")
-        require(is_measured, "fragility.measure", measure, "beside records of two components")
+        for question in self.asked().values():
+            question.require_records(components=count, all_angles=records.has_all_angles)
 
     def _one_structure(self) -> Structure:
         """Return the structure of the case, without what later stages compute.
@@ -317,11 +306,9 @@ class Content(CellContent):
             require(is_first, f"study[{number}].name", study.name, "a name of its own")
             names.append(study.name)
         self._require_modulus()
-        for section in self.questions.values():
-            section.require_answerable(structure)
-        if self.floor_spectrum is not None:
-            count = self.records.component_count if self.records is not None else 0
-            self.floor_spectrum.require_answerable(structure, count)
+        components = self.records.component_count if self.records is not None else 0
+        for section in self.asked().values():
+            section.require_answerable(structure, components)
         if self.identify is not None:
             is_framed = structure.model.floors > 0
             require(is_framed, "identify", "without a frame", "beside [frame]")
@@ -376,7 +363,7 @@ class Content(CellContent):
         structure.inputs(stated, f"{key}.fuzzy")
 
     def _require_spectrum(self, section: ResponseSpectrumSection, structure: Structure) -> None:
-        """Refuse inputs, limits and a structure that the response-spectrum method cannot take."""
+        """Refuse a structure and records that the response-spectrum method cannot take."""
         allowed = "without [identify], whose set is no box"
         require(self.identify is None, section.key, "beside [identify]", allowed)
         suite = () if self.records is None else self.records.suite
@@ -385,9 +372,6 @@ class Content(CellContent):
         require(has_single, "records.files", "of several components", allowed)
         is_linear = structure.linear is not None and not yields(structure.model)
         require(is_linear, "response_spectrum", "of another structure", "linear structures")
-        self._require_inputs(section.key, section.fuzzy, structure)
-        self._require_modulus()
-        section.require_answerable(structure)
 
     def _require_modulus(self) -> None:
         """Refuse columns whose modulus no stage computes."""

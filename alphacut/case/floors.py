@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
+from alphacut.case.limits import AnalysisSection
 from alphacut.case.structure import Structure
-from alphacut.case.types import Names, OneOrMany, Quantity, Section, Time
+from alphacut.case.types import Names, OneOrMany, Quantity, Time
 from alphacut.frame import Accelerogram
 from alphacut.frame.spectra.response_spectrum import MIN_PERIOD
 from alphacut.frame.structures.linear import frequencies
@@ -18,13 +19,14 @@ Period = Annotated[float, Quantity("s", minimum=0)]
 RANGE = ("shortest", "longest", "count")
 
 
-class FloorSpectrumSection(Section):
+class FloorSpectrumSection(AnalysisSection):
     """Spectra of light oscillators on floors, over the α-cuts of [envelope], with its time step.
 
     With [records] they are means over the records.
     """
 
-    key: ClassVar[str] = "floor_spectrum"
+    key = "floor_spectrum"
+    records = "allowed"
 
     outputs: Names
     """absolute accelerations of the floors, as a4 of [frame]"""
@@ -75,14 +77,13 @@ class FloorSpectrumSection(Section):
         own = own[(own >= self.shortest) & (own <= self.longest)]
         return np.union1d(self.stated_periods, own)
 
-    def require_answerable(self, structure: Structure, components: int) -> None:
-        """Refuse a structure without floor spectra, and outputs that are no accelerations.
+    def require_records(self, *, components: int, all_angles: bool) -> None:
+        """Refuse all angles of incidence, over which floor spectra are not bounded."""
+        allowed = "an angle in records.angle"
+        require(not all_angles, "floor_spectrum", "over all angles", allowed)
 
-        Args:
-            structure: The structure.
-            components: Number of components of the records that will move it; 0 where it has a
-                ground motion of its own.
-        """
+    def require_answerable(self, structure: Structure, components: int) -> None:
+        """Refuse a structure without floor spectra, and outputs that are no accelerations."""
         # takes time to import
         from alphacut.frame.analyses.floor_oscillators import moved_by, observed_accelerations
 

@@ -8,7 +8,7 @@ or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the r
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Self, cast
@@ -228,15 +228,53 @@ AnyLimit = Annotated[CaseLimit, PlainValidator(parse_limit)]
 Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
 
 
-class QuestionSection(Section):
-    """A question about limits of outputs, as a section of the case.
+class AnalysisSection(Section):
+    """A section that asks for an analysis of the structure, or of its response.
 
-    `reads_peaks`: the answer follows from the peaks of the limited outputs. `needs_magnitudes`:
-    each output has one limit, of its magnitude.
+    `key`: name of the section. `reads_peaks`: the answer follows from the peaks of the limited
+    outputs. `records`: whether a suite [records] is refused beside it, allowed or needed.
     """
 
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
+    records: ClassVar[Literal["refused", "allowed", "needed"]] = "refused"
+
+    def with_storeys(self, structure: Structure) -> Self:
+        """Return the section with what it says of every storey said of each."""
+        return self
+
+    def require_answerable(self, structure: Structure, components: int) -> None:
+        """Refuse what the structure cannot answer.
+
+        Args:
+            structure: Structure of the case.
+            components: Number of components of the records that will move it; 0 without records.
+        """
+
+    def require_records(self, *, components: int, all_angles: bool) -> None:
+        """Refuse what a suite of records of so many components does not answer.
+
+        Args:
+            components: Number of components of each record.
+            all_angles: Whether records of two components come from all angles of incidence.
+        """
+
+    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
+        """Refuse what cannot be computed, once the structure has its materials.
+
+        Args:
+            structure: The structure; what a stage computes is fuzzy in it, of a width that is not
+                known yet.
+            fuzzy: Names of the fuzzy inputs of [envelope].
+        """
+
+
+class QuestionSection(AnalysisSection):
+    """A question about limits of outputs, as a section of the case.
+
+    `needs_magnitudes`: each output has one limit, of its magnitude.
+    """
+
     needs_magnitudes: ClassVar[bool] = False
     limits: Limits
     """limits of outputs, 'drift1 <= 40 mm', 'max q3 <= 80 mm', 'min q3 >= -60 mm';
@@ -268,9 +306,16 @@ class QuestionSection(Section):
             limits_by_name(limits, (), magnitudes=self.needs_magnitudes)
         return limits
 
-    def require_answerable(self, structure: Structure) -> None:
+    def require_answerable(self, structure: Structure, components: int) -> None:
         """Refuse outputs that the structure lacks, and limits that this question cannot take."""
         self.limits_of(structure)
+
+    def require_records(self, *, components: int, all_angles: bool) -> None:
+        """Refuse limits of one side over all angles, where only magnitudes are bounded."""
+        sides = [limit.text for limit in self.limits if limit.side in ("max", "min")]
+        is_bounded = not (sides and all_angles)
+        allowed = "magnitudes over all angles, as roof <= 40 mm"
+        require(is_bounded, f"{self.key}.limits", ", ".join(sides), allowed)
 
 
 @contextmanager
@@ -301,6 +346,7 @@ class DecisionSection(QuestionSection):
 
     key = "decision"
     reads_peaks = True
+    records = "allowed"
 
 
 class ProbabilitySection(QuestionSection):
@@ -316,17 +362,14 @@ class ProbabilitySection(QuestionSection):
     samples: Annotated[int, Quantity(minimum=1, maximum=10_000, is_integer=True)] = 200
     """random draws at each fuzzy point"""
 
-    def require_answerable(self, structure: Structure) -> None:
+    def require_answerable(self, structure: Structure, components: int) -> None:
         """Refuse limits and random inputs that the structure does not have.
-
-        Args:
-            structure: Structure of the case.
 
         Raises:
             RefusedError: A limit does not fit the structure, or a random input other than E is
                 unknown or crisp.
         """
-        super().require_answerable(structure)
+        super().require_answerable(structure, components)
         # A modulus E that stage modulus computes is still crisp here, and may be random in the run.
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
@@ -341,12 +384,24 @@ class TolerancesSection(QuestionSection):
     most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
     """largest scale that is tried; 1 is that of the case"""
 
+    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
+        """Refuse a largest scale of the supports at which an input is inadmissible."""
+        # takes time to import
+        from alphacut.frame.analyses.tolerances import require_admissible_scale
+
+        try:
+            require_admissible_scale(structure.model, structure.inputs(fuzzy), self.most)
+        except RefusedError as error:
+            # The analysis speaks of its own argument; the user wrote a key of the case.
+            raise RefusedError("tolerances.most", error.value, error.allowed, error.cure) from None
+
 
 class FragilitySection(QuestionSection):
     """Fraction of the records under which limits are exceeded, over a measure of records."""
 
     key = "fragility"
     reads_peaks = True
+    records = "needed"
 
     limits: tuple[AnyLimit, ...] = ()
     """limits of outputs, as of [decision]; or states"""
@@ -381,18 +436,21 @@ class FragilitySection(QuestionSection):
             limits += [replace(limit, event=name) for limit in of_storeys]
         return self.model_copy(update={"limits": tuple(limits)})
 
-    def require_answerable(self, structure: Structure) -> None:
-        """Refuse a structure and limits of which no fragility can be computed.
+    def require_records(self, *, components: int, all_angles: bool) -> None:
+        """Refuse what `QuestionSection` does, and a measure of more components than there are."""
+        super().require_records(components=components, all_angles=all_angles)
+        is_measured = components > 1 or not self.measure.startswith("RotD")
+        require(is_measured, "fragility.measure", self.measure, "beside records of two components")
 
-        Args:
-            structure: Structure of the case, which a suite of records moves.
+    def require_answerable(self, structure: Structure, components: int) -> None:
+        """Refuse a structure and limits of which no fragility can be computed.
 
         Raises:
             RefusedError: The structure has forces or does not start at rest; a limit does not fit
                 it, or does not limit a magnitude; the states do not rise; or `most`, the largest
                 intensity tried, is stated though no columns yield.
         """
-        super().require_answerable(structure)
+        super().require_answerable(structure, components)
         with _naming("fragility.limits"):
             limits = self.limits_of(structure)
             require_fragile(structure.model, limits)

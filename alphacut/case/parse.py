@@ -16,10 +16,10 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from alphacut.base.csv_columns import text_of
 from alphacut.base.errors import RefusedError, cure_of, printable, require
 from alphacut.case.types import Quantity, Section
 from alphacut.io.files import BadInput, nearest, suggestion
-from alphacut.stochastic.particles.csv_columns import text_of
 
 C = TypeVar("C", bound=Section)
 MAX_KEY_PARTS = 30

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo
 
-from alphacut.base.errors import require, require_choice
+from alphacut.base.errors import RefusedError, require, require_choice
 from alphacut.case.limits import AnyLimit, QuestionSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import ALPHA, Levels, Names, Quantity, Section, case_file, text
 from alphacut.frame import TargetSpectrum, asce7_multi_period, eurocode8_spectrum, read_spectrum
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.storey import StoreyFrame
 
 
@@ -104,6 +106,7 @@ class ResponseSpectrumSection(QuestionSection, CodeSpectrumSection):
 
     key = place = "response_spectrum"
     needs_magnitudes = True
+    records = "allowed"
 
     fuzzy: Names
     """inputs that are fuzzy, as of [envelope]"""
@@ -158,7 +161,38 @@ class ResponseSpectrumSection(QuestionSection, CodeSpectrumSection):
             names.append("base_shear")
         return tuple(dict.fromkeys(names))
 
-    def require_answerable(self, structure: Structure) -> None:
+    def observed_model(self, structure: Structure) -> LinearSystem:
+        """Return the linear model with the outputs that a spectrum gives.
+
+        Raises:
+            RefusedError: The structure is not linear.
+        """
+        model = structure.model
+        if not isinstance(model, LinearSystem):
+            raise RefusedError("response_spectrum", "of a system that is not linear", "[frame]")
+        return model.with_outputs(self.outputs_of(structure))
+
+    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
+        """Refuse a structure whose nominal peaks the method does not give.
+
+        Raises:
+            RefusedError: An output takes velocities or accelerations, or a period lies outside the
+                range of the spectrum.
+        """
+        # take time to import
+        from alphacut.frame.modes.spectral_modes import spectral_modes
+        from alphacut.frame.spectra.modal_combination import Combination
+
+        method = Combination(self.target, self.combination, self.modes, own_ratios=self.own_ratios)
+        no_parameters = np.zeros((1, 0))  # one set of them
+        model = self.observed_model(structure)
+        try:
+            method.combined(spectral_modes(model, (), no_parameters))
+        except RefusedError as error:
+            key = f"response_spectrum: {error.key}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None
+
+    def require_answerable(self, structure: Structure, components: int) -> None:
         """Refuse inputs, outputs and limits that the structure does not have.
 
         Raises:

@@ -6,13 +6,15 @@ entry here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
-from pkgutil import resolve_name
 from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import create_model
 
+from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
+from alphacut.case.generated import section_at
 from alphacut.case.types import FirstUse
 
 C = TypeVar("C", bound=CellContent)
@@ -25,7 +27,7 @@ STRUCTURES = {
 
 
 def with_structures(content: type[C], *, built: bool) -> type[C]:
-    """Return a class of cases that also has a field for the section of each kind of structure.
+    """Return a class of cases that also has a field for each kind of structure and each analysis.
 
     Args:
         content: The class without them.
@@ -33,17 +35,23 @@ def with_structures(content: type[C], *, built: bool) -> type[C]:
             are imported; otherwise they are kept as the tables that stand in the file.
 
     Returns:
-        The class. The new fields stand after the fields that `content` inherits, and before its
-        own. Errors are reported in this order.
+        The class. The fields of structures stand after the fields that `content` inherits, and
+        before its own; those of analyses stand behind. Errors are reported in this order.
     """
-    return cast("type[C]", _whole_case(content, tuple(STRUCTURES.items()), built=built))
+    analyses = {key: analysis.section for key, analysis in ANALYSES.items() if analysis.section}
+    structures = tuple(STRUCTURES.items())
+    return cast("type[C]", _whole_case(content, structures, tuple(analyses.items()), built=built))
 
 
 @cache  # Pydantic takes 50 ms for the class, and tests read many cases
 def _whole_case(
-    content: type[CellContent], structures: tuple[tuple[str, str], ...], *, built: bool
+    content: type[CellContent],
+    structures: tuple[tuple[str, str], ...],
+    analyses: tuple[tuple[str, str], ...],
+    *,
+    built: bool,
 ) -> type[CellContent]:
-    """Return a class of cases with a field for the section of each kind of structure.
+    """Return a class of cases with a field for the section of each structure and analysis.
 
     The class is created once for each set of arguments. Its name and docstring are those of
     `content`.
@@ -52,21 +60,26 @@ def _whole_case(
         content: Class of cases without sections of structures.
         structures: Pairs of the name of a section, such as "frame", and of the place "module:Class"
             of its class.
+        analyses: The same of each analysis.
         built: Whether the fields take sections of these classes, or any value. Each may be left
             out, and is None then.
 
     Raises:
         ImportError: A class is to be built and its module cannot be imported.
     """
-    fields: dict[str, Any] = {}
-    for name, place in structures:
-        kind: Any = object
-        if built:
-            section: Any = resolve_name(place)
-            kind = Annotated[section, FirstUse()] | None
-        fields[name] = (kind, None)  # the type of the field, and its default
-    # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest.
-    bases: Any = (content, create_model("Structures", __base__=CellContent, **fields))
-    whole: type[CellContent] = create_model(content.__name__, __base__=bases)
+
+    def fields_of(places: Mapping[str, str]) -> dict[str, Any]:
+        """Return the types of the fields of sections, with their defaults, by name."""
+        if not built:
+            return dict.fromkeys(places, (object, None))
+        sections = {name: section_at(name, place) for name, place in places.items()}
+        return {name: (Annotated[x, FirstUse()] | None, None) for name, x in sections.items()}
+
+    # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest, and
+    # at last those of analyses.
+    of_structures = create_model("Structures", __base__=CellContent, **fields_of(dict(structures)))
+    bases: Any = (content, of_structures)
+    further = fields_of(dict(analyses))
+    whole: type[CellContent] = create_model(content.__name__, __base__=bases, **further)
     whole.__doc__ = content.__doc__
     return whole

@@ -9,7 +9,6 @@ import math
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
@@ -28,6 +27,7 @@ from pydantic.annotated_handlers import GetCoreSchemaHandler
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
+from alphacut.base import quantity as base
 from alphacut.base.errors import RefusedError, is_number, require
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
@@ -99,31 +99,8 @@ def _lines_below_keys(section: type) -> dict[str, str]:
     return lines
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """Type of a key that holds a quantity, as metadata of `Annotated`.
-
-    Every value that the quantity may take lies in the range: all of a fuzzy number's support.
-
-    Args:
-        si: SI unit, a key of `QUANTITIES`; empty for a number without a unit.
-        above: Value that the range does not reach from above.
-        minimum: Smallest value in the range.
-        below: Value that the range does not reach from below.
-        maximum: Largest value in the range.
-        fuzzy: Whether the quantity may be fuzzy.
-        is_integer: Whether it is a whole number.
-        cure: What to give in place of a value that is refused.
-    """
-
-    si: str = ""
-    above: float = -math.inf
-    minimum: float = -math.inf
-    below: float = math.inf
-    maximum: float = math.inf
-    fuzzy: bool = False
-    is_integer: bool = False
-    cure: str = ""
+class Quantity(base.Quantity):
+    """Type of a key that holds a quantity: its unit and range, and how it is read from a case."""
 
     @property
     def allowed(self) -> str:

@@ -10,11 +10,11 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
+from alphacut.base.csv_columns import text_of
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import write_text
 from alphacut.io.files import as_json, suggestion
 from alphacut.rve.interruption import uninterrupted
-from alphacut.stochastic.particles.csv_columns import text_of
 
 if TYPE_CHECKING:
     from alphacut.case.cell import CellContent

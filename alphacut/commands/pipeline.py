@@ -15,10 +15,12 @@ from alphacut.base.errors import RefusedError, require
 from alphacut.base.kept_files import locked
 from alphacut.base.progress_bar import progress_reporter
 from alphacut.case.content import Case, Content
+from alphacut.case.generated import GeneratedSection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.microstructure import MicrostructureSection
 from alphacut.case.motion import EnvelopeSection
+from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import Structure
 from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
@@ -39,7 +41,7 @@ from alphacut.stages import (
     spectrum,
     suite,
 )
-from alphacut.stages.answers import ANSWERS, Response
+from alphacut.stages.answers import Response
 from alphacut.stages.cell import CellProblem
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import fuzzy_loss, fuzzy_modulus
@@ -161,6 +163,9 @@ class Pipeline:
             self._compute_motion()
         if "response_spectrum" in stages:
             self._compute_spectrum()
+        for stage in stages:
+            if stage not in ("microstructure", "modulus", "envelope", "response_spectrum"):
+                self._compute_alone(stage)
         if self.content.shares:
             self._compute_shares()
         return results
@@ -180,7 +185,7 @@ class Pipeline:
             kinds += of_record * len(content.records.suite)
         elif "envelope" in content.stages:
             kinds += ["envelope"] * max(1, len(content.study))
-        kinds += content.answered
+        kinds += content.asked()
         if content.shares:
             kinds.append("shares")
         if self.figures:
@@ -261,10 +266,8 @@ class Pipeline:
             self._compute_envelopes(structure, section)
             peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
             response = Response(structure, task, peaks)
-        for kind in ANSWERS:
-            if (question := content.answered.get(kind.key)) is not None:
-                stage = answers.stage(kind, question, response)
-                results.answers[kind.key] = self.store.take(stage).numbers
+        for key, question in content.asked().items():
+            results.answers[key] = self.store.take(answers.stage(key, question, response)).numbers
 
     def _structure(self) -> Structure:
         """Return the structure with the material that stage modulus found, if there is one."""
@@ -279,6 +282,19 @@ class Pipeline:
         assert structure is not None
         return structure
 
+    def _compute_alone(self, stage: str) -> None:
+        """Compute the answers of a stage that is an analysis of the structure, without a response.
+
+        Raises:
+            RefusedError: An input, output or limit does not fit the structure.
+            FailedError: The analysis fails.
+        """
+        self.results.structure = structure = self._structure()
+        for key, question in self.content.asked(stage).items():
+            assert isinstance(question, GeneratedSection)  # others have stages above
+            alone = answers.stage_alone(key, question, structure)
+            self.results.answers[key] = self.store.take(alone).numbers
+
     def _compute_spectrum(self) -> None:
         """Compute combined peaks under a response spectrum, and what follows from them.
 
@@ -290,8 +306,8 @@ class Pipeline:
             FailedError: A peak under a record is not bounded.
         """
         content = self.content
-        section = content.response_spectrum
-        assert section is not None  # of stage response_spectrum
+        (section,) = content.asked("response_spectrum").values()
+        assert isinstance(section, ResponseSpectrumSection)
         structure = self._structure()
         self.results.structure = structure
         kept = self.results.answers

@@ -46,11 +46,10 @@ def require_runnable(content: Content) -> Built:
         study_of_image = _require_material(content)
     if "envelope" in content.stages:
         records = _require_motion(content)
-    section = content.response_spectrum
-    if "response_spectrum" in content.stages and section is not None and content.structure:
-        from alphacut.stages.spectrum import require_possible
-
-        require_possible(section, content.structure)
+    for stage in content.stages:
+        for section in content.asked(stage).values() if stage != "envelope" else ():
+            assert content.structure is not None  # as the case was checked for
+            section.require_computable(content.structure, ())
     return Built(study_of_image, records)
 
 
@@ -147,9 +146,6 @@ def _require_motion_of(
         structure = moved_by(structure, records[0])  # which stands for all
     for task in tasks(section, content.study):
         require_envelope(**task.arguments(structure))
-    if content.tolerances is not None:
-        from alphacut.stages.answers import Response, require_tolerances
-
-        (own_task,) = tasks(section, ())  # of [envelope], as questions are
-        require_tolerances(content.tolerances, Response(structure, own_task))
+    for question in content.asked().values():
+        question.require_computable(structure, section.fuzzy)
     return records

@@ -6,12 +6,14 @@ Figures that the paper alone needs are drawn by cases/paper_figures.py.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pkgutil import resolve_name
 
 from matplotlib.figure import Figure
 
+from alphacut.case.analyses import ANALYSES
 from alphacut.figures import answers, envelope, material, structure
 from alphacut.figures.style import figure_style, save
-from alphacut.frame import Fragility, StoreyFrame
+from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.storey import yields
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
@@ -22,10 +24,9 @@ from alphacut.stages.summary import Parts, Results
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
-    Names are "modulus", "image", "update-inputs", "structure", "spectra", the key of each answered
-    question, "fragility-curves", "damage-states", and of a study "envelope-STUDY-OUTPUT" for each
-    drawn output, "profile-STUDY" and "loops-STUDY". Figures of the paper have "figNUMBER-" before
-    the name.
+    Names are "modulus", "image", "update-inputs", "structure", "spectra", those of the pictures of
+    each answer, and of a study "envelope-STUDY-OUTPUT" for each drawn output, "profile-STUDY" and
+    "loops-STUDY". Figures of the paper have "figNUMBER-" before the name.
 
     Args:
         results: Results of a run; stages that are missing have no figures.
@@ -45,11 +46,10 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
         if scaled is not None:
             yield "spectra", answers.draw_spectra(scaled)
     for key, answer in results.answers.items():
-        yield key, answers.DRAWINGS[key](answer)
-        if isinstance(answer, Fragility) and answer.increments:  # of a frame that yields
-            yield "fragility-curves", answers.draw_incremental(answer)
-        if isinstance(answer, Fragility) and answer.states:
-            yield "damage-states", answers.draw_states(answer)
+        for name, picture in ANALYSES[key].pictures.items():
+            figure = resolve_name(picture.draw)(answer)
+            if figure is not None:
+                yield name, figure
     units = Parts.of(results).shown_units
     for task in results.tasks:
         yield from envelope.drawings(task, results)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from textwrap import fill
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -266,7 +265,7 @@ def draw_fragility_of(axes: Axes, answer: Fragility, part: LimitFragility) -> No
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
 
 
-def draw_states(answer: Fragility) -> Figure:
+def draw_states(answer: Fragility) -> Figure | None:
     """Draw all damage states over the intensity measure, each in a colour.
 
     Of each state there are the band of the fraction of records on the lowest level, and for the
@@ -275,6 +274,8 @@ def draw_states(answer: Fragility) -> Figure:
     Args:
         answer: Fragility with damage states.
     """
+    if not answer.states:
+        return None
     figure, axes = plt.subplots()
     parts = [answer.limits[state] for state in answer.states]
     top = max(float(part.measure[-1]) for part in parts)
@@ -365,7 +366,7 @@ def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
     return figure
 
 
-def draw_incremental(answer: Fragility) -> Figure:
+def draw_incremental(answer: Fragility) -> Figure | None:
     """Draw the smallest and the largest peak found over the intensity measure of each record.
 
     Each peak has a panel with all its limits, and each record a band for each level. In SVG the
@@ -373,8 +374,10 @@ def draw_incremental(answer: Fragility) -> Figure:
 
     Args:
         answer: Fragility of a frame that yields, with the peaks under each record at rising
-            intensity.
+            intensity. Of other structures nothing is drawn.
     """
+    if not answer.increments:
+        return None
     # Limits of the same peak share its panel, for they share its curves.
     demands = answer.limits_by_demand
     size = WIDTH, 0.6 + 1.9 * len(demands)
@@ -454,16 +457,3 @@ def draw_accuracy(answer: SpectrumAccuracy) -> Figure:
     axes.set_yticks(rows, list(answer.outputs))
     axes.set_xlabel("combined peak over the peak under the record, less 1 [%]")
     return figure
-
-
-DRAWINGS: dict[str, Callable[[Any], Figure]] = {
-    "probability": draw_probability,
-    "decision": draw_decision,
-    "tolerances": draw_tolerances,
-    "fragility": draw_fragility,
-    "floor_spectrum": draw_floor_spectrum,
-    "response_spectrum": draw_response_spectrum,
-    "spectrum_checks": draw_decision,
-    "spectrum_accuracy": draw_accuracy,
-}
-"""Function that draws the answer to each question, by the question's key."""

@@ -18,6 +18,7 @@ import xarray
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
+from alphacut.case.analyses import ANALYSES
 from alphacut.frame import Sensitivity
 from alphacut.frame.analyses.answer import enclosing_box_words, table_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
@@ -84,6 +85,7 @@ def render_page(folder: ResultsFolder) -> str:
         isotropic_label=isotropic_label,
         enclosing_box_words=enclosing_box_words,
         envelopes=envelopes,
+        analyses=ANALYSES,
     )
 
 
@@ -126,7 +128,10 @@ def render_template(template: str, **content: object) -> str:
 
 def named_words() -> dict[str, dict[str, str]]:
     """Return the captions of figures by their names, and the meanings of terms."""
-    return tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
+    words = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
+    for analysis in ANALYSES.values():
+        words["figures"] |= {name: x.caption for name, x in analysis.pictures.items()}
+    return words
 
 
 def plot(
@@ -252,5 +257,6 @@ def caption(name: str, captions: Mapping[str, str]) -> str:
         if match[2] != "all":
             text += f", study {match[2]}"
     else:
-        text = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
+        known = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
+        text = captions.get(rest, known)
     return number + text

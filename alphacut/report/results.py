@@ -22,6 +22,7 @@ from alphacut.base.number_text import (
     text_table,
 )
 from alphacut.frame import (
+    Decision,
     FloorSpectrum,
     Peak,
     SpectrumChecks,
@@ -465,10 +466,11 @@ def limits_by_peak(parts: Parts) -> dict[str, list[tuple[float, str]]]:
         exceeded, in the order of the case. Empty without this question.
     """
     limits: dict[str, list[tuple[float, str]]] = {}
-    if parts.decision is None:
+    decided = parts.answered.get(Decision.key)
+    if not isinstance(decided, Decision):
         return limits
     short = {"exceeded": "yes", "not exceeded": "no", "can be exceeded": "can be"}
-    for decision in parts.decision.limits.values():
+    for decision in decided.limits.values():
         verdict = short.get(decision.verdict, decision.verdict)
         limits.setdefault(decision.peak_name, []).append((decision.limit, verdict))
     return limits
@@ -718,8 +720,6 @@ def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:
             for name, ends in statistics.items():
                 what = f"{name} of the records' peaks of {output}"
                 yield ComparedEntry(what, unit, float(ends[0]))  # on the lowest level
-    if parts.decision is not None:
-        for limit in parts.decision.limits.values():
-            yield ComparedEntry(limit.words, no_unit, limit.verdict_words)
-    if parts.tolerances is not None and parts.tolerances.kept is not None:
-        yield ComparedEntry("scale of tolerances", no_unit, parts.tolerances.kept)
+    for answer in parts.answers:
+        for what, value in answer.compared().items():
+            yield ComparedEntry(what, no_unit, value)

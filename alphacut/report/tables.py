@@ -54,11 +54,8 @@ def frames(parts: Parts) -> dict[str, pd.DataFrame]:
         found["records"] = rows_of(parts.records)
     if parts.shares:
         found["shares"] = rows_of(Sensitivity(parts.shares))
-    if parts.fragility is not None and parts.fragility.increments:
-        found["fragility_sets"] = pd.DataFrame(parts.fragility.crossings())
-        found["fragility_curves"] = pd.DataFrame(parts.fragility.curves())
-    if parts.fragility is not None and parts.fragility.has_pelicun_table:
-        found["pelicun"] = pd.DataFrame(parts.fragility.pelicun())
+    for answer in parts.answers:
+        found |= {name: pd.DataFrame(rows) for name, rows in answer.further_records().items()}
     for answer in parts.answers:
         found[answer.key] = rows_of(answer)
     return found

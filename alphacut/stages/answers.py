@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pkgutil import resolve_name
 from typing import Any, TypedDict
 
 from alphacut.base.errors import RefusedError
 from alphacut.base.progress_bar import Progress
+from alphacut.case.analyses import ANALYSES, answer_class
 from alphacut.case.floors import FloorSpectrumSection
+from alphacut.case.generated import GeneratedSection
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
@@ -23,9 +26,6 @@ from alphacut.frame import (
     FloorSpectrum,
     Fragility,
     Probability,
-    SpectrumAccuracy,
-    SpectrumChecks,
-    SpectrumResponse,
     SuitePeaks,
     Tolerances,
     decide,
@@ -38,8 +38,8 @@ from alphacut.frame.analyses.fragility import fragility_of
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.peaks import Peaks
+from alphacut.frame.analyses.question import Asked
 from alphacut.frame.analyses.suites import ScaledRecord
-from alphacut.frame.analyses.tolerances import require_admissible_scale
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
@@ -224,37 +224,52 @@ def floor_spectra(
     )
 
 
-ANSWERS: dict[type[Answer], Callable[[Any, Response, Progress], Answer]] = {
-    Probability: probability_of,
-    Decision: decision,
-    Tolerances: tolerances_of,
-    Fragility: fragility_answer,
-    FloorSpectrum: floor_spectra,
-}
-"""Kinds of answers to questions, each with its function of section and response."""
-KINDS: tuple[type[Answer], ...] = (*ANSWERS, SpectrumResponse, SpectrumChecks, SpectrumAccuracy)
-"""Kinds of all answers of a run, in the order of the report."""
+def answer_of(section: GeneratedSection, response: Response, tick: Progress) -> Answer:
+    """Return the answer to a section that is made from the options of its analysis."""
+    asked = Asked(
+        response.structure.model,
+        response.inputs,
+        response.task.section.alpha,
+        **response.times,
+        peaks=response.peaks,
+    )
+    return section.question(response.structure).answer(asked, tick)
 
 
-def stage(kind: type[Answer], section: Section, response: Response) -> Stage[Answer]:
-    """Return the stage of the answer of a kind to the question of a section."""
+def stage(key: str, section: Section, response: Response) -> Stage[Answer]:
+    """Return the stage of the answer to the question of a section with a key."""
     # Answers are kept in the units and words of this package, so that its source counts as well.
-    compute = partial(_computed, kind, section, response)
+    compute = partial(_computed, key, section, response)
     packages = ("fuzzy", "frame", "alphacut")
-    return Stage(kind.key, [section, response], packages, kind, compute)
+    return Stage(key, [section, response], packages, answer_class(key), compute)
+
+
+def stage_alone(key: str, section: GeneratedSection, structure: Structure) -> Stage[Answer]:
+    """Return the stage of an analysis of a structure that takes no response.
+
+    Args:
+        key: Key of the answer.
+        section: Its options, with the names of the inputs that are `fuzzy`, and `alpha`.
+        structure: The structure.
+    """
+
+    def compute(context: StageContext) -> StageResult[Answer]:
+        """Answer the question, reporting progress to the context."""
+        question = section.question(structure)
+        inputs = structure.inputs(question.fuzzy, f"{key}.fuzzy")  # type: ignore[attr-defined]
+        asked = Asked(structure.model, inputs, question.alpha)  # type: ignore[attr-defined]
+        return StageResult(question.answer(asked, context.tick))
+
+    inputs = [section, structure.model, structure.numbers]
+    return Stage(key, inputs, ("fuzzy", "frame", "alphacut"), answer_class(key), compute)
 
 
 def _computed(
-    kind: type[Answer], section: Section, response: Response, context: StageContext
+    key: str, section: Section, response: Response, context: StageContext
 ) -> StageResult[Answer]:
     """Answer the question of a section, reporting progress to the context."""
-    return StageResult(ANSWERS[kind](section, response, context.tick))
-
-
-def require_tolerances(section: TolerancesSection, response: Response) -> None:
-    """Refuse a largest scale of the supports at which an input is inadmissible."""
-    try:
-        require_admissible_scale(response.structure.model, response.inputs, section.most)
-    except RefusedError as error:
-        # The analysis speaks of its own argument; the user wrote a key of the case.
-        raise RefusedError("tolerances.most", error.value, error.allowed, error.cure) from None
+    place = ANALYSES[key].compute
+    compute: Callable[[Any, Response, Progress], Answer] = answer_of
+    if place:
+        compute = resolve_name(place)
+    return StageResult(compute(section, response, context.tick))

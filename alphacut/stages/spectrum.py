@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-import numpy as np
-
-from alphacut.base.errors import RefusedError
 from alphacut.case.spectrum import ResponseSpectrumSection
 from alphacut.case.structure import Structure
 from alphacut.frame import (
@@ -22,41 +19,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.analyses.spectrum_accuracy import accuracy_of
 from alphacut.frame.analyses.suites import ScaledRecord
-from alphacut.frame.modes.spectral_modes import spectral_modes
-from alphacut.frame.spectra.modal_combination import Combination
-from alphacut.frame.structures.linear import LinearSystem
 from alphacut.stages.store import Stage, StageContext, StageResult
-
-
-def observed_model(section: ResponseSpectrumSection, structure: Structure) -> LinearSystem:
-    """Return the linear model with the outputs that a spectrum gives.
-
-    Raises:
-        RefusedError: The structure is not linear.
-    """
-    model = structure.model
-    if not isinstance(model, LinearSystem):
-        raise RefusedError("response_spectrum", "of a system that is not linear", "[frame]")
-    return model.with_outputs(section.outputs_of(structure))
-
-
-def require_possible(section: ResponseSpectrumSection, structure: Structure) -> None:
-    """Refuse a structure whose nominal peaks the method does not give.
-
-    Raises:
-        RefusedError: An output takes velocities or accelerations, or a period lies outside the
-            range of the spectrum.
-    """
-    method = Combination(
-        section.target, section.combination, section.modes, own_ratios=section.own_ratios
-    )
-    no_parameters = np.zeros((1, 0))  # one set of them
-    model = observed_model(section, structure)
-    try:
-        method.combined(spectral_modes(model, (), no_parameters))
-    except RefusedError as error:
-        key = f"response_spectrum: {error.key}"
-        raise RefusedError(key, error.value, error.allowed, error.cure) from None
 
 
 def stage(section: ResponseSpectrumSection, structure: Structure) -> Stage[SpectrumResponse]:
@@ -71,7 +34,7 @@ def _response(
 ) -> StageResult[SpectrumResponse]:
     """Compute the combined peaks of a structure."""
     found = spectrum_response(
-        observed_model(section, structure),
+        section.observed_model(structure),
         structure.inputs(section.fuzzy),
         section.target,
         combination=section.combination,
@@ -131,7 +94,7 @@ def accuracy_stage(
 
     def compute(context: StageContext) -> StageResult[SpectrumAccuracy]:
         """Compare the peaks under each record, reporting progress."""
-        model = observed_model(section, structure)
+        model = section.observed_model(structure)
         return StageResult(accuracy_of(model, found, records, step=step, progress=context.tick))
 
     inputs = [section, structure.model, structure.numbers, records, step]

@@ -11,30 +11,17 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.number_text import STANDARD_GRAVITY, ShownUnit, axis_prefix
+from alphacut.case.analyses import ANALYSES, answer_class
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
-from alphacut.frame import (
-    Decision,
-    FloorSpectrum,
-    Fragility,
-    LearnedInputs,
-    Probability,
-    SpectrumAccuracy,
-    SpectrumChecks,
-    SpectrumResponse,
-    StoreyFrame,
-    SuitePeaks,
-    Tolerances,
-)
+from alphacut.frame import LearnedInputs, StoreyFrame, SuitePeaks
 from alphacut.frame.analyses.answer import Answer
-from alphacut.frame.analyses.limits import LimitResult
 from alphacut.frame.analyses.storey_table import assumptions, storey_table
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.quantities import output_of
 from alphacut.io.files import Document, as_json
 from alphacut.io.results import COMPLETE, RUN_AGAIN, PlainName, ResultsFolder
 from alphacut.io.typed_json import from_document, to_document
-from alphacut.stages.answers import KINDS
 from alphacut.stages.envelope import EnvelopeResult, EnvelopeTask
 from alphacut.stages.image import ImageResult
 from alphacut.stages.modulus import ModulusResult
@@ -168,14 +155,7 @@ class Parts:
     envelopes: dict[PlainName, EnvelopeResult] = field(default_factory=dict)
     records: SuitePeaks | None = None
     update: LearnedInputs | None = None
-    probability: Probability | None = None
-    decision: Decision | None = None
-    tolerances: Tolerances | None = None
-    fragility: Fragility | None = None
-    floor_spectrum: FloorSpectrum | None = None
-    response_spectrum: SpectrumResponse | None = None
-    spectrum_checks: SpectrumChecks | None = None
-    spectrum_accuracy: SpectrumAccuracy | None = None
+    answered: dict[str, Answer] = field(default_factory=dict)
     shares: ShareTable = field(default_factory=dict)
 
     @classmethod
@@ -204,13 +184,20 @@ class Parts:
             "records": results.suite,
             "update": results.learned,
         }
-        # Answers are fields under the keys of their questions.
-        return cls(**(parts | results.answers | further))
+        return cls(**(parts | {"answered": results.answers} | further))
 
     def parts(self) -> Document:
-        """Return all parts by name but those that the run lacks, as a JSON document."""
+        """Return all parts by name but those that the run lacks, as a JSON document.
+
+        The answers stand by their own names.
+        """
         # Empty texts and numbers of zero are results; None and empty tables are missing stages.
-        values = {x.name: getattr(self, x.name) for x in fields(self)}
+        values: dict[str, object] = {}
+        for x in fields(self):
+            if x.name == "answered":
+                values |= {answer.key: answer for answer in self.answers}
+            else:
+                values[x.name] = getattr(self, x.name)
         is_there = {name: value is not None and value != {} for name, value in values.items()}
         return {name: to_document(x) for name, x in values.items() if is_there[name]}
 
@@ -255,24 +242,16 @@ class Parts:
             else:
                 factor, label = axis_prefix(largest.get(output, 0.0), unit)
                 found[output] = ShownUnit(label, factor)
-        # Later entries replace earlier ones, so the limits are taken in reversed order: if an
-        # output has several limits, the first one of the case stays.
-        limits: list[LimitResult] = []
-        if self.probability is not None:
-            limits += reversed(self.probability.events.values())
-        for answer in (self.spectrum_checks, self.fragility, self.decision):
-            if answer is not None:
-                limits += reversed(answer.limits.values())
-        for limit in limits:
-            if limit.stated_unit is not None and limit.output in units:
-                found[limit.output] = limit.stated_unit
+        # Later entries replace earlier ones: the unit of the first answer that states one stays.
+        for answer in reversed(self.answers):
+            stated = answer.stated_units
+            found |= {output: unit for output, unit in stated.items() if output in units}
         return found
 
     @property
     def answers(self) -> list[Answer]:
         """The answers to all questions of the case, in the order of the report."""
-        answers = (getattr(self, kind.key) for kind in KINDS)
-        return [answer for answer in answers if answer is not None]
+        return [self.answered[key] for key in ANALYSES if key in self.answered]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -305,7 +284,12 @@ class Summary(Parts):
         """
         content = folder.content(SUMMARY)
         try:
-            return from_document(cls, json.loads(content))
+            document = json.loads(content)
+            answered = {}
+            for key in ANALYSES:
+                if isinstance(document, dict) and key in document:
+                    answered[key] = from_document(answer_class(key), document.pop(key), key)
+            return replace(from_document(cls, document), answered=answered)
         except (ValueError, RecursionError) as error:
             # Both readers begin their messages with what is wrong, such as the name of the key.
             keys = str(error).partition(":")[0] or "no JSON object"

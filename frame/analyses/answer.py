@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.base.csv_text import csv_text
 from alphacut.base.extras import extra_named
 from alphacut.base.nature import Nature
-from alphacut.base.number_text import Table, text_table
+from alphacut.base.number_text import ShownUnit, Table, text_table
 from alphacut.fuzzy.result import of_enclosing_box
 
 if TYPE_CHECKING:
@@ -53,6 +53,19 @@ class Answer(ABC):
     @abstractmethod
     def words(self) -> str:
         """Return sentences that explain how to read the result."""
+
+    @property
+    def stated_units(self) -> dict[str, ShownUnit]:
+        """Units in which the limits of outputs are stated, by output; of several the first."""
+        return {}
+
+    def further_records(self) -> dict[str, list[Record]]:
+        """Return further rows of numbers in SI units, by the names of their files."""
+        return {}
+
+    def compared(self) -> dict[str, float | str]:
+        """Return the numbers and verdicts without a unit that are compared with another run's."""
+        return {}
 
     def nature_text(self, nature: Nature) -> str:
         """Return the guarantee of a bound as text, with the enclosing box if there is one."""

@@ -17,9 +17,16 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Mask
 from alphacut.base.errors import require_choice
-from alphacut.base.number_text import MINUS, Table, engineering, percent_text
+from alphacut.base.number_text import MINUS, ShownUnit, Table, engineering, percent_text
 from alphacut.frame.analyses.answer import Answer, Record, known, table_of
-from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit, limits_by_name
+from alphacut.frame.analyses.limits import (
+    ANY,
+    Limit,
+    LimitResult,
+    about_limit,
+    limits_by_name,
+    stated_units,
+)
 from alphacut.frame.analyses.peaks import Peak, Peaks, peaks
 from alphacut.frame.analyses.suites import SuitePeaks
 from alphacut.frame.result import Envelope
@@ -138,6 +145,15 @@ class Decision(Answer):
     title = "Can or must limits be exceeded?"
     alpha: Array
     limits: dict[str, LimitDecision]
+
+    @property
+    def stated_units(self) -> dict[str, ShownUnit]:
+        """Units in which the limits are stated, by output."""
+        return stated_units(self.limits.values())
+
+    def compared(self) -> dict[str, float | str]:
+        """Return the verdict on each limit in words."""
+        return {limit.words: limit.verdict_words for limit in self.limits.values()}
 
     def table(self) -> Table:
         """Return a row for each limit; margin, bound, attained peak and gap are of the lowest α."""

@@ -27,7 +27,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import STANDARD_GRAVITY, Table, engineering, range_text
+from alphacut.base.number_text import STANDARD_GRAVITY, ShownUnit, Table, engineering, range_text
 from alphacut.base.progress_bar import Progress, nth_subprogress
 from alphacut.frame.analyses.answer import Answer, Record, known, records_csv, table_of
 from alphacut.frame.analyses.damage_states import (
@@ -51,6 +51,7 @@ from alphacut.frame.analyses.limits import (
     about_limit,
     limits_by_name,
     require_fragile,
+    stated_units,
 )
 from alphacut.frame.analyses.peaks import Peak
 from alphacut.frame.analyses.probability import CONFIDENCE, clopper_pearson
@@ -436,6 +437,20 @@ class Fragility(Answer):
     limits: dict[str, LimitFragility]
     increments: dict[str, Increments] = field(default_factory=dict)
     states: tuple[str, ...] = ()
+
+    @property
+    def stated_units(self) -> dict[str, ShownUnit]:
+        """Units in which the limits are stated, by output."""
+        return stated_units(self.limits.values())
+
+    def further_records(self) -> dict[str, list[Record]]:
+        """Return sets and curves of a frame that yields, and Pelicun's table of damage states."""
+        found: dict[str, list[Record]] = {}
+        if self.increments:
+            found = {"fragility_sets": self.crossings(), "fragility_curves": self.curves()}
+        if self.has_pelicun_table:
+            found["pelicun"] = self.pelicun()
+        return found
 
     def table(self) -> Table:
         """Return a table of texts with a row for each limit and for each event of several limits.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -249,6 +249,15 @@ class LimitResult:
     def columns(self, name: str) -> Record:
         """Return the first columns of a row of numbers about the limit with a name."""
         return {"limited output": name, "unit": self.unit, "limit": self.limit}
+
+
+def stated_units(results: Iterable[LimitResult]) -> dict[str, ShownUnit]:
+    """Return the unit in which the first limit of each output is stated, by output."""
+    found: dict[str, ShownUnit] = {}
+    for result in results:
+        if result.stated_unit is not None:
+            found.setdefault(result.output, result.stated_unit)
+    return found
 
 
 def about_limit(limit: Limit, unit: str) -> LimitResult:

@@ -19,10 +19,17 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import checked_number, require, require_choice
-from alphacut.base.number_text import MINUS, Table, range_text
+from alphacut.base.number_text import MINUS, ShownUnit, Table, range_text
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.analyses.answer import Answer, Record, table_of
-from alphacut.frame.analyses.limits import ANY, Limit, LimitResult, about_limit, limits_by_name
+from alphacut.frame.analyses.limits import (
+    ANY,
+    Limit,
+    LimitResult,
+    about_limit,
+    limits_by_name,
+    stated_units,
+)
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import make_flow
@@ -104,6 +111,11 @@ class Probability(Answer):
     random: tuple[str, ...]
     samples: int
     step: float
+
+    @property
+    def stated_units(self) -> dict[str, ShownUnit]:
+        """Units in which the limits are stated, by output."""
+        return stated_units(self.events.values())
 
     def table(self) -> Table:
         """Return a table of texts with a row for each limit, and last for any of them.

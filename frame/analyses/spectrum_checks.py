@@ -40,6 +40,10 @@ class SpectrumChecks(Decision):
     title = "Are limits kept under the response spectrum?"
     notes: tuple[str, ...] = ()
 
+    def compared(self) -> dict[str, float | str]:
+        """Return nothing: the limits may be those of a decision beside this."""
+        return {}
+
     def words(self) -> str:
         """Return sentences that explain the verdicts, and what a code asks for besides."""
         text = (

@@ -74,6 +74,10 @@ class Tolerances(Answer):
     nature: Nature
     supports: dict[str, Support]
 
+    def compared(self) -> dict[str, float | str]:
+        """Return the largest scale that keeps the limits, if there is one."""
+        return {} if self.kept is None else {"scale of tolerances": self.kept}
+
     def table(self) -> Table:
         """Return a table of texts: a row on the scale, then a row on the support of each input.
 

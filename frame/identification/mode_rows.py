@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.csv_columns import fields, number
 from alphacut.base.errors import require
-from alphacut.stochastic.particles.csv_columns import fields, number
 
 
 @dataclass(frozen=True, eq=False)

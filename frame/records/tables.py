@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.base.arrays import Array
+from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, cure_of, require
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import peaks_in_text
@@ -37,7 +38,6 @@ from alphacut.frame.records.units import (
     other_quantity,
     seconds_of,
 )
-from alphacut.stochastic.particles.csv_columns import NUMBER
 
 # The allowed value in messages on the head of a table.
 EXPECTED_HEAD = "time [s],acceleration [m/s^2], [g] or [gal]"

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
+from alphacut.base.csv_columns import fields, number
 from alphacut.base.errors import path_of, require, require_numbers
 from alphacut.base.number_text import percent_text
 from alphacut.frame.records.units import acceleration_factor
-from alphacut.stochastic.particles.csv_columns import fields, number
 
 
 class MeanRule(NamedTuple):

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.base.arrays import Array, Mask
+from alphacut.base.csv_columns import length_columns
 from alphacut.base.errors import RefusedError, checked_number, require, require_numbers
 from alphacut.base.extras import extra_named
 from alphacut.base.pictures import opened_picture
-from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.particles import Particles, close_pairs, surface_distance
 from alphacut.stochastic.particles.radius_distributions import require_radii
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.base.arrays import Array
+from alphacut.base.csv_columns import length_columns
 from alphacut.base.errors import RefusedError, require
-from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.distribution import TruncatedNormal
 
 

@@ -28,7 +28,10 @@ def test_the_page_has_every_section_of_the_models():
     bases = {
         "CellContent",
         "CellCase",
+        "AnalysisSection",
         "QuestionSection",
+        "GeneratedSection",
+        "GeneratedQuestion",
         "CodeSpectrumSection",
         "StructureSection",
         "Structures",

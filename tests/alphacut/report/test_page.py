@@ -114,7 +114,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     }
     parts = peaks_of(**ends)
     decision = decide({"drift1": parts.envelopes["all"].peak["drift1"]}, Limit("drift1", 0.02))
-    head, rows = peak_table(replace(parts, decision=decision))
+    head, rows = peak_table(replace(parts, answered={"decision": decision}))
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
     assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
     assert rows[0][5:] == ("20", "no")
@@ -265,9 +265,9 @@ def test_an_output_is_shown_in_the_unit_of_its_limit(shown_units):
     summary = Summary.read(shown_units)
     labels = [row[0] for row in peak_table(summary).rows]
     assert {"drift1, cm", "base_shear, MN", "q2, mm", "a2, g"} <= set(labels)
-    by_output = {part.output: part for part in summary.decision.limits.values()}
+    by_output = {part.output: part for part in summary.answered["decision"].limits.values()}
     for name, unit in (("drift1", "cm"), ("base_shear", "MN"), ("q2", "mm")):
-        head, rows = summary.decision.table()
+        head, rows = summary.answered["decision"].table()
         (row,) = [row for row in rows if row[0] == by_output[name].words]
         texts = dict(zip(head, row, strict=True))
         values = [text for text in texts.values() if re.search(r"\d (c|m|M|k)?[mN]\b", text)]
@@ -375,7 +375,7 @@ def parts_of(drawn):
         seconds=1.0, method="proof", nature=Nature.GUARANTEED, motions_tested=0,
         units=OUTPUTS,
     )  # fmt: skip
-    return Parts(envelopes={"all": study}, decision=answer)
+    return Parts(envelopes={"all": study}, answered={"decision": answer})
 
 
 def check_answer(peak, limit, cells):
@@ -445,7 +445,7 @@ def test_limits_and_peaks_have_the_sign_that_they_were_given(tmp_path, rng):
         drawn = [Drawn(rng, *kind) for kind in kinds]
         limits = [(peak, limit) for peak in drawn for limit in peak.limits]
         parts = parts_of(drawn)
-        of_limits, of_peaks = parts.decision.table(), peak_table(parts)
+        of_limits, of_peaks = parts.answered["decision"].table(), peak_table(parts)
         page = "".join(
             render_template("comparison.html", title="", name="", about="", comparison=table)
             for table in (of_peaks, of_limits)

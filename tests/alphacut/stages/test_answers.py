@@ -1,20 +1,21 @@
 """Questions of a case: their answers, and what a further one touches."""
 
 import re
-from dataclasses import fields
+from pkgutil import resolve_name
 
 import numpy as np
 import pytest
 
+from alphacut.case.analyses import ANALYSES, answer_class
 from alphacut.case.cell import CellCase
 from alphacut.case.content import Content, load
+from alphacut.case.generated import section_at
 from alphacut.case.limits import CaseLimit, parse_limit
-from alphacut.figures.answers import DRAWINGS
+from alphacut.case.structures import with_structures
 from alphacut.frame import Accelerogram, Decision, Exact, LinearFlow, StoreyFrame, envelope, peaks
+from alphacut.frame.analyses.answer import Answer
 from alphacut.fuzzy import Interval
 from alphacut.io.typed_json import from_document
-from alphacut.stages.answers import ANSWERS, KINDS
-from alphacut.stages.summary import Parts
 from tests.alphacut.small import summary_of, summary_of_run, written
 from tests.refused import refuses
 
@@ -88,12 +89,39 @@ def test_limits_without_a_meaning_are_refused(text):
 
 
 def test_every_question_is_complete():
-    keys = [kind.key for kind in ANSWERS]
-    assert len(set(keys)) == len(keys)
-    assert set(keys) <= set(Content.model_fields)
-    assert set(keys) <= set(CellCase.model_fields)
-    all_keys = {kind.key for kind in KINDS}
-    assert set(DRAWINGS) == all_keys <= {field.name for field in fields(Parts)}
+    """Of each entry the class of the answer, the section, the function and the pictures exist."""
+    asked = set()
+    for key, analysis in ANALYSES.items():
+        assert answer_class(key).key == key
+        if analysis.section:
+            asked.add(key)
+            assert section_at(key, analysis.section).key == key
+        if analysis.compute:
+            assert callable(resolve_name(analysis.compute))
+        for picture in analysis.pictures.values():
+            assert picture.caption
+            assert callable(resolve_name(picture.draw))
+    for kind, built in ((Content, True), (CellCase, False)):
+        assert asked <= set(with_structures(kind, built=built).model_fields)
+
+
+def test_every_answer_is_registered():
+    def below(kind):
+        for inner in kind.__subclasses__():
+            yield inner
+            yield from below(inner)
+
+    own = {x for x in below(Answer) if x.__module__.startswith("alphacut.frame.")}
+    not_asked = {
+        "Sensitivity",
+        "SuitePeaks",
+        "AnglePeaks",
+        "LearnedInputs",
+        "ScaledSuite",
+        "ScaledPeaks",
+    }
+    registered = {answer_class(key) for key in ANALYSES}
+    assert {x.__name__ for x in own - registered} <= not_asked
 
 
 LIMITS = """
