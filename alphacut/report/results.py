@@ -315,15 +315,15 @@ def width_text(image: ImageResult) -> str:
 
     Args:
         image: Bounds of the stiffness matrix on the highest level, and the width of E on the lowest
-            level by its cause, in GPa. Without a lower bound the lower matrix is 0 throughout;
+            level by its cause, in GPa. Without a lower bound the lower matrix is singular;
             without an upper bound an entry of the upper one is infinite.
     """
     has_lower = is_positive_definite(image.lower_GPa)
     has_upper = np.isfinite(image.upper_GPa).all()
     missing = []
     if not has_lower:
-        why = "stresses are sought that vanish in closed pores, and these meet their own image"
-        missing.append(f"lower bound of E: {why}")
+        why = "no solid that carries is found in some direction, or to some shear"
+        missing.append(f"lower bound of E but 0: {why}")
     if not has_upper:
         # In the plane E = G (3 − G/K). It falls where G, which has no bound, exceeds 3/2 K.
         which = "upper"

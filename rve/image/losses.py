@@ -127,7 +127,6 @@ def _lower_bounds_with(
     factors = np.where(phase == changed_phase, factor, 1.0)
     # Only the lower bound is needed, which stresses give: half the work of both sides.
     stresses = model.solve_side(factors * images.lower, dual=True, start=solution.lower)
-    assert stresses is not None  # None beside pores that percolate alone
     bounds = concave_constants(StiffnessBounds(stresses.bound, stresses.bound), model.average)
     return {name: ends.lower for name, ends in bounds.items()}
 

@@ -24,6 +24,7 @@ from alphacut.rve.image.bounds import (
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
 from alphacut.rve.image.fields.energy import SideSolution, solve_side
+from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
@@ -187,7 +188,7 @@ class GridModel(Generic[Bounds]):
         dual: bool,
         start: SideSolution | None,
         watch: Callable[[], None] | None = None,
-    ) -> SideSolution | None:
+    ) -> SideSolution:
         """Return fields of nearly least energy under unit loads.
 
         Args:
@@ -202,9 +203,7 @@ class GridModel(Generic[Bounds]):
                 this one.
 
         Returns:
-            `fields` under unit mean fields, of strains and stresses in Voigt's order, and `energy`,
-            whose `upper` is the bound; None where pores percolate, so that no stress or flux is
-            found that vanishes in them.
+            `fields`, of strains and stresses under unit mean fields in Voigt's order, and `bound`.
 
         Raises:
             FailedError: The solver does not converge.
@@ -217,17 +216,17 @@ class GridModel(Generic[Bounds]):
         beside_pores = dual and not moduli.all()
         if start is not None and start.beside_pores == beside_pores:
             first_guess = start.fields
-        if beside_pores and self.conduction:
-            (fine,) = self._divided(moduli)
-            return solve_fluxes(fine, self.sides, solver=solver, start=first_guess)
+        if beside_pores:
+            fine = self._divided(moduli)
+            if self.conduction:
+                return solve_fluxes(fine[0], self.sides, solver=solver, start=first_guess)
+            return solve_stresses(fine, self.sides, solver=solver)
         solution = solve_side(
             self._element(dual=dual),
             [to_device(modulus) for modulus in self._divided(moduli)],
             solver=solver,
             start=first_guess,
         )
-        if solution is None:
-            return None
         bound = solution.energy.upper
         if dual:
             bound = inverse_below(bound)
@@ -400,7 +399,7 @@ class ImageSolution(Generic[Bounds]):
         bounds: The bounds.
         upper: Displacements or temperatures, which prove the upper bound; None where a phase is
             rigid or conducts perfectly.
-        lower: Stresses or fluxes, which prove the lower bound; None where pores percolate.
+        lower: Stresses or fluxes, which prove the lower bound.
     """
 
     bounds: Bounds

@@ -83,9 +83,9 @@ def image_fields(
 
     Returns:
         Means over each pixel or voxel of the strain under each unit mean strain, and of the stress
-        under each unit mean stress, shape (loads, components, ...grid) in Voigt's order; the strain
-        is None beside rigid phases, the stress where pores percolate. And the phases, shape (y, x)
-        or (z, y, x).
+        under each unit mean stress, shape (loads, components, *grid) in Voigt's order. The strain
+        is None beside rigid phases, the stress 0 where nothing carries its mean. And the phases,
+        shape (y, x) or (z, y, x).
 
     Raises:
         RefusedError: A value is not allowed, noise leaves too much of a picture open at the
@@ -120,6 +120,11 @@ def _pixel_means(element: Element, side: SideSolution | None, division: int) -> 
     fields = side.fields
     n_loads = fields.shape[0]
     fine_grid = fields.shape[2:]
+    # Each axis of the fine grid becomes two: of pixels, and of the cells in a pixel.
+    pairs = [size for length in fine_grid for size in (length // division, division)]
+    axes_in_pixel = tuple(range(3, 3 + 2 * len(fine_grid), 2))
+    if side.beside_pores:  # these fields are the means over cells
+        return np.asarray(fields.reshape(n_loads, -1, *pairs).mean(axis=axes_in_pixel))
     uniform_modes = element.mean_modes(np.eye(n_loads))
     # The modes are coefficients of orthonormal polynomials, and those of a uniform field belong to
     # the constant polynomial alone. So the least squares that give the uniform field nearest to the
@@ -131,9 +136,6 @@ def _pixel_means(element: Element, side: SideSolution | None, division: int) -> 
         for component, load in np.ndindex(of_cells.shape[:2]):
             grid = means[load, component]
             grid[found.slab] = of_cells[component, load].reshape(grid[found.slab].shape)
-    # Each axis of the fine grid becomes two: of pixels, and of the cells in a pixel.
-    pairs = [size for length in fine_grid for size in (length // division, division)]
-    axes_in_pixel = tuple(range(3, 3 + 2 * len(fine_grid), 2))
     return np.asarray(means.reshape(n_loads, -1, *pairs).mean(axis=axes_in_pixel))
 
 

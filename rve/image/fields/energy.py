@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +28,6 @@ from alphacut.rve.image.fields.grid import (
     slabs,
 )
 from alphacut.rve.image.fields.kernels import ROUNDINGS, modes_by_rows
-from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT = 2.0**-53
@@ -116,12 +115,13 @@ def bound_of_trials(means: Array, energy: Energies) -> Array:
     is_kept = eigenvalues > 1e-9 * max(eigenvalues[-1], np.finfo(float).tiny)
     x = vectors[:, is_kept] / np.sqrt(eigenvalues[is_kept])
     trials = (means * scale) @ x
-    # A sum of n products is off by n units of the sum of their magnitudes (Higham, section 3.1);
-    # twice two of them, in Xᵀ E X.
+    # In rational numbers, since the combinations may have lost many digits.
+    rational = np.vectorize(Fraction, otypes=[object])
+    of_trials = rational(x).T @ rational(scaled) @ rational(x)
+    largest = SAFETY_OF_SUMS * float(max(abs(of_trials).sum(axis=1), default=1))
+    # A sum of n products is off by n units of the sum of their magnitudes (Higham, Accuracy and
+    # Stability of Numerical Algorithms, section 3.1).
     n = len(scale)
-    slack = 2 * (n + 1) * UNIT * abs(x).T @ abs(scaled) @ abs(x)
-    row_sums = (abs(x.T @ scaled @ x) + slack).sum(axis=1, initial=0.0)
-    largest = SAFETY_OF_SUMS * max(row_sums, default=1.0)
     trial_errors = (n + 5) * UNIT * abs(means * scale) @ abs(x)
     products = abs(trials) @ trial_errors.T
     error = products + products.T + trial_errors @ trial_errors.T
@@ -141,7 +141,6 @@ def energies(
     fields: Fields,
     mean_modes: Array,
     coefficients: Sequence[Fields],
-    field_errors: Fields | None = None,
 ) -> Energies:
     """Return mean energy products of all pairs of fields, with bounds of their rounding errors.
 
@@ -156,8 +155,6 @@ def energies(
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
         coefficients: Coefficients of the squares of each part in each cell, of the shape of the
             grid, not negative, each with a relative error of up to 8 rounding units of 2⁻⁵³.
-        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
-            exact fields.
 
     Returns:
         Energies with `value`, the products of each part, shape (parts, fields, fields), symmetric;
@@ -172,7 +169,7 @@ def energies(
     squared_errors = np.zeros((len(element.parts), count))
     additions = 0
     max_cells = 0
-    for slab, modes, amplification, local in modes_of(element, fields, mean_modes, field_errors):
+    for slab, modes, amplification, local in modes_of(element, fields, mean_modes):
         # `modes_of` gives the factors of this bound of the errors of modes.
         errors = xp.tensordot(amplification, local, axes=1) + UNIT * xp.abs(modes)
         for k, (rows, coefficient) in enumerate(zip(element.parts, coefficients, strict=True)):
@@ -210,9 +207,7 @@ class SlabModes(NamedTuple):
     local: Fields
 
 
-def modes_of(
-    element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
-) -> Iterator[SlabModes]:
+def modes_of(element: Element, fields: Fields, mean_modes: Array) -> Iterator[SlabModes]:
     """Yield the modes of fields plus uniform fields, by groups of cells.
 
     Modes are coefficients of the element's parts in products of Legendre polynomials that are
@@ -223,8 +218,6 @@ def modes_of(
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
-            exact fields.
 
     Yields:
         SlabModes: `slab`, the index of the cells in an array of the grid's shape; `modes`, shape
@@ -232,13 +225,11 @@ def modes_of(
         `local`, with which modes are off by at most A b + 2⁻⁵³ |modes|. Every cell is in one group.
     """
     if isinstance(fields, np.ndarray) and element.dimension == 3:
-        return _modes_by_rows(element, fields, mean_modes, field_errors)
-    return modes_by_matrices(element, fields, mean_modes, field_errors)
+        return _modes_by_rows(element, fields, mean_modes)
+    return modes_by_matrices(element, fields, mean_modes)
 
 
-def modes_by_matrices(
-    element: Element, fields: Fields, mean_modes: Array, field_errors: Fields | None = None
-) -> Iterator[SlabModes]:
+def modes_by_matrices(element: Element, fields: Fields, mean_modes: Array) -> Iterator[SlabModes]:
     """Yield the modes of fields plus uniform fields by the element's matrix, in slabs of the grid.
 
     Modes are coefficients of the element's parts in products of Legendre polynomials that are
@@ -250,8 +241,6 @@ def modes_by_matrices(
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a cell, *grid), where
             the grid is (y, x) or (z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
-            exact fields.
 
     Yields:
         SlabModes for each slice of the first axis of the grid: `slab`, that slice; `modes`, shape
@@ -269,16 +258,12 @@ def modes_by_matrices(
         local = gather(element, fields, slab)
         local = xp.reshape(local, (*local.shape[:2], -1))
         error = relative_error * xp.abs(local)
-        if field_errors is not None:
-            error += xp.reshape(gather(element, field_errors, slab), error.shape)
         modes = xp.tensordot(matrix, local, axes=1)
         modes += xp.asarray(mean_modes)[:, :, None]
         yield SlabModes(slab, modes, magnitude, error)
 
 
-def _modes_by_rows(
-    element: Element, fields: Array, mean_modes: Array, field_errors: Array | None
-) -> Iterator[SlabModes]:
+def _modes_by_rows(element: Element, fields: Array, mean_modes: Array) -> Iterator[SlabModes]:
     """Yield the modes of fields of voxels plus uniform fields, by compiled kernels.
 
     Modes are coefficients of the element's parts in products of Legendre polynomials that are
@@ -288,8 +273,6 @@ def _modes_by_rows(
         element: Element of voxels.
         fields: Unknowns of periodic fluctuations, shape (fields, unknowns of a voxel, z, y, x).
         mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
-        field_errors: Bounds of the errors of the entries of `fields`, of the same shape; None for
-            exact fields.
 
     Yields:
         SlabModes for some rows of a layer, so that few modes are in memory: `slab`, the index (z,
@@ -309,8 +292,6 @@ def _modes_by_rows(
     for z in range(nz):
         layers = np.arange(z, z + width) % nz
         sizes = np.abs(fields[:, :, layers])
-        if field_errors is not None:  # counted in units of the rounding of modes
-            sizes += field_errors[:, :, layers] / (ROUNDINGS * UNIT)
         # largest value of each unknown over the cells that own local unknowns of a voxel
         greatest = sizes.max(axis=2)
         for axis in (2, 3):
@@ -384,51 +365,32 @@ def solve_side(
     *,
     solver: ConjugateGradient,
     start: Fields | None = None,
-) -> FieldSolution | None:
+) -> FieldSolution:
     """Return fields of nearly least energy under unit loads: one side of the bounds.
 
     Fields of displacements bound the stiffness from above, those of temperatures the conductivity.
     Fields of stresses in equilibrium, or of fluxes without sources, bound the inverse from above;
-    they vanish exactly in pores, by potentials that are prescribed there.
+    for pores there are `solve_stresses` and `solve_fluxes`.
 
     Args:
         element: Element of the fields.
         moduli: Bulk modulus of each cell (in the plane K + G/3) and shear modulus; or the
             conductivity alone. They are in any unit, of shape (y, x) or (z, y, x), and finite. A
-            cell where one is 0 is a pore, which is allowed for stresses and fluxes alone.
+            cell may not have 0.
         solver: Solver with its stopping rule.
         start: Fields to start from, in the shape of the result's fields; None for zero.
 
     Returns:
         `fields`, shape (loads, unknowns of a cell, *grid), with the unit loads in Voigt's order;
-        and `energy`, that of all pairs of these fields. None for stresses and fluxes where a pore
-        meets its own periodic image.
+        and `energy`, that of all pairs of these fields.
 
     Raises:
         FailedError: The solver does not converge.
     """
-    xp = namespace(moduli[0])
-    is_pore = reduce(xp.logical_or, [modulus == 0 for modulus in moduli])
-    potentials = None
-    if element.dual and bool(is_pore.any()):
-        mask = on_host(is_pore).astype(bool)
-        nodes = PoreNodes.of_mask(mask, element.reach)
-        if nodes is None:
-            return None
-        potentials = PorePotentials.of_nodes(element, nodes, mask)
-        # Pores have no stress, so that their moduli do not matter while fields are solved for. The
-        # largest moduli of the other cells keep the spectrum narrow.
-        moduli = [xp.where(is_pore, modulus.max(), modulus) for modulus in moduli]
     coefficients = coefficients_of(element, moduli)
-    fields = _least_energy_fields(element, coefficients, solver, potentials, start)
-    field_errors = None
-    if potentials is not None:
-        # `impose` sets the potentials at pores, and bounds their distance from exact ones. The
-        # exact ones have no stress in pores, whose energy is zero therefore.
-        field_errors = potentials.impose(fields)
-        coefficients = [xp.where(is_pore, 0.0, coefficient) for coefficient in coefficients]
+    fields = _least_energy_fields(element, coefficients, solver, start)
     unit_modes = element.mean_modes(np.eye(len(fields)))
-    energy = energies(element, fields, unit_modes, coefficients, field_errors)
+    energy = energies(element, fields, unit_modes, coefficients)
     return FieldSolution(fields, energy)
 
 
@@ -436,7 +398,6 @@ def _least_energy_fields(
     element: Element,
     coefficients: Sequence[Fields],
     solver: ConjugateGradient,
-    potentials: PorePotentials | None,
     start: Fields | None,
 ) -> Fields:
     """Return fields under unit loads whose energy is nearly the least.
@@ -449,7 +410,6 @@ def _least_energy_fields(
         coefficients: Coefficient of the square of each of the element's parts in each cell,
             positive, shape (y, x) or (z, y, x).
         solver: Solver with its stopping rule.
-        potentials: Space of the potentials whose field vanishes in pores; None without pores.
         start: First guess, in the shape of the result; None for zero.
 
     Returns:
@@ -480,52 +440,12 @@ def _least_energy_fields(
         if start is not None:
             guess = xp.tensordot(xp.asarray(loads[this]), start, axes=1)
             system = replace(system, start=guess)
-        if potentials is None:
-            fields[this] = solver.solve(system)
-        else:
-            fields[this] = _solve_beside_pores(solver, system, potentials, loads[this])
+        fields[this] = solver.solve(system)
     # Energies are computed from the combined fields later, so that these may be rounded here.
     to_unit_loads = xp.asarray(np.linalg.inv(loads))
     for slab in slabs(fields):  # in place
         fields[:, :, slab] = xp.tensordot(to_unit_loads, fields[:, :, slab], axes=1)
     return fields
-
-
-def _solve_beside_pores(
-    solver: ConjugateGradient, system: System, potentials: PorePotentials, load: Array
-) -> Fields:
-    """Return the field of a system whose stress or flux under a mean one vanishes in pores.
-
-    Such fields are an affine space: a particular field plus differences. With Q the orthogonal
-    projection on the differences, A the operator and M its preconditioner, the system for a
-    difference is Q A Q, and Q M Q its preconditioner. The energy of a difference is that of A, so
-    that `system.min_energy_ratio` holds.
-
-    Args:
-        solver: Solver with its stopping rule.
-        system: The system without pores, for potentials of shape (1, unknowns of a cell, *grid);
-            its `start` may be None.
-        potentials: Space of the potentials whose total stress or flux vanishes in the pores.
-        load: Mean stress in Voigt's order or mean flux, shape (1, components).
-
-    Returns:
-        New array in the shape of `system.load`.
-
-    Raises:
-        FailedError: The solver does not converge.
-    """
-    particular = potentials.particular_fields(load, system.load)
-    start = system.start
-    if start is not None:
-        start = potentials.project(start - particular)
-    projected = replace(
-        system,
-        operator=lambda x: potentials.project(system.operator(x)),
-        preconditioner=lambda r: potentials.project(system.preconditioner(r)),
-        load=potentials.project(system.load - system.operator(particular)),
-        start=start,
-    )
-    return particular + solver.solve(projected)
 
 
 def minimum_energy(element: Element, coefficients: Sequence[Fields], modes: Array) -> Array:

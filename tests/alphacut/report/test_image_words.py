@@ -19,7 +19,7 @@ alpha = [1]
 """
 PLANE = "guaranteed of the image as segmented, repeated periodically, in plane strain"
 SPACE = "guaranteed of the volume, repeated periodically"
-NO_LOWER = "This program gives no lower bound of E: stresses are sought that vanish in closed pores"
+NO_LOWER = "This program gives no lower bound of E but 0: no solid that carries is found"
 
 
 def place(folder, shape, first, *, percolates=False):

@@ -232,12 +232,14 @@ def test_pores_are_bounded_from_above_and_rigid_phases_from_below(dimension, rng
     assert eigh(pore.lower, soft, eigvals_only=True)[-1] <= 1
     phase[:, 1] = 0  # pores that meet their own image
     percolating = solve_image(*(moduli * [0, 1])[:, phase]).bounds
-    assert not percolating.lower.any()
-    for bounds, side, end in ((percolating, 0, 0.0), (rigid, 1, np.inf)):
+    assert np.diag(percolating.lower).max() > 0
+    assert not percolating.has_lower
+    for bounds, side in ((percolating, 0), (rigid, 1)):
         constants = bounds.constants()
         ends = np.array([bounds.bulk, bounds.shear(), *constants[:dimension], constants[-1]])
         assert np.isfinite(ends[:, 1 - side]).all()
-        assert (ends[:, side] == end).all()
+        assert (ends[:, 0] >= 0).all()
+        assert bounds is percolating or np.isinf(ends[:, 1]).all()
         assert np.array_equal(constants[dimension], [-np.inf, np.inf])  # ν
     assert percolating.young()[0] <= 0
 

@@ -7,13 +7,12 @@ first term is 1, each other one is lost.
 
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
 
 import numpy as np
 import pytest
 
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
-from alphacut.rve.image.fields.element import element_of, field_derivatives
+from alphacut.rve.image.fields.element import element_of
 from alphacut.rve.image.fields.energy import (
     COEFFICIENT,
     UNIT,
@@ -27,7 +26,6 @@ from alphacut.rve.image.fields.energy import (
     solved_loads,
 )
 from alphacut.rve.image.fields.grid import Operator
-from alphacut.rve.image.fields.pores import PoreNodes, PorePotentials
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 from tests.rve.image.test_bounds import LOST, TIGHT, discs, image_of, in_order, random_moduli, tight
 
@@ -291,94 +289,3 @@ def test_errors_of_entries_that_all_lift_one_load():
     assert np.linalg.eigvalsh(inverse @ (one.upper - lifted) @ inverse)[0] >= -1e-15
     half = one.value[0] + np.diag(np.diagonal(one.upper - one.value[0])) / 2
     assert np.linalg.eigvalsh(inverse @ (half - lifted) @ inverse)[0] < 0
-
-
-@pytest.mark.parametrize("conduction", [False, True], ids=["stress", "flux"])
-@pytest.mark.parametrize("sides", [(0.8, 1.0), (0.8, 1.2, 1.0)])
-def test_what_fields_are_off_by_is_in_the_rounding_of_their_energies(sides, conduction, rng):
-    element = element_of(sides, dual=True, conduction=conduction)
-    shape = (2, element.unknowns, *(3, 4, 5)[: len(sides)])
-    fields, off = rng.normal(size=shape), 1e-6 * rng.normal(size=shape)
-    means = element.mean_modes(rng.normal(size=(2, len(element.of_voigt.T))))
-    weights = rng.uniform(0.5, 2.0, (len(element.parts), *shape[2:]))
-    found = energies(element, fields, means, weights, abs(off))
-    exact, without = (energies(element, x, means, weights) for x in (fields + off, fields))
-    error = abs(exact.value - without.value)
-    assert (error <= found.rounding).all()
-    assert (error > 1e3 * without.rounding).any()
-    assert (found.rounding < 1e3 * error.max()).all()
-
-
-def closed_pores(rng, shape):
-    """Single cells and pairs of them, far enough apart to be pores of their own."""
-    is_pore = np.zeros(shape, bool)
-    for corner in product(*(range(0, n - 3, 5) for n in shape)):
-        is_pore[corner] = True
-        beside = list(corner)
-        beside[rng.integers(len(shape))] += 1
-        is_pore[tuple(beside)] = rng.random() < 0.5
-    return np.roll(is_pore, rng.integers(0, 8, len(shape)), range(len(shape)))
-
-
-@pytest.mark.parametrize("conduction", [False, True], ids=["stress", "flux"])
-@pytest.mark.parametrize("sides", [(1.0, 1.0), (0.7, 1.0), (1.0, 1.0, 1.0), (1.3, 0.7, 1.0)])
-def test_the_field_in_pores_is_zero_but_for_the_declared_rounding(sides, conduction, rng):
-    n = len(sides)
-    is_pore = closed_pores(rng, (10, 15)[:n] if n == 2 else (5, 10, 10))
-    element = element_of(sides, dual=True, conduction=conduction)
-    nodes = PoreNodes.of_mask(is_pore, element.reach)
-    potentials = PorePotentials.of_nodes(element, nodes, is_pore)
-    count = len(element.of_voigt.T)
-    fields = rng.normal(size=(count, element.unknowns, *is_pore.shape))
-    errors = potentials.impose(fields)
-    n_wrong = 0
-    for cell in np.argwhere(is_pore)[:4]:
-        for load, (found, bound) in enumerate(exact_stress(element, fields, errors, cell)):
-            stress = [x + (component == load) for component, x in enumerate(found)]
-            assert all(abs(x) <= y for x, y in zip(stress, bound, strict=True))
-            n_wrong += any(stress)
-    assert (n_wrong > 0) or set(sides) == {1.0}  # rounding there is
-    assert errors.max() < 1e-12 * abs(fields).max()
-    mean_modes = element.mean_modes(np.eye(count))
-    for slab, modes, *_ in modes_of(element, fields, mean_modes):
-        inside = is_pore[slab].ravel()
-        assert abs(modes[..., inside]).max(initial=0.0) < 1e-11
-
-
-def exact_stress(element, fields, errors, cell):
-    """Mean stress in a cell without rounding, by load, and what errors of the fields add to it."""
-    # integrals over a cell of the derivatives of order 0, 1, 2 of its functions of one coordinate
-    functions = {
-        2: [
-            [Fraction(1, 2), -1, 0],
-            [Fraction(1, 12), 0, -1],
-            [Fraction(1, 2), 1, 0],
-            [Fraction(-1, 12), 0, 1],
-        ],
-        3: [[Fraction(1, 3), -1, 2], [Fraction(4, 3), 0, -4], [Fraction(1, 3), 1, 2]],
-    }[element.dimension]
-    if element.conduction and element.dimension == 2:
-        functions = [[Fraction(1, 6), -1], [Fraction(2, 3), 0], [Fraction(1, 6), 1]]
-    elif element.conduction:  # order 2 is the constant function of an edge
-        functions = [[Fraction(1, 2), -1, 1], [Fraction(1, 2), 1, 0]]
-    n = element.dimension
-    derivatives = field_derivatives(n, dual=True, conduction=element.conduction)
-    potentials = sorted({potential for terms in derivatives for _, potential, _ in terms})
-    numbers = list(product(range(len(functions)), repeat=n))
-    for field, error in zip(fields, errors, strict=True):
-        stress, bound = [], []
-        for terms in derivatives:
-            total = added = Fraction(0)
-            for factor, potential, orders in terms:
-                for k, number in enumerate(numbers):
-                    unknown, offset = element.local[potentials.index(potential) * len(numbers) + k]
-                    weight = Fraction(factor)
-                    for f, order, side in zip(number, orders[::-1], element.sides, strict=True):
-                        is_edge = element.conduction and order == 2
-                        weight *= functions[f][order] / Fraction(side) ** (0 if is_edge else order)
-                    at = (unknown, *(cell + offset) % field.shape[1:])
-                    total += weight * Fraction(field[at])
-                    added += abs(weight) * Fraction(error[at])
-            stress.append(total)
-            bound.append(added)
-        yield stress, bound

@@ -5,8 +5,10 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from alphacut.base.errors import FailedError
-from alphacut.rve import solve_conduction
+from alphacut.rve import solve_conduction, solve_image
+from alphacut.rve.image.fields import equilibrium
 from alphacut.rve.image.fields import fluxes as of_fluxes
+from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.forest import Forest, sweep_fluxes
 from tests.rve.image.test_bounds import TIGHT
@@ -108,3 +110,84 @@ def test_fluxes_that_do_not_balance_are_an_error(monkeypatch, rng):
     monkeypatch.setattr(of_fluxes, "sweep_fluxes", leaves_one)
     with pytest.raises(FailedError, match="do not balance"):
         solve_fluxes(1.0 * porous(rng, 6, porosity=0.3), (1.0,) * 3, solver=TIGHT)
+
+
+# stiffness
+
+
+def moduli(phase, young, nu=0.3):
+    """Bulk and shear modulus of each voxel; phase 0 is a pore."""
+    stiffness = np.array([0.0, *young])[phase]
+    shear = stiffness / (2 * (1 + nu))
+    bulk = stiffness / (3 * (1 - 2 * nu)) + (shear / 3 if phase.ndim == 2 else 0)
+    return np.array([bulk, shear])
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (2, 5), (7, 6), (1, 4, 5), (2, 3, 4), (5, 3, 4)])
+def test_any_whole_tractions_balance_once_they_are_swept(shape, rng):
+    """Also of pieces that meet their own image, where forces around loops are needed."""
+    solid = rng.random(shape) < 0.75
+    solid.ravel()[0] = True
+    grid = equilibrium._Grid.of_moduli(moduli(solid.astype(int), (1.0,)), (1.0,) * len(shape))
+    d = len(shape)
+    whole = rng.integers(-(1 << 30), 1 << 30, (len(grid.shear), d, d**2))
+    for axis in range(d):
+        whole[grid.above[axis] < 0, axis] = 0
+    balanced = grid.balanced(whole, 1.0).tractions  # which raises if it is not
+    assert not any(balanced[grid.above[axis] < 0, axis].any() for axis in range(d))
+    forces = balanced[:, :, :d].sum(axis=0)
+    assert np.array_equal(forces, forces.T)  # the mean stress is symmetric
+
+
+def test_stresses_that_are_not_in_equilibrium_are_an_error(monkeypatch, rng):
+    """One unit of 2⁻⁴⁰ of the largest traction is enough."""
+    sweep = equilibrium._sweep
+
+    def leaves_one(order, parents, above, below, tractions):
+        sweep(order, parents, above, below, tractions)
+        linked = np.flatnonzero(above[0] >= 0)
+        tractions[linked[0], 0, 0] += 1
+
+    monkeypatch.setattr(equilibrium, "_sweep", leaves_one)
+    image = moduli(porous(rng, 5, porosity=0.3).astype(int), (1.0,))
+    with pytest.raises(FailedError, match=r"not in equilibrium|no loop"):
+        solve_stresses(image, (1.0,) * 3, solver=TIGHT)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_channel_and_layers_are_exact(dimension, rng):
+    """Bars that pass through carry uniaxial stress, layers biaxial stress: nothing across them."""
+    phase = np.zeros((4, 5, 6)[:dimension], int)
+    phase[:, 1:4] = 1
+    sides = (*rng.uniform(0.7, 1.4, dimension - 1), 1.0)
+    young, nu = 2.0, rng.uniform(-0.5, 0.45)
+    bounds = solve_image(*moduli(phase, (young,), nu), sides=sides, solver=TIGHT).bounds
+    exact = np.zeros_like(bounds.lower)
+    if dimension == 2:
+        exact[1, 1] = young / (1 - nu**2)
+    else:  # across y, with the stresses 11, 33 and 13
+        plane = young / (1 - nu**2)
+        exact[np.ix_([0, 2], [0, 2])] = [[plane, nu * plane], [nu * plane, plane]]
+        exact[4, 4] = young / (2 * (1 + nu))
+    exact *= 3 / 5
+    assert bounds.lower == pytest.approx(exact, abs=1e-7 * young)
+
+
+@pytest.mark.parametrize(("young", "porosity"), [((1.0,), 0.4), ((1.0, 10.0), 0.5)])
+def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
+    young, porosity, rng
+):
+    solid = porous(rng, 6, porosity=porosity, length=1.2)
+    phase = solid * (1 + (len(young) - 1) * porous(rng, 6, porosity=0.5, length=1.2))
+    nu = rng.uniform(-0.5, 0.45)
+    coarse, fine = (
+        solve_image(*moduli(refined(phase, n).astype(int), young, nu), solver=TIGHT).bounds
+        for n in (1, 2)
+    )
+    margin = 1e-7 * np.trace(fine.upper)
+    # Stresses on the coarse grid are among those on the fine one.
+    assert np.linalg.eigvalsh(fine.lower - 0.99 * coarse.lower)[0] > -margin
+    assert np.linalg.eigvalsh(fine.upper - coarse.lower)[0] > -margin
+    assert np.linalg.eigvalsh(coarse.upper - fine.upper)[0] > -margin
+    gaps = [np.trace(x.upper - x.lower) / np.trace(x.upper) for x in (coarse, fine)]
+    assert gaps[1] < gaps[0] / 1.3

@@ -1,5 +1,7 @@
 """Lower bounds of cells with pores: stresses that vanish in them, against bounds by hand and limits."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -7,9 +9,19 @@ from scipy.linalg import eigh
 from alphacut.fuzzy import Interval, Triangular, from_data
 from alphacut.rve import GreyImage, fuzzy_image_stiffness
 from tests.refused import refuses
-from tests.rve.image.test_fields import closed_pores
 
 E, NU = 1e9, 0.25
+
+
+def closed_pores(rng, shape):
+    """Single cells and pairs of them, far enough apart to be pores of their own."""
+    is_pore = np.zeros(shape, bool)
+    for corner in product(*(range(0, n - 3, 5) for n in shape)):
+        is_pore[corner] = True
+        beside = list(corner)
+        beside[rng.integers(len(shape))] += 1
+        is_pore[tuple(beside)] = rng.random() < 0.5
+    return np.roll(is_pore, rng.integers(0, 8, len(shape)), range(len(shape)))
 
 
 def crisp_cut(is_pore, ratio=0.0, sides=None):
@@ -36,7 +48,7 @@ def test_columns_beside_a_cube_carry_three_quarters():
     """Uniaxial stress in the columns that meet no pore: E_x, E_y, E_z ≥ 3/4 E, whatever the sides."""
     low, high = with_pores(cube(8)).constants()[:3].T / E
     assert (high < 0.84).all()
-    assert low == pytest.approx([0.76887] * 3, abs=2e-5)  # what 1e-6 and 1e-8 in the pore tend to
+    assert (low > 0.76887).all()  # what 1e-6 and 1e-8 in the pore tend to by splines
     moved = np.roll(cube(8), (3, 5, 0), (0, 1, 2))
     low, high = with_pores(moved, sides=(1.3, 0.7, 1.0)).constants()[:3].T / E
     assert (low >= 0.75).all()
@@ -85,19 +97,32 @@ def column(shape=(4, 7, 7)):
 
 
 @pytest.mark.parametrize(
-    "is_pore",
+    ("is_pore", "carried"),
     [
-        column(),
-        column((7, 9))[:, ::-1].T.copy(),
-        np.roll(np.pad(np.ones((2, 2, 2), bool), (0, 1)), 2, 0),  # a voxel from its image
-        np.indices((8, 8)).sum(0) % 8 < 2,  # a band along a diagonal
+        (column(), [0, 0, 6 / 7]),
+        (column((7, 9))[:, ::-1].T.copy(), [8 / 9, 0]),
+        (np.roll(np.pad(np.ones((2, 2, 2), bool), (0, 1)), 2, 0), [4 / 9] * 3),
     ],
-    ids=["column", "row", "thin wall", "diagonal"],
+    ids=["column", "row", "thin walls"],
 )
-def test_pores_that_meet_their_own_image_leave_no_lower_bound(is_pore):
+def test_walls_between_pores_that_meet_their_own_image_carry(is_pore, carried):
+    """At least uniaxial stress in the walls that reach through: C_kk ≥ E times their fraction."""
     bounds = with_pores(is_pore)
-    assert not bounds.has_lower
-    assert bounds.constants()[0, 0] == 0
+    n = is_pore.ndim
+    assert (np.diag(bounds.lower)[:n] >= np.array(carried) * E * (1 - 1e-6)).all()
+    assert (np.diag(bounds.lower)[:n] > 0).any()
+    assert bounds.has_lower == all(carried)
+
+
+def test_a_band_along_a_diagonal_carries_along_it_alone():
+    band = np.indices((8, 8)).sum(0) % 8 >= 2
+    bounds = with_pores(~band)
+    along = np.array([0.5, 0.5, -0.5])  # σ along (1, −1), in Voigt's order
+    carried = np.linalg.eigvalsh(bounds.lower)
+    assert carried[2] > 0.1 * E
+    assert abs(carried[:2]).max() < 1e-6 * E
+    vector = np.linalg.eigh(bounds.lower)[1][:, 2]
+    assert abs(vector @ along) / np.linalg.norm(along) == pytest.approx(1, rel=1e-6)
 
 
 def test_a_pore_that_is_connected_through_the_sides_alone_is_closed():
