@@ -229,10 +229,11 @@ def long_steps(linear: LinearSystem, duration: float, step: float) -> Iterator[s
                 by_how_much = "altogether"
             yield f"{name}: {what} {by_how_much} between nodes"
         else:
-            # A curve is farthest from its chord by h²/8 max |q''|: the distance falls with the
-            # square of the step h, and half a step leaves a quarter.
-            what = f"the step of {step:g} s widens its bound by about {fraction:.1%}"
-            yield f"{name}: {what} between nodes, one of {step / 2:g} s by {fraction / 4:.1%}"
+            # This is the deviation of one structure. A bound over wide inputs may contain several
+            # times as much, which only its computation tells.
+            what = f"between time nodes {step:g} s apart the most plausible structure may add"
+            bound = "a bound over all inputs may contain several times as much"
+            yield f"{name}: {what} {fraction:.1%} to its peak; {bound}"
 
 
 def records_text(

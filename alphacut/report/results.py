@@ -86,7 +86,7 @@ def run_text(parts: Parts) -> str:
     sentences: list[str] = []
     if parts.image is not None:
         sentences.append(guaranteed_of(parts.image))
-    sentences.extend(chain(natures(parts), smaller_steps(parts)))
+    sentences.extend(chain(natures(parts), wide_bounds(parts), smaller_steps(parts)))
     if parts.modulus is not None and parts.modulus.solver:
         sentences.append(f"Cells: {parts.modulus.solver}")
     if parts.update is not None and parts.update.is_refuted:
@@ -125,7 +125,7 @@ def key_tables(parts: Parts) -> list[Table]:
 
 def key_sentences(parts: Parts) -> list[str]:
     """Return the sentences below the tables: on guarantees, smaller steps and main inputs."""
-    return list(chain(natures(parts), smaller_steps(parts), drivers(parts)))
+    return list(chain(natures(parts), wide_bounds(parts), smaller_steps(parts), drivers(parts)))
 
 
 def cut_text(cuts: Ends, level: int, nature: Nature, error: float = 0.0) -> str:
@@ -554,35 +554,42 @@ def agreement(is_guaranteed: bool) -> str:
     return "lie in the wider bounds that are proved"
 
 
+def wide_bounds(parts: Parts) -> Iterator[str]:
+    """Yield a sentence for each peak whose bound is wide or not guaranteed, with what would help.
+
+    Args:
+        parts: Numbers of the results.
+    """
+    studies = [study.peak for study in parts.envelopes.values()]
+    if parts.records is not None:
+        studies.append(parts.records.peak)
+    for peaks in studies:
+        for name, peak in peaks.items():
+            if peak.warning:
+                yield f"Warning: {name}: {peak.warning}"
+
+
 def smaller_steps(parts: Parts) -> Iterator[str]:
     """Yield a sentence for each peak whose bound the time step widens noticeably.
 
     Bounds hold at all times, so they contain what responses may add between the time nodes. Widened
-    noticeably are bounds of which this is over 1 %, and over half of their uncertainty. The
-    sentence says about what half the step would give.
+    noticeably are bounds of which this is over 1 %, and over half of their uncertainty.
 
     Args:
         parts: Numbers of the results.
     """
     for study in parts.envelopes.values():
         for name, peak in study.peak.items():
-            if not peak.is_widened_by_step:
+            if not peak.is_widened_by_step or peak.warning:
                 continue
-            # Between nodes h apart a curve q leaves its chord by h²/8 max |q''| at most.
-            # What responses add between nodes so falls with the square of the step: half a step
-            # leaves a quarter of it.
-            saved = 0.75 * peak.between_nodes
-            if peak.nature is not Nature.GUARANTEED:
-                what = "an error of"
-                value = float(peak.error[0]) - saved
-            elif peak.is_least:  # a smallest value has a lower bound, which rises
-                what = "at least"
-                value = float(peak.far_end[0]) + saved
-            else:
-                what = "at most"
-                value = float(peak.far_end[0]) - saved
-            text = parts.shown_units[output_of(name)].text(value)
-            yield f"{name}: a step of {study.step / 2:g} s would give {what} about {text}"
+            what = "its error"
+            whole = float(peak.error[0])
+            if peak.nature is Nature.GUARANTEED:
+                what = "its bound"
+                whole = abs(float(peak.far_end[0]))
+            fraction = percent_text(peak.between_nodes / whole)
+            between = f"what may come between time nodes {study.step:g} s apart"
+            yield f"{name}: {fraction} of {what} is {between}; a smaller step narrows it"
 
 
 def answers(parts: Parts) -> list[Row]:

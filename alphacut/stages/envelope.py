@@ -22,6 +22,7 @@ from alphacut.frame.analyses.peaks import (
     loose_peaks,
     peaks,
     tightest,
+    with_causes,
 )
 from alphacut.frame.boxes import MAX_PARAMETERS
 from alphacut.frame.structures.quantities import Output, output_of
@@ -210,7 +211,7 @@ class EnvelopeTask:
         # proof. `output_of` is "q3" for "max q3", so that it differs from names of signed peaks.
         outputs = [str(name) for name in envelope.outputs]
         signed = [x for x in self.limited if x != output_of(x) and output_of(x) in outputs]
-        found = peaks(envelope, [*outputs, *signed])
+        found = with_causes(peaks(envelope, [*outputs, *signed]), structure.model, envelope)
         # A second proof of many inputs is hardly tighter, since it ends at the largest number of
         # sub-boxes: an infinite gap lets each guaranteed peak stay as it is.
         gap = PEAK_ERROR

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from alphacut.base.number_text import engineering
 from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
 from alphacut.case.motion import EnvelopeSection
@@ -21,8 +22,11 @@ from alphacut.frame.analyses.suites import (
     scaled_records,
     summarised,
 )
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.quantities import output_of
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.result import Nature
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult
 
@@ -156,6 +160,7 @@ def _peaks(
     Raises:
         RefusedError: An input is unknown or crisp.
         FailedError: A response could not be computed.
+        UnprovedError: The case names a proof as its method, and a peak is not proved.
     """
     peaks = record_peaks(
         linear_model(structure),
@@ -166,7 +171,29 @@ def _peaks(
         alpha=task.section.alpha,
         progress=context.tick,
     )
+    if task.section.method in ("proof", "dual"):
+        _require_guaranteed(peaks, structure, record)
     return StageResult(peaks)
+
+
+def _require_guaranteed(
+    peaks: Mapping[str, Peak], structure: Structure, record: ScaledRecord
+) -> None:
+    """Refuse peaks that are not guaranteed, of a case that names a proof as its method.
+
+    Raises:
+        UnprovedError: A peak is not guaranteed. The message has what is known: the peak that a
+            structure is known to reach, and the bound as it is estimated.
+    """
+    for name, peak in peaks.items():
+        if peak.nature is Nature.GUARANTEED:
+            continue
+        unit = structure.unit(output_of(name))
+        reached = engineering(float(peak.reached[0]), unit)
+        estimate = engineering(float(peak.far_end[0]), unit)
+        known = f"a structure reaches {reached}, and at most {estimate} is estimated"
+        what = f"{name} under {record.name} is not proved; {known}"
+        raise UnprovedError(what, peak.cause or "method auto takes estimates")
 
 
 def suite_peaks(

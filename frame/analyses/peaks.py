@@ -15,9 +15,11 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.progress_bar import Progress
+from alphacut.frame.analyses.gap_causes import missing_guarantee, wide_gap
 from alphacut.frame.boxes import ALPHA
 from alphacut.frame.dynamics.yielding import AT_NODES
 from alphacut.frame.methods.auto import Auto
+from alphacut.frame.numbers import WIDE
 from alphacut.frame.propagation import envelope
 from alphacut.frame.result import Envelope, within_steps
 from alphacut.frame.structures.model import StructureModel
@@ -66,6 +68,8 @@ class Peak:
             level; empty if none is known.
         encloses: Name of the set of inputs, such as "the learned set", that the box of the cuts
             encloses. If it is given, no response is known to belong to the set.
+        cause: Why the bound is not guaranteed though a proof was tried, or why it is more than a
+            tenth above the attained value, and what would narrow it; empty otherwise.
         worst: Where the peak is one over all angles of the ground motion, the angle and the time of
             the attained peak on the lowest level; else None.
 
@@ -87,6 +91,7 @@ class Peak:
     reached_at: Mapping[str, float] = field(default_factory=dict)
     encloses: str = ""
     worst: WorstCase | None = None
+    cause: str = ""
     proved: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -207,6 +212,18 @@ class Peak:
         # A bound of zero is attained, as no magnitude is smaller.
         ratio = np.divide(difference, size, out=np.zeros_like(size), where=size > 0)
         return np.asarray(ratio)
+
+    @property
+    def warning(self) -> str:
+        """Return a clause on a wide gap or a missing guarantee, with its cause; empty if none."""
+        if not self.cause:
+            return ""
+        if self.nature is not Nature.GUARANTEED:
+            return f"not guaranteed: {self.cause}"
+        gap = float(self.gaps[0])
+        if not gap > WIDE:  # it may have become narrower by another analysis; NaN is unknown
+            return ""
+        return f"{gap:.0%} of its bound is above what is attained: {self.cause}"
 
 
 def mirrored(peak: Peak) -> Peak:
@@ -576,7 +593,28 @@ def close_peaks(
         alpha=alpha,
         progress=progress,
     )
-    return peaks(band, names)
+    return with_causes(peaks(band, names), model, band)
+
+
+def with_causes(found: Peaks, model: StructureModel, band: Envelope) -> dict[str, Peak]:
+    """Return peaks of an envelope with the causes of wide gaps and of missing guarantees.
+
+    Args:
+        found: Peaks by name, such as "q3" or "min q3".
+        model: The structure; its own outputs are not used.
+        band: The envelope that the peaks were read from.
+    """
+    peaks_with_causes: dict[str, Peak] = {}
+    for name, peak in found.items():
+        cause = ""
+        gap = float(peak.gaps[0])
+        if peak.nature is not Nature.GUARANTEED:
+            cause = missing_guarantee(model, band, output_of(name))
+        elif gap > WIDE:
+            between = peak.between_nodes / abs(float(peak.far_end[0]))
+            cause = wide_gap(model, band, output_of(name), gap=gap, between=between)
+        peaks_with_causes[name] = replace(peak, cause=cause)
+    return peaks_with_causes
 
 
 def loose_peaks(peaks: Peaks, names: Sequence[str], gap: float) -> tuple[str, ...]:
