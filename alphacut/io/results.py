@@ -33,6 +33,8 @@ COMPLETE = "whole results of a run"
 """Allowed state of a folder of results."""
 EMPTY = "variables_without_entries"
 """Attribute of a dataset in a file for variables that the format has no place for."""
+TEXTS = "lists_of_texts"
+"""Attribute for the attributes that are lists of texts."""
 RUN_AGAIN = f"make it anew by {command_to_paste('run', 'CASE.toml')}"
 """Cure of files that were changed."""
 
@@ -72,7 +74,8 @@ def write_arrays(data: xarray.Dataset, path: Path) -> None:
     """Write a dataset in the classic format of NetCDF, which `ResultsFolder.dataset` reads.
 
     The format has no axes of length 0, such as that of the loads of a structure without loads:
-    variables without entries become an attribute with the length of each of their axes.
+    variables without entries become an attribute with the length of each of their axes. It has no
+    attributes of several texts either, which become one text.
 
     Args:
         data: The dataset, of numbers and texts. Integers must fit into 32 bits.
@@ -85,6 +88,14 @@ def write_arrays(data: xarray.Dataset, path: Path) -> None:
     empty = {name: dict(x.sizes) for name, x in data.variables.items() if x.size == 0}
     if empty:
         data = data.drop_vars(empty).assign_attrs({EMPTY: json.dumps(empty)})
+    texts = {}
+    others = {}
+    for name, value in data.attrs.items():
+        is_list = not isinstance(value, str) and np.asarray(value).dtype.kind == "U"
+        (texts if is_list else others)[name] = value
+    if texts:
+        data = data.copy()
+        data.attrs = others | {TEXTS: json.dumps({name: list(x) for name, x in texts.items()})}
     data.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
 
 
@@ -218,7 +229,7 @@ class ResultsFolder:
             sizes_of = json.loads(data.attrs.pop(EMPTY, "{}"))
             for variable, sizes in sizes_of.items():
                 data[variable] = (tuple(sizes), np.empty(tuple(sizes.values())))
-            return data
+            return data.assign_attrs(json.loads(data.attrs.pop(TEXTS, "{}")))
         except Exception as error:  # whatever the reader raises for a damaged file
             value = f"damaged ({printable(error, 80)})"
             raise RefusedError(str(self.path / name), value, COMPLETE, RUN_AGAIN) from None

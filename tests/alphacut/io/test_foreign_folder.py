@@ -36,12 +36,15 @@ def test_arrays_without_entries_come_back(tmp_path, rng):
     data["y"] = (("a",), rng.random(3))
     data["z"] = (("b",), np.array([]))
     data["text"] = (("c",), ["one", ""])
+    data.attrs = {"phases": ["pore", "µ"], "one": ["alone"], "title": "a", "number": 2.5}
     path = tmp_path / "arrays" / "a.nc"
     path.parent.mkdir()
     write_arrays(data, path)
     folder = ResultsFolder(tmp_path / "out")
     folder.put_files("1", path.parent)
-    assert folder.dataset("a.nc").equals(data)
+    read = folder.dataset("a.nc")
+    assert read.equals(data)
+    assert read.attrs == data.attrs
 
 
 def linked_file(folder, secret, kind):
