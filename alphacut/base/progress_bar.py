@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
 from alphacut.base.kernels import before_compiling
 
+REPEAT = 1.0
+"""Seconds between two looks at whether something was shown."""
 Progress = Callable[[float], None]
 """A function that takes the completed fraction of a computation, 0 to 1."""
 
@@ -41,7 +44,8 @@ def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | N
 
     Args:
         progress: Function of the caller that takes the completed fraction. None or True shows a bar
-            on the terminal, or writes a line every ten seconds if standard error is not a terminal.
+            on the terminal, or writes a line every eight seconds if standard error is not a
+            terminal, also while the block reports nothing.
             False reports nothing; then None is yielded in place of a function.
     """
     has_stream = sys.stderr is not None  # it may have been closed before Python began
@@ -76,12 +80,17 @@ def _rising(progress: Progress) -> Progress:
 class _Display:
     """A bar on a terminal, which `close` removes; elsewhere lines with the time that is left.
 
+    A thread shows the last fraction again, with the time that has passed, while nothing is
+    reported: who waits sees that the computation goes on.
+
     Attributes:
         is_terminal: Whether standard error is a terminal.
         has_bar: Whether a bar stands there.
         begun: Time at which this was made, in s of a clock that never goes back.
         written: Time of the last display.
         fraction: Completed fraction, 0 to 1.
+        turn: Held by the thread that shows.
+        ended: Set by `close`.
     """
 
     def __init__(self) -> None:
@@ -90,6 +99,14 @@ class _Display:
         self.begun = monotonic()
         self.written = self.begun
         self.fraction = 0.0
+        self.turn = threading.Lock()
+        self.ended = threading.Event()
+        threading.Thread(target=self._repeat, daemon=True).start()
+
+    def _repeat(self) -> None:
+        """Show the last fraction again where nothing was shown for long, until the end."""
+        while not self.ended.wait(REPEAT):
+            self(self.fraction)
 
     def __call__(self, fraction: float) -> None:
         """Show a completed fraction, 0 to 1, unless something was shown just before.
@@ -112,21 +129,29 @@ class _Display:
         """Show the completed fraction on standard error, unless one was shown just before.
 
         On a terminal (`is_terminal`) a bar is drawn over the last one, at most five times a second.
-        Elsewhere a line is written, at most every ten seconds. Nothing is shown during the first
-        second. The time of the display is kept in `written`, and that there is a bar in `has_bar`.
+        Elsewhere a line is written, at most every eight seconds. Nothing is shown during the first
+        second, nor while another thread shows something. The time of the display is kept in
+        `written`, and that there is a bar in `has_bar`.
 
         Args:
             note: What stands behind the time in a line.
             on_terminal: What stands behind the time beside a bar.
         """
-        pause = 10.0  # seconds between lines
+        pause = 8.0  # seconds between lines
         if self.is_terminal:
             pause = 0.2  # seconds between changes of a bar
         now = monotonic()
         elapsed = now - self.begun
-        if elapsed < 1.0 or now - self.written < pause:
+        if elapsed < 1.0 or now - self.written < pause or not self.turn.acquire(blocking=False):
             return
-        self.written = now
+        try:
+            self.written = now
+            self._write_line(elapsed, note, on_terminal=on_terminal)
+        finally:
+            self.turn.release()
+
+    def _write_line(self, elapsed: float, note: str, *, on_terminal: str) -> None:
+        """Write the bar or the line after `elapsed` seconds; arguments are those of `_show`."""
         if self.is_terminal:
             self.has_bar = True
             width = 30
@@ -138,7 +163,8 @@ class _Display:
         _write(f"{self.fraction:4.0%} after {elapsed:.0f} s{separator}{note}\n")
 
     def close(self) -> None:
-        """Remove the bar."""
+        """Remove the bar, and end its thread."""
+        self.ended.set()
         if self.has_bar:
             _write("\r\x1b[K")
 
