@@ -269,7 +269,7 @@ def draw_states(answer: Fragility) -> Figure | None:
     """Draw all damage states over the intensity measure, each in a colour.
 
     Of each state there are the band of the fraction of records on the lowest level, and for the
-    highest level the first crossings of the records as points and the lognormal fit as a line.
+    nominal structure the first crossings of the records as points and the lognormal fit as a line.
 
     Args:
         answer: Fragility with damage states.
@@ -282,15 +282,14 @@ def draw_states(answer: Fragility) -> Figure | None:
     axes.set(xlim=(0.0, top), ylim=(0.0, 1.02))
     style.prefix_axis(axes, answer.measure, answer.unit, across=True)
     colours = colormaps["viridis_r"](np.linspace(0.15, 0.95, len(parts)))
-    for part, colour in zip(parts, colours, strict=True):
+    for state, part, colour in zip(answer.states, parts, colours, strict=True):
         band: Look = {"color": colour, "alpha": 0.25, "lw": 0, "step": "post"}
         axes.fill_between(part.measure, part.band.lower[0], part.band.upper[0], **band)
-        low, high = part.critical.first_crossings
         # Records that do not bring the state are missing at the upper end.
-        crossings = np.sort(np.sqrt(low[-1] * high[-1]))
+        crossings = np.sort(answer.nominal_crossings(state))
         fractions = np.arange(1, len(crossings) + 1) / len(crossings)
         axes.plot(crossings, fractions, color=colour, ls="none", marker="o", ms=3)
-        fit = part.critical.fits(-1)[0]
+        fit = answer.nominal_fit(state)
         label = part.words
         if np.isfinite(fit).all() and fit.dispersion > 0:
             x = np.linspace(top / 400, top, 400)
@@ -298,7 +297,7 @@ def draw_states(answer: Fragility) -> Figure | None:
             label += f": θ = {engineering(fit.median, answer.unit)}, β = {fit.dispersion:.2f}"
         axes.plot([], [], color=colour, lw=1.8, label=label.replace("^2", "²"))
     axes.set_title(
-        f"damage states under {len(crossings)} records, α = {answer.alpha[-1]:g};"
+        f"damage states under {len(crossings)} records, nominal inputs;"
         f" bands: α = {answer.alpha[0]:g}"
     )
     axes.set_ylabel("fraction of records")

@@ -34,7 +34,7 @@ from alphacut.frame import (
     tolerances,
 )
 from alphacut.frame.analyses.answer import Answer
-from alphacut.frame.analyses.fragility import fragility_of
+from alphacut.frame.analyses.fragility import fragility_of, with_nominal
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.limits import limits_by_name
 from alphacut.frame.analyses.peaks import Peaks
@@ -173,7 +173,8 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
         section: Its limits, the intensity measure, and `independent`, whether the records count as
             independent draws, which gives limits of 95 % confidence.
         response: The peaks under each record in `suite` and, of a frame that yields, `increments`.
-        _: Progress, which is not reported: all responses are known.
+        _: Progress, which is not reported: all responses but those of the nominal structure, which
+            are few, are known.
 
     Raises:
         RefusedError: The case has no suite of records or no linear structure, or a limit does not
@@ -182,15 +183,20 @@ def fragility_answer(section: FragilitySection, response: Response, _: Progress)
     linear = response.structure.linear
     if response.suite is None or linear is None:
         raise RefusedError("fragility", "without records", "a section [records]")
-    return fragility_of(
+    limits = limits_by_name(section.limits_of(response.structure), ())  # () allows any outputs
+    found = fragility_of(
         linear,
-        limits_by_name(section.limits_of(response.structure), ()),  # () allows any outputs
+        limits,
         intensity=section.measure,
         independent=section.independent,
         alpha=response.task.section.alpha,
         suite=response.suite,
         increments=response.increments,
         states=tuple(section.states),
+    )
+    step = response.task.section.step
+    return with_nominal(
+        found, linear, response.inputs, response.records, limits, step=step, most=section.most
     )
 
 

@@ -350,7 +350,14 @@ def _decide_limit(
         float(alpha[is_kept].max(initial=0.0)),
         _level_from_which(alpha, min_peak.lower > largest_allowed),
     )
-    necessity = (1 - possibility_of_keeping[1], 1 - possibility_of_keeping[0])
+    # Responses of the highest cut exceed the limit or keep it, so that the larger one of both
+    # possibilities is 1: the necessity is 0 where the possibility is below 1.
+    necessity = (
+        1 - possibility_of_keeping[1],
+        1 - possibility_of_keeping[0] if possibility[1] == 1 else 0.0,
+    )
+    if necessity[0] > 0:
+        possibility = (1.0, 1.0)
     lowest_level = float(alpha[0])
     return LimitDecision(
         **vars(about_limit(limit, unit)),

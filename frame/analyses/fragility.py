@@ -61,13 +61,15 @@ from alphacut.frame.analyses.suites import (
     SuitePeaks,
     nominal_mode,
     over_records,
+    record_peaks,
     scaled_records,
+    summarised,
 )
 from alphacut.frame.boxes import ALPHA, boxes
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.storey import StoreyFrame, yields
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Ends, Nature
 
 
@@ -425,6 +427,8 @@ class Fragility(Answer):
         limits: Fragility of each limit by its name, then of each event of several limits.
         increments: Demands over the measure of each record by its name, for a frame that yields.
         states: Names of the damage states, from the slightest on; each is an event in `limits`.
+        nominal: Critical measures of each state for the structure with the nominal inputs, on one
+            level; empty where the cuts of the highest level contain no other structure.
     """
 
     key = "fragility"
@@ -437,6 +441,20 @@ class Fragility(Answer):
     limits: dict[str, LimitFragility]
     increments: dict[str, Increments] = field(default_factory=dict)
     states: tuple[str, ...] = ()
+    nominal: dict[str, CriticalMeasures] = field(default_factory=dict)
+
+    def nominal_crossings(self, state: str) -> Array:
+        """Return the measures at which the nominal structure comes into a state, (records,).
+
+        Each is the geometric mean of its bounds, which are close for one structure; infinite where
+        it does not come into the state.
+        """
+        low, high = self.nominal.get(state, self.limits[state].critical).first_crossings
+        return np.asarray(np.sqrt(low[-1] * high[-1]))
+
+    def nominal_fit(self, state: str) -> LognormalFit:
+        """Return the lognormal fit to `nominal_crossings`."""
+        return lognormal_fit(self.nominal_crossings(state), self.limits[state].critical.largest)
 
     @property
     def stated_units(self) -> dict[str, ShownUnit]:
@@ -634,10 +652,9 @@ class Fragility(Answer):
     def pelicun(self, component: str = "structure") -> list[Record]:
         """Return the damage states as rows of a table of damage models of Pelicun 3.10.
 
-        There are three components: one with the fits on the highest level (of both ends of the
-        measures their geometric and arithmetic mean), and the weakest and the strongest one on the
-        lowest level, with fits to all lower and to all upper ends. Medians are in g. A component
-        of which a state has no fit is marked as incomplete.
+        There are three components: one with the fits of the nominal structure, and the weakest and
+        the strongest one on the lowest level, with fits to all lower and to all upper ends. Medians
+        are in g. A component of which a state has no fit is marked as incomplete.
 
         Args:
             component: Name of the first component.
@@ -653,11 +670,8 @@ class Fragility(Answer):
         components: dict[str, dict[str, LognormalFit]] = {}
         for state in self.states:
             critical = self.limits[state].critical
-            low, high = critical.fits(-1)
-            median = float(np.sqrt(low.median * high.median))
-            middle = LognormalFit(median, (low.dispersion + high.dispersion) / 2)
             weakest, strongest = critical.fits(0)
-            components.setdefault(component, {})[state] = middle
+            components.setdefault(component, {})[state] = self.nominal_fit(state)
             components.setdefault(f"{component}.weakest", {})[state] = weakest
             components.setdefault(f"{component}.strongest", {})[state] = strongest
         return pelicun_rows(components, self.measure, self.period_s)
@@ -831,7 +845,7 @@ def fragility(
             names=list(dict.fromkeys(limit.peak for limit in named.values())),
             progress=progress,
         )
-    return fragility_of(
+    found = fragility_of(
         model,
         named,
         intensity=intensity,
@@ -841,6 +855,66 @@ def fragility(
         increments=increments,
         states=tuple(states or ()),
     )
+    scaled = scaled_records(model, suite, duration=duration, step=step)
+    return with_nominal(found, model, inputs, scaled, named, step=step, most=most)
+
+
+def with_nominal(
+    found: Fragility,
+    model: LinearSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    records: Sequence[ScaledRecord],
+    limits: Mapping[str, Limit],
+    *,
+    step: float,
+    most: float,
+) -> Fragility:
+    """Return a fragility of damage states with the measures of the nominal structure.
+
+    The ends of measures over a cut belong to different structures under different records, so that
+    their scatter is that of none. The fragility is returned as it is if it has no states, or if
+    the cuts of its highest level contain one structure alone.
+
+    Args:
+        found: The fragility.
+        model: The structure.
+        inputs: Fuzzy parameters by name, in SI units.
+        records: The scaled records.
+        limits: Limits of the states by name.
+        step: Distance of the time nodes, in s.
+        most: Largest measure that is tried; see `fragility`.
+
+    Raises:
+        RefusedError, FailedError: As of `fragility`.
+    """
+    cuts = boxes(inputs, list(map(float, found.alpha)))
+    if not found.states or (cuts.lower[-1] == cuts.upper[-1]).all():
+        return found
+    nominal = {name: Crisp(value) for name, value in zip(cuts.names, cuts.nominal, strict=True)}
+    suite = None
+    increments = {}
+    if yields(model):
+        assert isinstance(model, StoreyFrame)
+        analyses = incremental_analyses(
+            model, nominal, records, limits, intensity=found.measure, most=most, step=step,
+            alpha=[1.0],
+        )  # fmt: skip
+        for name, analysis in analyses.items():
+            increments[name] = increments_of(analysis, limits)
+    else:
+        names = list(dict.fromkeys(limit.peak for limit in limits.values()))
+        peaks = {}
+        for record in records:
+            peaks[record.name] = record_peaks(
+                model, nominal, record, names, step=step, alpha=[1.0], progress=False
+            )
+        suite = summarised(model, nominal, records, peaks, step=step, alpha=[1.0])
+    of_nominal = fragility_of(
+        model, limits, intensity=found.measure, independent=False, alpha=[1.0], suite=suite,
+        increments=increments, states=found.states,
+    )  # fmt: skip
+    critical = {state: of_nominal.limits[state].critical for state in found.states}
+    return replace(found, nominal=critical)
 
 
 def events_of(limits: Mapping[str, Limit]) -> dict[str, list[str]]:

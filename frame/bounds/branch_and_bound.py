@@ -205,7 +205,8 @@ def examine_items(
         factors=wave_factors(eigenvalues, coefficients, d),
     )
     waves = model.waves(eigenvalues[0, row_box], row_node)
-    found: Examination = examine(items, boxes, waves, remainder, target)
+    found = Examination.none(len(column))
+    examine(items, boxes, waves, remainder, target, found)
     return found
 
 

@@ -58,6 +58,11 @@ class Examination(NamedTuple):
     value: Array  # side × output at the midpoint of the sub-box
     bound: Array  # guaranteed upper bound of side × output over the sub-box
 
+    @classmethod
+    def none(cls, count: int) -> Examination:
+        """Return an examination of `count` items that `examine` has not filled in yet."""
+        return cls(np.zeros(count, np.int64), np.zeros(count), np.zeros(count))
+
 
 @compiled
 def separable_bound(g: Array, H: Array, r: Array) -> float:
@@ -295,8 +300,9 @@ def bisection_code(bend: Array, slope_error: Array, r: Array) -> int:
 
 @compiled
 def examine(
-    items: Items, boxes: BoxTables, waves: Array, remainder: RemainderBounds, target: Array
-) -> Examination:
+    items: Items, boxes: BoxTables, waves: Array, remainder: RemainderBounds, target: Array,
+    found: Examination,
+) -> None:  # fmt: skip
     """Examine all items: what is done next with each, its value and its upper bound.
 
     An item is one of B sub-boxes with a problem: one side, −1 or 1, of one of m outputs at one of T
@@ -314,17 +320,13 @@ def examine(
             d), and of the rounding of values and slopes (T, m, 1 + d).
         target: Best known value plus the wanted gap of each problem, shape (2 T m,), in the order
             of nodes, outputs, sides.
-
-    Returns:
-        For each item: `code`, 0 where the item is closed (its bound is at most the target, or a
-        neighbouring sub-box holds higher points), 1 + i to bisect axis i, `FACES` + Σ 3^i (once for
-        lower, twice for upper ends) to confine it to faces; `value` of side × output at the
-        midpoint; and its guaranteed upper `bound` over the sub-box.
+        found: Receives for each item: `code`, 0 where it is closed (its bound is at most the
+            target, or a neighbouring sub-box holds higher points), 1 + i to bisect axis i, `FACES`
+            + Σ 3^i (once for lower, twice for upper ends) to confine it to faces; `value` of side ×
+            output at the midpoint; and its guaranteed upper `bound` over the sub-box. Its codes
+            must be 0 before.
     """
-    count = len(items.column)
-    code = np.zeros(count, np.int64)
-    value = np.zeros(count)
-    bound = np.zeros(count)
+    code, value, bound = found
     outputs = boxes.factors.shape[1]
     d = boxes.radius.shape[1]
     jet = np.empty(boxes.factors.shape[3])
@@ -361,7 +363,6 @@ def examine(
                 allowed = aim - value[item] - missing
                 if not stays_below(g, H, r, allowed, work, factor):
                     code[item] = bisection_code(bend, slope_error, r)
-    return Examination(code, value, bound)
 
 
 def call_examine() -> None:
@@ -378,4 +379,4 @@ def call_examine() -> None:
         factors=np.zeros((0, 0, 0, 0)),
     )
     remainder = RemainderBounds(third=np.zeros((0,) * 5), rounding=np.zeros((0,) * 3))
-    examine(items, boxes, np.zeros((0, 0)), remainder, np.zeros(0))
+    examine(items, boxes, np.zeros((0, 0)), remainder, np.zeros(0), Examination.none(0))

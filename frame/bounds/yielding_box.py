@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.yielding_element import Load, Storey
-from alphacut.frame.bounds.yielding_march import PROVED, march
+from alphacut.frame.bounds.yielding_march import PROVED, End, march
 from alphacut.frame.bounds.yielding_outputs import Found, Observed
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.truncated_polynomials import product_table
@@ -212,7 +212,8 @@ class YieldingStorey:
             events=np.zeros((MAX_EVENTS, 3)),
         )
         start = tuple(_padded(x, terms) for x in found.start)
-        end = march(storey, load, observed, start, MAX_ERROR * self.yield_velocity, result)
+        limit = MAX_ERROR * self.yield_velocity
+        end = End(*march(storey, load, observed, start, limit, result))
         widening = ROUNDING * np.abs(result.peaks).max(axis=1, initial=0.0)[:, np.newaxis]
         for values in (result.bounds, result.steps, result.peaks):
             values += widening

@@ -82,8 +82,8 @@ class End(NamedTuple):
 def march(
     storey: Storey, load: Load, observed: Observed, start: tuple[Array, Array], limit: float,
     found: Found,
-) -> End:  # fmt: skip
-    """Enclose the motion at all inputs of a box from t = 0 on.
+) -> tuple[int, float, int, float]:  # fmt: skip
+    """Enclose the motion at all inputs of a box from t = 0 on, and return an `End` as a tuple.
 
     Args:
         storey: The storey.
@@ -122,7 +122,7 @@ def march(
             counts[0] = (element.integers[0], n_events)
         target = _target(load, state, element, is_fixed)
         if target < 0:
-            return End(TOO_WIDE, numbers[ERROR], n_events, state.begin[0])
+            return TOO_WIDE, numbers[ERROR], n_events, state.begin[0]
         _to_time(storey, load, state, target, element)
         passed = _passed(storey, state, element)
         side, residual = 0.0, np.inf
@@ -150,7 +150,7 @@ def march(
                 target = state.begin[0] + element.h[0]
         elements += 1
         if elements > MAX_ELEMENTS * observed.last:
-            return End(TOO_WIDE, np.inf, n_events, state.begin[0])
+            return TOO_WIDE, np.inf, n_events, state.begin[0]
         is_event = residual < np.inf
 
         until = target
@@ -159,7 +159,7 @@ def march(
         load_error(load, element.integers[0], numbers[WINDOW], until, by_load)
         _add_defects(storey, load, state, element, passed, residual, by_load)
         if not numbers[ERROR] <= limit:
-            return End(TOO_WIDE, numbers[ERROR], n_events, state.begin[0])
+            return TOO_WIDE, numbers[ERROR], n_events, state.begin[0]
         _write_errors(storey, numbers, by_load, errors)
         observe(storey, observed, load, state, element, errors, is_fixed and not is_event, found)
 
@@ -192,7 +192,7 @@ def march(
             _write_errors(storey, numbers, by_load, errors)
             observe_node(storey, observed, state, errors, observed.node[edge], found)
         element.integers[0] = edge
-    return End(PROVED, numbers[ERROR], n_events, state.begin[0])
+    return PROVED, numbers[ERROR], n_events, state.begin[0]
 
 
 @compiled

@@ -165,7 +165,7 @@ class YieldingFlow(Flow):
         values: Array = np.empty((len(points), len(self.time), len(kinds)))
         peaks = np.zeros((len(points), len(kinds)))
         for s in range(len(points)):
-            end = _march(
+            found = _march(
                 np.ascontiguousarray(storeys[s]),
                 np.ascontiguousarray(matrices.damping.value[s]),
                 np.ascontiguousarray(pushes[s]),
@@ -175,6 +175,7 @@ class YieldingFlow(Flow):
                 values[s],
                 peaks[s],
             )
+            end = MotionEnd(*found)
             if takes_collapse and end.status == COLLAPSED:
                 values[s] = 0.0
                 peaks[s] = np.inf
@@ -319,8 +320,8 @@ def load_substeps(loads: Sequence[History], time: Array, *, longest: float) -> L
 def _march(
     storeys: Array, damping: Array, pushes: Array, start: Array, edges: Array, is_node: Mask,
     first: Array, last: Array, kinds: Ints, values: Array, peaks: Array,
-) -> MotionEnd:  # fmt: skip
-    """Write the response of one frame to `values` and `peaks`, and return how it ends.
+) -> tuple[int, float, int, float]:  # fmt: skip
+    """Write the response of one frame to `values` and `peaks`, and return a `MotionEnd` as a tuple.
 
     Args:
         storeys: Properties of the n storeys, shape (7, n), with the rows 0 mass, 1 initial
@@ -419,7 +420,7 @@ def _march(
             # A yielding storey turns elastic, or has collapsed. An elastic one begins to yield.
             if direction[z] != 0:
                 if direction[z] * _drift(q, z) >= (1 - 1e-9) * last_drift[z]:
-                    return MotionEnd(COLLAPSED, edges[e + 1] - h, z, 0.0)
+                    return COLLAPSED, edges[e + 1] - h, z, 0.0
                 direction[z] = 0.0
             else:
                 direction[z] = math.copysign(1.0, _drift(q, z) - plastic[z])
@@ -434,7 +435,7 @@ def _march(
                         damping[i - 1, i] += lost_damping[i]
             # so many events in one substep are those of a motion that is computed wrongly
             if event == MAX_EVENTS:
-                return MotionEnd(FAILED, edges[e + 1] - h, z, 0.0)
+                return FAILED, edges[e + 1] - h, z, 0.0
     # Work of the loads less changes of energy and dissipation vanishes for the exact motion. The
     # sum of all magnitudes is the scale against which it is judged.
     after = _energy(storeys, q, v, plastic)
@@ -443,7 +444,7 @@ def _march(
     imbalance = 0.0
     if exchanged > 0:
         imbalance = (before + works[0] - after - dissipation) / exchanged
-    return MotionEnd(RUNS, edges[-1], -1, imbalance)
+    return RUNS, edges[-1], -1, imbalance
 
 
 @compiled

@@ -167,16 +167,21 @@ def learned_envelope(
         if level:
             lower[level] = np.maximum(lower[level], lower[level - 1])
             upper[level] = np.minimum(upper[level], upper[level - 1])
-        parts = []
+        part_lower, part_upper, part_between = [], [], []
         for low, high in covering:
             sides = zip(numbers, map(Interval, low, high), strict=True)
-            parts.append(bounded(dict(sides), [0.0]))
+            part = bounded(dict(sides), [0.0])
+            # The whole box contains the part. Of one without a proof what is known of it holds.
+            is_proved = part.nature is Nature.GUARANTEED
+            part_lower.append(part.lower[0] if is_proved else whole.lower[level])
+            part_upper.append(part.upper[0] if is_proved else whole.upper[level])
+            part_between.append(part.between if is_proved else None)
         # Each structure of the set lies in a box of the cover.
-        lower[level] = np.maximum(lower[level], np.min([x.lower[0] for x in parts], axis=0))
-        upper[level] = np.minimum(upper[level], np.max([x.upper[0] for x in parts], axis=0))
+        lower[level] = np.maximum(lower[level], np.min(part_lower, axis=0))
+        upper[level] = np.minimum(upper[level], np.max(part_upper, axis=0))
         # Distances between the nodes belong to single responses, so that the lowest level has all.
         if level == 0 and between is not None:
-            of_parts = [part.between for part in parts if part.between is not None]
+            of_parts = [between if x is None else x for x in part_between]
             between = np.minimum(between, np.max(of_parts, axis=0))
         found = np.concatenate([found, members(learned, level, covering, count)])
     bounds = replace(

@@ -51,13 +51,13 @@ class TargetSpectrum:
         name: What it is, for tables and figures.
         clause: Code and clause.
         damping: Damping ratio that it belongs to.
-        falls_from: Periods T_C and T_D of codes, in s; none for a table.
+        falls_from: Periods T_C and T_D of codes, in s, two at most; none for a table.
         minimum: Smallest value, in m/s².
         rule: What is asked of the mean spectrum of a suite.
 
     Raises:
-        RefusedError: The periods do not rise, an acceleration is not positive, or there are not as
-            many of both.
+        RefusedError: The periods do not rise, an acceleration is not positive, there are not as
+            many of both, or more than two periods to fall from, or one that is not positive.
 
     Example:
         >>> from alphacut.frame import TargetSpectrum
@@ -85,6 +85,9 @@ class TargetSpectrum:
         fits = 1 < len(periods) == len(sizes) and rises and bool((sizes > 0).all())
         allowed = "two or more rising periods from 0 s on, a positive acceleration for each"
         require(fits, "spectrum", f"{periods} s, {sizes} m/s^2", allowed)
+        # `displacement_chord` bounds branches in 1/T and 1/T², and no others.
+        falls = len(self.falls_from) <= 2 and all(0 < x < np.inf for x in self.falls_from)
+        require(falls, "falls_from", f"{self.falls_from} s", "two positive periods at most")
 
     def __call__(self, periods: ArrayLike) -> Array:
         """Return the spectral acceleration in m/s² at periods in s, in their shape.

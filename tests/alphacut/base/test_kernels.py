@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from alphacut.base import kernels
+from tests.environment.house import PACKAGES, files_in, tree
 
 FILES = {
     "__init__.py": "",
@@ -150,3 +151,45 @@ def test_what_kernels_read_from_other_files_is_in_their_digests() -> None:
                     ), name
                     found += 1
     assert found
+
+
+def named_in(node: ast.AST | None) -> set[str]:
+    """Names that a part of a syntax tree reads."""
+    return {x.id for x in ast.walk(node or ast.Pass()) if isinstance(x, ast.Name)}
+
+
+def test_kernels_that_python_calls_return_numbers_or_tuples_of_numbers() -> None:
+    """Numba runs Python code to make a named tuple or an array.
+
+    There the handler of a signal may raise an exception. Numba returns it if the result is an
+    array, but not out of a tuple: then the process ends by SIGSEGV, or with a SystemError.
+    """
+    named_tuples = set()
+    returned: dict[str, set[str]] = {}
+    called = set()
+    for module in map(tree, files_in(*PACKAGES)):
+        decorators = {"compiled"}
+        of_kernels = []
+        for node in module.body:
+            if isinstance(node, ast.ClassDef) and "NamedTuple" in set().union(
+                *map(named_in, node.bases)
+            ):
+                named_tuples.add(node.name)
+            if isinstance(node, ast.Assign) and "kernel" in named_in(node.value):
+                decorators |= {x.id for x in node.targets if isinstance(x, ast.Name)}
+            if isinstance(node, ast.FunctionDef) and decorators & set().union(
+                *map(named_in, node.decorator_list)
+            ):
+                of_kernels.append(node)
+                returned[node.name] = named_in(node.returns)
+                for line in ast.walk(node):
+                    if isinstance(line, ast.Return) and isinstance(line.value, ast.Call):
+                        returned[node.name] |= named_in(line.value.func)
+        for node in module.body:
+            if node not in of_kernels:
+                called |= named_in(node)
+    of_python = called & set(returned)
+    assert {"examine", "_march"} <= of_python
+    not_allowed = named_tuples | {"Array", "Ints", "Mask"}
+    wrong = {name: returned[name] & not_allowed for name in of_python}
+    assert {name: kinds for name, kinds in wrong.items() if kinds} == {}

@@ -193,7 +193,7 @@ def test_damage_states_share_a_figure_with_the_crossings_of_the_records(rng):
     # Twice the limit of a linear frame is exceeded at twice the measure, with the same bounds.
     assert of_severe.get_xdata() == pytest.approx(2 * points.get_xdata(), rel=1e-12)
     # The median of the drawn curve is known to the distance of the drawn measures.
-    median = float(answer.limits["slight"].lognormal_median.lower[-1])
+    median = answer.nominal_fit("slight").median
     x = fit.get_xdata()
     assert np.interp(0.5, fit.get_ydata(), x) == pytest.approx(median, rel=0, abs=x[1] - x[0])
     texts = [text.get_text() for text in axes.get_legend().get_texts()]

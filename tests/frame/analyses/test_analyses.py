@@ -146,6 +146,17 @@ def test_what_lies_between_nodes_lowers_no_peak():
     assert decided({"q1": peak}, {"q1": limit})["q1"].verdict == "exceeded"
 
 
+@pytest.mark.parametrize("alpha", [[0.0], [0.0, 1.0]])
+def test_nothing_is_more_necessary_than_it_is_possible(alpha):
+    """Also where the lowest level alone is known: a limit that no response reaches is not passed."""
+    found = peaks(envelope(FRAME, INPUTS, duration=1.0, step=0.05, alpha=alpha))
+    for factor, degrees in ((1.1, (0.0, 0.0)), (0.01, (1.0, 1.0))):
+        limits = [Limit(name, factor * float(found[name].upper[0])) for name in ("q1", "drift2")]
+        for part in decide(found, limits).limits.values():
+            assert part.possibility == degrees
+            assert part.necessity == degrees
+
+
 def test_levels_below_the_lowest_are_left_open():
     motion = envelope(FRAME, INPUTS, duration=4, step=0.05, alpha=(0.5, 1))
     answer = decided(motion, {"q1": 1.0})["q1"]

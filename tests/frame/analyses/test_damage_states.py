@@ -84,6 +84,32 @@ def test_the_first_storey_decides_and_every_structure_lies_in_the_ranges(found, 
     assert [row[0] for row in found.table().rows] == list(STATES)
 
 
+@pytest.mark.parametrize("alpha", [(0,), (0, 0.5), (0, 1)])
+def test_the_row_of_a_structure_is_that_of_the_nominal_one(suite, alpha):
+    """The ends of a cut belong to different structures, whose common scatter would be none's."""
+    found = fragility(FRAME, INPUTS, suite, states=STATES, **TIMES | {"alpha": alpha})
+    row = found.pelicun()[0]
+    for number, (state, limits) in enumerate(STATES.items(), 1):
+        members = [limits] if isinstance(limits, Limit) else limits
+        exact = []
+        for record in suite:
+            frame = replace(FRAME, ground=record, outputs=tuple(x.output for x in members))
+            motion = exact_motions(frame, np.array([[8e6]]), INPUTS, 2.0, 0.002)
+            peak = np.abs(motion).max(axis=(0, 1))
+            ratio = max(peak / [limit.value for limit in members])
+            exact.append(np.abs(record.samples).max() / ratio)
+        critical = found.nominal.get(state, found.limits[state].critical)
+        low, high = critical.low[-1], critical.high[-1]
+        assert (low <= exact).all()
+        assert (exact <= high * (1 + 2e-3)).all()  # between the nodes the peak is a little larger
+        # Measures within a factor of the exact ones have deviations that differ by its logarithm.
+        radii = np.log(high * (1 + 2e-3) / low) / 2
+        allowed = np.linalg.norm(radii) / np.sqrt(len(suite) - 1)
+        deviation = np.log(exact).std(ddof=1)
+        assert allowed < 0.25 * deviation
+        assert row[f"LS{number}-Theta_1"] == pytest.approx(deviation, rel=0, abs=allowed)
+
+
 def test_a_frame_that_yields_comes_into_a_state_at_its_first_crossing():
     measure = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     # One structure exceeds at 2 and again at 4, another at 3 and not at 4, all at 3 and 5.

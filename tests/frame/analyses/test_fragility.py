@@ -25,7 +25,7 @@ def two_storeys():
         for text, value in (("0.5 %", 0.015), ("1 %", 0.03))
         for storey in (1, 2)
     ]
-    times = {"duration": 2.0, "step": 0.04, "alpha": (0, 1)}
+    times = {"duration": 2.0, "step": 0.01, "alpha": (0, 1)}
     return fragility(FRAME, INPUTS, SUITE, limits, intensity="PGA", independent=True, **times)
 
 

@@ -36,7 +36,14 @@ from alphacut.frame.bounds.branch_and_bound import (
     bound_problems,
     examine_items,
 )
-from alphacut.frame.bounds.kernel import BoxTables, Items, RemainderBounds, examine, stays_below
+from alphacut.frame.bounds.kernel import (
+    BoxTables,
+    Examination,
+    Items,
+    RemainderBounds,
+    examine,
+    stays_below,
+)
 from alphacut.frame.bounds.model_error import (
     EnergyNorms,
     largest_growth,
@@ -520,7 +527,8 @@ def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
     `third` in size, and a slope that is wrong by `slope_error` at most.
     """
     table = np.array([0.0, slope, bend]).reshape(1, 1, 1, 3)
-    found = examine(
+    found = Examination.none(1)
+    examine(
         Items(np.array([0, 1]), np.array([0, 1]), node=np.array([0]), column=np.array([1])),
         BoxTables(np.full((1, 1), radius), np.full((1, 2, 1), is_at_ends), table),
         np.ones((1, 1)),
@@ -529,6 +537,7 @@ def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
             rounding=np.array([0.0, slope_error]).reshape(1, 1, 2),
         ),
         np.array([np.inf, target]),
+        found,
     )
     return found.code[0]
 

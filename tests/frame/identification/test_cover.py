@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from alphacut.frame import Accelerogram, StoreyFrame, envelope, identify, measured_mode, peaks
 from alphacut.frame.identification.cover import contains, cover, learned_envelope
 from alphacut.frame.identification.modes import chain_modes
-from alphacut.fuzzy import Interval
+from alphacut.fuzzy import Interval, Nature
 
 STEP, COUNT = 0.05, 40
 
@@ -117,6 +117,32 @@ def checked(rng, members):
 
 def test_members_of_the_learned_set_stay_in_its_bounds(rng):
     assert checked(rng, 100) < 0.95
+
+
+@pytest.mark.parametrize("lacks", ["proof", "between"])
+def test_a_part_without_a_proof_has_the_bounds_of_the_whole_box(rng, monkeypatch, lacks):
+    """One part of the cover is no proof, or says nothing of what lies between its nodes."""
+    frame, learned = identified(rng)
+    found = {}
+
+    def weakened(model, inputs, *arguments, **options):
+        of_inputs = envelope(model, inputs, *arguments, **options)
+        found.setdefault("whole", of_inputs)
+        found["count"] = found.get("count", 0) + 1
+        if found["count"] != 2:
+            return of_inputs
+        if lacks == "between":
+            return replace(of_inputs, between=None)
+        nothing = np.zeros_like(of_inputs.lower)
+        ends = {"lower": nothing, "upper": nothing, "inner": None, "between": 0 * of_inputs.between}
+        return replace(of_inputs, **ends, nature=Nature.ESTIMATED, natures=())
+
+    monkeypatch.setattr("alphacut.frame.identification.cover.envelope", weakened)
+    bounds = learned_envelope(frame, learned, duration=1.0, step=STEP, boxes=4, count=5)
+    np.testing.assert_array_equal(bounds.between, found["whole"].between)
+    if lacks == "proof":
+        np.testing.assert_array_equal(bounds.upper[0], found["whole"].upper[0])
+        np.testing.assert_array_equal(bounds.lower[0], found["whole"].lower[0])
 
 
 @pytest.mark.slow

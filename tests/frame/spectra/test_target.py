@@ -86,6 +86,8 @@ def test_a_table_of_ones_own_is_linear_and_in_the_unit_of_its_head(tmp_path):
         (lambda: asce7_multi_period(np.ones(21)), "spectrum"),
         (lambda: asce7_two_period(10.0, 6.0, 0.5), "long_period"),
         (lambda: TargetSpectrum([0.0, 1.0], [1.0, 0.0]), "spectrum"),
+        (lambda: TargetSpectrum([0, 50], [1, 5], falls_from=(0.2, 0.5, 0.9)), "falls_from"),
+        (lambda: TargetSpectrum([0, 50], [1, 5], falls_from=(0.0,)), "falls_from"),
     ],
 )
 def test_what_makes_no_spectrum_is_one_line(build, key):
