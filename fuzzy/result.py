@@ -177,15 +177,20 @@ class Bounds:
         estimate_error = np.where(self._guaranteed, 0.0, error)
         # Each of two levels may be off by its own error and its own rounding.
         between_levels = 2 * rounding + error[1:] + error[:-1]
-        attained = self.attained
-        proved = self.proved
         # `_require_none` raises if an entry of its array is positive.
         crossing = self.lower - self.upper - rounding - estimate_error
         _require_none("lower bounds lie above upper ones", crossing, self.outputs)
+        # What crosses by no more than that is put in order: each end stays within its error.
+        if (self.lower > self.upper).any():
+            lower, upper = self.lower, self.upper
+            object.__setattr__(self, "lower", np.minimum(lower, upper))
+            object.__setattr__(self, "upper", np.maximum(lower, upper))
         lower_falls = -np.diff(self.lower, axis=0) - between_levels
         _require_none("lower ends of the α-cuts are not nested", lower_falls, self.outputs)
         upper_rises = np.diff(self.upper, axis=0) - between_levels
         _require_none("upper ends of the α-cuts are not nested", upper_rises, self.outputs)
+        attained = self.attained
+        proved = self.proved
         # A comparison with NaN is false, so that unknown attained ends pass.
         for excess in (proved.lower - attained.lower, attained.upper - proved.upper):
             what = "attained bounds lie outside the proved ones"

@@ -132,10 +132,12 @@ def corners_suffice(domain: Domain, signs: Signs) -> Mask:
             neither is known, shape (outputs, inputs).
 
     Returns:
-        True for such outputs, shape (outputs,).
+        True for such outputs, shape (outputs,); False for all if no input has a width. A single
+        evaluation attains its value, and says nothing of what the function rounds.
     """
     lower, upper = domain.boxes
-    return np.asarray(((signs != 0) | (lower[0] == upper[0])).all(axis=1))
+    has_width = lower[0] < upper[0]
+    return np.asarray(((signs != 0) | ~has_width).all(axis=1) & has_width.any())
 
 
 def require_budget(samples: float, campaign: Campaign, method: str) -> None:

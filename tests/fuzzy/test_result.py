@@ -5,7 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import Bounds, FailedError, Nature, RefusedError, Triangular
+from alphacut.fuzzy import (
+    Bounds,
+    FailedError,
+    General,
+    Interval,
+    Nature,
+    Reduced,
+    RefusedError,
+    Signed,
+    Triangular,
+    propagate,
+)
 from tests.refused import refuses
 
 ALPHA = np.array([0.0, 1.0])
@@ -47,6 +58,28 @@ def test_cuts_that_are_not_nested_are_a_failure():
         bounds(lower=np.array([[4.1], [3.9]]), upper=np.array([[16.0], [16.0]]))
     with pytest.raises(FailedError, match="above"):
         bounds(lower=np.array([[1.0], [4.1]]))
+
+
+@pytest.mark.parametrize("nature", list(Nature))
+def test_ends_that_rounding_crosses_are_put_in_order(nature):
+    found = bounds(lower=np.array([[1.0], [4.0 + 1e-12]]), nature=nature, error=np.zeros((2, 1)))
+    assert (found.lower <= found.upper).all()
+    assert found.lower[1, 0] == 4.0
+    assert found.upper[1, 0] == 4.0 + 1e-12
+
+
+@pytest.mark.parametrize("method", [None, General(), Reduced(), Signed()])
+def test_crisp_inputs_attain_one_value_and_prove_nothing(method):
+    """Rump's function, whose evaluation has no right digit."""
+
+    def rump(a, b):
+        return (333.75 - a**2) * b**6 + a**2 * (11 * a**2 * b**2 - 121 * b**4 - 2) + 5.5 * b**8
+
+    inputs = {"a": 77617.0, "b": Interval(33096, 33096)}
+    found = propagate(rump, inputs, method, progress=False)
+    assert found.nature is Nature.ATTAINED
+    assert "signs" not in str(found)
+    assert len(set(found.lower.ravel())) == 1
 
 
 @pytest.mark.parametrize("time", [None, np.array([0.0, 0.5, 1.0])])
