@@ -6,12 +6,14 @@ sphere makes B = T A, and the B of all images make A (Rayleigh 1892; McPhedran a
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import checked_number
 from alphacut.rve.result.result import DeclaredConstants
-from alphacut.rve.series.fibre_constants import theta_mean
+from alphacut.rve.series.fibre_constants import remainder_factor, theta_mean
 from alphacut.rve.spheres.multipoles import VOLUME, harmonic_couplings
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.radius_map import require_map
@@ -47,7 +49,7 @@ def cubic_conductivity(radius: Array, ratio: float) -> tuple[Array, Array]:
     """Return the conductivity over that of the matrix, and its relative error, at each radius.
 
     The highest degree of the multipoles rises until no value changes by more than 1e-11, or to 47;
-    the last change is the error, plus 1e-11.
+    the error is the last change, plus 1e-11, times `remainder_factor` where spheres nearly touch.
 
     Args:
         radius: Radii over half the cell's side, in [0, 1), shape (n,).
@@ -56,13 +58,14 @@ def cubic_conductivity(radius: Array, ratio: float) -> tuple[Array, Array]:
     tolerance = 1e-11
     degrees = (5, 9, 15, 23, 33, 47)  # the last one takes 150 unknowns
     values = _conductivity(radius, ratio, degrees[0])
-    for degree in degrees[1:]:
+    for previous_degree, degree in pairwise(degrees):
+        last_orders = degree - previous_degree
         previous = values
         values = _conductivity(radius, ratio, degree)
         change = np.abs(values / previous - 1)
         if change.max() <= tolerance:
             break
-    return values, change + tolerance
+    return values, (change + tolerance) * remainder_factor(radius, last_orders)
 
 
 def _conductivity(radius: Array, ratio: float, degree: int) -> Array:

@@ -7,6 +7,7 @@ from scipy.integrate import quad
 from alphacut.rve import fibre_conductivity, sphere_conductivity
 from alphacut.rve.image.model import ConductionModel
 from alphacut.rve.image.phases import ModuliImages
+from alphacut.rve.series.fibre_constants import longitudinal_shear
 from alphacut.rve.spheres.conduction import cubic_conductivity
 from alphacut.stochastic import HermiteMap
 from tests.refused import refuses
@@ -70,6 +71,25 @@ def test_voxels_enclose_the_array_of_spheres(radius, ratio):
     denominator = 1 / contrast - fraction - 1.3047 * octupoles * fraction ** (10 / 3)
     assert value == pytest.approx(1 + 3 * fraction / denominator, rel=fraction**4)
     assert (value > dipoles_alone) == (ratio > 1)
+
+
+@pytest.mark.parametrize("radius", [0.999, 0.9999, 0.99999, 0.999999])
+def test_the_error_of_fibres_that_nearly_touch_covers_the_flux_through_the_gap(radius):
+    """Of perfect conductors: π √(r/h) − 1.88 with the gap h (Keller, J. Appl. Phys. 34, 991)."""
+    [value], [error] = longitudinal_shear(np.array([radius]), 1.0, 1e12)
+    limit = np.pi * np.sqrt(radius / (2 - 2 * radius)) - 1.88
+    assert abs(value - limit) <= error * value + 2e-3 * limit
+
+
+@pytest.mark.parametrize("radius", [0.9999, 0.99999])
+def test_the_error_of_spheres_that_nearly_touch_covers_the_flux_through_the_gap(radius):
+    """Of perfect conductors: near contact it grows by (π/2) ln of the gap's inverse."""
+    far = 0.999
+    [start], [start_error] = cubic_conductivity(np.array([far]), 1e6)
+    limit = start + np.pi / 2 * np.log((1 - far) / (1 - radius))
+    [value], [error] = cubic_conductivity(np.array([radius]), 1e6)
+    assert abs(value - limit) <= error * value + start_error * start
+    assert error < 2
 
 
 def test_wrong_conductivities_are_refused():
