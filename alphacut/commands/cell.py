@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     if options.export:
         document["export"] = export(problem, Path(options.export))
     text = summary(document, result.convention)
-    if solver := problem.model().solver_text:
+    if solver := problem.model(parallel=ranks() > 1).solver_text:
         text += f"Cell: {solver}\n"
     write_answer(options, document, out, text)
     return 0

@@ -28,6 +28,7 @@ class CellFields:
             (n, 3, loads), in Pa.
         names: Names of the phases.
         node: Node of the mesh that each point is, shape (n,).
+        writes: Whether `write` writes the file: of MPI ranks that have the same fields, one does.
     """
 
     points: Array
@@ -37,9 +38,13 @@ class CellFields:
     stress: Array
     names: tuple[str, ...]
     node: Ints
+    writes: bool = True
 
     def write(self, path: Path | str) -> int:
-        """Write mesh, phases, displacements and stresses; return the number of nodes written.
+        """Write mesh, phases, displacements and stresses; return the number of nodes in the file.
+
+        Ranks that solved one cell together have the same fields, and the first one writes the file;
+        the others go on at once, so that they must wait before they read it.
 
         The ending of the name chooses the format. A file of Gmsh (.msh) holds the mesh once, with
         fields as values at the nodes of its elements. In those of VTK (.vtu) and in XDMF (.xdmf)
@@ -63,10 +68,12 @@ class CellFields:
             raise RefusedError("file", str(path), f"names that end in {', '.join(formats)}")
         if kind == "gmsh":
             return self._write_gmsh(path)
+        fine = self.in_tetrahedra()
+        if not self.writes:
+            return len(fine.points)
         with extra_named():
             import meshio
 
-        fine = self.in_tetrahedra()
         mesh = meshio.Mesh(
             fine.points,
             [("tetra10", fine.cells)],
@@ -89,6 +96,8 @@ class CellFields:
         """
         points: Array = np.empty((self.node.max() + 1, 3))
         points[self.node] = self.points
+        if not self.writes:
+            return len(points)
         values = {
             name: data[self.cells].reshape(*self.cells.shape, -1)
             for name, data in self._point_fields().items()
@@ -167,6 +176,7 @@ class CellFields:
             stress=with_centres(self.stress),
             names=self.names,
             node=np.concatenate([self.node, np.full(len(sides), -1)]),
+            writes=self.writes,
         )
 
 

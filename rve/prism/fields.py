@@ -22,8 +22,10 @@ def solved_fields(
 ) -> CellFields:
     """Solve a cell and return its displacements and stresses under macroscopic strains.
 
+    All ranks of the problem must call, and get the fields of the whole cell.
+
     Args:
-        problem: The cell on one rank, moved to its radius map.
+        problem: The cell, moved to its radius map.
         stiffness: Stiffness of each phase in Voigt order (11, 22, 12 with 2 ε12), (3, 3) each, in
             Pa, in the order of the problem's phases.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
@@ -56,8 +58,10 @@ def fields_of_solution(
 ) -> CellFields:
     """Return displacements and stresses at the nodes, for a solution of a material law of the user.
 
+    All ranks of the problem must call, and get the fields of the whole cell.
+
     Args:
-        problem: The cell that it was solved on, on one rank.
+        problem: The cell that it was solved on.
         u: Fluctuation of the displacements, without the displacements of the macroscopic strain,
             in halves of the cell's side.
         stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of three components, in
@@ -119,31 +123,41 @@ def nodal_fields(
 ) -> CellFields:
     """Return total displacements, and stresses as means over the prisms that meet in a node.
 
-    Only prisms of the same phase at a node enter a mean, since stresses jump between phases.
+    Only prisms of the same phase at a node enter a mean, since stresses jump between phases. All
+    ranks of the problem must call.
 
     Args:
-        problem: The cell, on one rank.
-        fluctuation: Displacements at DOLFINx's nodes, without the displacements of the macroscopic
-            strain, in halves of the cell's side, shape (nodes, 2, loads).
+        problem: The cell.
+        fluctuation: Displacements at this rank's nodes of DOLFINx, without the displacements of the
+            macroscopic strain, in halves of the cell's side, shape (nodes, 2, loads).
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
-        stress: (σ11, σ22, σ12) at the 15 nodes of each prism, shape (prisms, 15, 3, loads), in Pa.
-        phase: Index of the phase at the nodes of each prism, shape (prisms, 15).
+        stress: (σ11, σ22, σ12) at the 15 nodes of each of this rank's prisms, shape (prisms, 15, 3,
+            loads), in Pa.
+        phase: Index of the phase at the nodes of these prisms, shape (prisms, 15).
 
     Returns:
-        Fields with one point for each pair of a node and a phase that meets there, sorted by phase
-        and then by node; `cells` are indices of these points. The phase of a prism that a level set
-        cuts is the phase of most of its 15 nodes.
+        Fields of the whole cell on all ranks, with one point for each pair of a node and a phase
+        that meets there, sorted by phase and then by node; `cells` are indices of these points, in
+        the order of the grid. The phase of a prism that a level set cuts is the phase of most of
+        its 15 nodes.
     """
     grid = problem.grid
     positions = grid.positions(problem.map)
+    wedge, stress, phase, node, fluctuation = [
+        np.concatenate(problem.comm.allgather(of_rank))
+        for of_rank in (problem.wedge, stress, phase, problem.node, fluctuation)
+    ]
+    order = np.argsort(wedge)
+    stress = stress[order]
+    phase = phase[order]
     eps11, eps22, gamma12 = np.moveaxis(loads, -1, 0)
     tensors = np.array([[eps11, gamma12 / 2], [gamma12 / 2, eps22]])  # (2, 2, loads)
-    uniform = np.einsum("nj,ijl->nil", positions[problem.node, :2], tensors)
+    uniform = np.einsum("nj,ijl->nil", positions[node, :2], tensors)
     displacement = np.empty((grid.nodes, 2, len(loads)))
-    displacement[problem.node] = fluctuation + uniform
+    displacement[node] = fluctuation + uniform
 
     # A point is a pair of a phase and a node, numbered phase · nodes + node.
-    point_keys = grid.cells[problem.wedge] + phase * grid.nodes
+    point_keys = grid.cells + phase * grid.nodes
     points, cells = np.unique(point_keys, return_inverse=True)
     cells = cells.reshape(point_keys.shape)
     node = points % grid.nodes
@@ -159,4 +173,5 @@ def nodal_fields(
         stress=mean_stress,
         names=NAMES if isinstance(problem.map, LevelSet) else grid.names,
         node=node,
+        writes=problem.comm.rank == 0,
     )

@@ -9,6 +9,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
@@ -134,6 +135,45 @@ def test_only_one_rank_prints_and_the_command_shares_a_cell():
     one = PrismModel(0.4, 4, estimate=False).solve(radius, Phase(20e9), [Phase(80e9)])[0]
     assert two["E_GPa"] == pytest.approx(one.modulus / 1e9, rel=1e-10)
     assert two["unknowns"] == one.unknowns
+    text = run(2, *solve[:-2], "--set", "mesh.size=0.5", "--set", "mesh.layers=2")
+    assert text.count("Cell: one UFL form over prisms") == 1
+
+
+FIELDS = """
+import numpy as np
+from alphacut.rve import Phase, PrismModel
+from alphacut.stochastic import HermiteMap
+
+model = PrismModel(0.5, 2, parallel=parallel)
+fields = model.fields(HermiteMap(0.2, 0.1, 0.6, 0.1), Phase(20e9), [Phase(80e9)])
+"""
+
+
+def test_fields_of_a_shared_cell_are_whole_on_each_rank_and_in_one_file(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    names = {"parallel": False}
+    exec(FIELDS, names)
+    one = names["fields"]
+    path = tmp_path / "fields.vtu"
+    expected = one.write(tmp_path / "one.vtu")
+    script = f"""
+parallel = True
+{FIELDS}
+from mpi4py import MPI
+assert fields.write({str(path)!r}) == {expected}
+assert fields.writes == (MPI.COMM_WORLD.rank == 0)
+np.savez({str(tmp_path)!r} + f"/{{MPI.COMM_WORLD.rank}}.npz", **vars(fields))
+"""
+    run(2, "-c", script)
+    for rank in range(2):
+        with np.load(tmp_path / f"{rank}.npz") as found:
+            for name in ("points", "cells", "phase", "node"):
+                assert np.array_equal(found[name], getattr(one, name))
+            for name in ("displacement", "stress"):
+                value = getattr(one, name)
+                assert found[name] == pytest.approx(value, rel=1e-6, abs=1e-7 * abs(value).max())
+    [cells] = meshio.read(path).cells
+    assert len(cells.data) == 3 * len(one.cells)
 
 
 BOUNDS = """
