@@ -26,6 +26,7 @@ from alphacut.commands.motion_text import load_end_warnings
 from alphacut.commands.options import read_case
 from alphacut.frame.analyses.incremental import Increments
 from alphacut.frame.analyses.peaks import Peak, Peaks
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, rank, require_writable, say
 from alphacut.io.results import MANIFEST, ResultsFolder
 from alphacut.rve.image.fields.grid import device_array
@@ -230,7 +231,8 @@ class Pipeline:
         self.campaign.require_mesh()
         results.modulus = self.store.take(modulus.stage(self.campaign))
         numbers = results.modulus.numbers
-        cell.require_tolerance(numbers.error, section.tolerance)
+        if numbers.nature is not Nature.GUARANTEED:  # which leaves no error out
+            cell.require_tolerance(numbers.error, section.tolerance)
         # The classical bounds belong to the nominal inputs, and so does E on the highest level.
         highest = (float(numbers.E_GPa.lower[-1]), float(numbers.E_GPa.upper[-1]))
         cell.require_bounds(highest, numbers.references, numbers.particles)

@@ -45,8 +45,9 @@ def read_grid(path: Path | str) -> PrismGrid:
     Raises:
         RefusedError: The file cannot be read, is not in that format, or contradicts itself.
         MeshError: It is no mesh of a cell: other elements than prisms, a volume without a group or
-            in two, θ along another axis, no such cell, no columns, folded prisms, voids or
-            overlaps, opposite sides that do not match, slits, or a material that changes along θ.
+            in two, θ along another axis, no such cell, no columns, edges without a middle node of
+            their own, folded prisms, voids or overlaps, opposite sides that do not match, slits, or
+            a material that changes along θ.
     """
     try:
         mesh = parse_msh(mesh_content(path))
@@ -60,6 +61,7 @@ def read_grid(path: Path | str) -> PrismGrid:
         _require_theta_last(prisms.points)
         raise
     plane = grid.plane
+    _require_one_middle_for_each_edge(plane.triangles, plane.points)
     grid = replace(grid, plane=replace(plane, lattice=lattice_of(plane.points)))
     _require_unfolded_and_filled(grid)
     _require_periodic(grid)
@@ -420,9 +422,9 @@ def _require_periodic(grid: PrismGrid) -> None:
             which are numbered level by level, and with the lattice of its lowest level.
 
     Raises:
-        MeshError: The nodes of a level reach out of the cell or do not reach its sides, a
-            node on a side has no partner on the opposite side, or nodes are partners on one level
-            and not on another.
+        MeshError: The nodes of a level reach out of the cell or do not reach its sides, the middle
+            node of an edge on a side is off it, a node on a side has no partner on the opposite
+            side, or nodes are partners on one level and not on another.
     """
     assert grid.fixed is not None
     lattice = grid.plane.lattice
@@ -439,6 +441,8 @@ def _require_periodic(grid: PrismGrid) -> None:
             what += " of the lowest level"
             cure = "mesh a parallelogram or regular hexagon, alike at all θ"
             raise MeshError(what, cure)
+        if len(points) == len(grid.plane.points):
+            _require_middles_on_sides(grid, xy)
         try:
             partners = unknowns(xy, lattice)
         except MeshError as error:
@@ -446,6 +450,50 @@ def _require_periodic(grid: PrismGrid) -> None:
         # Vertices, which middles have alone, are the first nodes of a level.
         if not np.array_equal(partners, unknowns(levels[0][: len(xy), :2], lattice)):
             raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
+
+
+def _require_middles_on_sides(grid: PrismGrid, xy: Array) -> None:
+    """Raise MeshError where an edge's ends lie on a side of the cell and its middle node does not.
+
+    Such a node would have no partner on the opposite side, where the field would jump.
+
+    Args:
+        grid: A mesh with its lattice, which tells the ends of each middle node's edge.
+        xy: Positions of the nodes of a level, shape (nodes, 2), vertices before middle nodes.
+    """
+    plane = grid.plane
+    coordinates = plane.lattice.side_coordinates(xy)
+    # −1 on the first side of each pair, 1 on the second one, and 0 inside.
+    sides = np.where(abs(abs(coordinates) - 1) <= SAME_PLACE, np.sign(coordinates), 0)
+    first = sides[plane.ends[:, 0]]
+    is_along_side = (first != 0) & (first == sides[plane.ends[:, 1]])
+    is_off = (is_along_side & (sides[plane.vertices :] != first)).any(axis=1)
+    if is_off.any():
+        x, y = xy[plane.vertices + np.argmax(is_off)]
+        what = f"the middle node at ({x:.8g}, {y:.8g}) of an edge on a side of the cell is off it"
+        raise MeshError(what, "put it onto the side, as straight sides do")
+
+
+def _require_one_middle_for_each_edge(triangles: Ints, points: Array) -> None:
+    """Raise MeshError where triangles that share an edge have different middle nodes on it.
+
+    Neither may a node be the middle of two edges.
+
+    Args:
+        triangles: Nodes of six-node triangles: vertices, then middles of edges 01, 02, 12, shape
+            (triangles, 6).
+        points: Positions of the nodes, shape (n, 2).
+    """
+    _, edges, _ = square.edges(triangles[:, :3], np.zeros(len(triangles), bool))
+    # Edges of a triangle are in the order 12, 02, 01.
+    pairs = np.unique(np.stack([edges.ravel(), triangles[:, [5, 4, 3]].ravel()]), axis=1)
+    for row, what in ((0, "an edge has two middle nodes"), (1, "two edges have one middle node")):
+        values, counts = np.unique(pairs[row], return_counts=True)
+        if (counts > 1).any():
+            middle = pairs[1, pairs[row] == values[np.argmax(counts > 1)]][0]
+            x, y = points[middle]
+            cure = "remove duplicate nodes, and let surfaces share their curves: occ.fragment"
+            raise MeshError(f"{what}, at ({x:.6g}, {y:.6g})", cure)
 
 
 def write(

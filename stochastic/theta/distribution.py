@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import erfc, sqrt
 from typing import Protocol
 
@@ -57,6 +58,36 @@ def require_distribution(distribution: object) -> None:
     if isinstance(distribution, str):
         shown = repr(distribution)
     raise RefusedError("law of θ", shown, "a law with lower, upper, pdf, cdf and quantile", cure)
+
+
+def require_matching_density(distribution: ThetaDistribution, heights: Array) -> None:
+    """Raise unless the distribution function of θ is the integral of its density.
+
+    It must be 0 and 1 at the ends of the support, and rise over each layer by the integral of the
+    density, to 1e-6.
+
+    Args:
+        distribution: The distribution.
+        heights: Ends of the layers, rising from 0 to 1 over the support.
+
+    Raises:
+        RefusedError: It is not.
+    """
+    from scipy.integrate import quad  # takes time to import
+
+    tolerance = 1e-6
+    levels = distribution.lower + heights * (distribution.upper - distribution.lower)
+    values = np.asarray(distribution.cdf(levels), float)
+    key = "distribution function of θ"
+    is_whole = abs(values[0]) <= tolerance and abs(values[-1] - 1) <= tolerance
+    ends = f"{values[0]:.6g} and {values[-1]:.6g} at the ends of the support"
+    cure = "cut the law at its support: divide density and distribution function by the same mass"
+    require(is_whole, key, ends, "0 and 1", cure)
+    for (low, high), rise in zip(pairwise(levels), np.diff(values), strict=True):
+        integral, error = quad(lambda theta: float(distribution.pdf(theta)), low, high, limit=200)
+        found = f"rising by {rise:.6g} from {low:.4g} to {high:.4g}"
+        is_integral = abs(rise - integral) <= tolerance + error
+        require(is_integral, key, found, f"{integral:.6g}, the integral of the density", cure)
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:

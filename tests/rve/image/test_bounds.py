@@ -15,8 +15,8 @@ from scipy.linalg import eigh
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from alphacut.fuzzy import FailedError
-from alphacut.rve import Phase, SpheresModel, solve_image
+from alphacut.fuzzy import FailedError, Triangular
+from alphacut.rve import GreyImage, Phase, SpheresModel, fuzzy_image_stiffness, solve_image
 from alphacut.rve.image.bounds import (
     Enclosure,
     StiffnessBounds,
@@ -519,6 +519,21 @@ def test_a_laminate_s_modulus_along_its_layers_is_inside_at_any_contrast(contras
     bounds = solve_image(*diagonal_stripes(contrast, (2, 4, 4))).bounds
     young = bounds.constants()[2]  # along z: the mean of both phases, of one Poisson's ratio
     assert young[0] <= (1 + contrast) / 2 * 1e9 <= young[1] < 1.001 * contrast / 2 * 1e9
+
+
+def test_layers_of_pores_polymer_and_steel_are_bounded_along_them():
+    """At 45° to the axes across z: along z the mean of the moduli, and pores below."""
+    index = np.indices((3, 6, 6))
+    image = GreyImage((index[1] + index[2]) % 6 // 2 + 1, (5e-6,) * 3)
+    steel, polymer = Triangular(190e9, 200e9, 210e9), Triangular(1e7, 2e7, 3e7)
+    phases = [{"modulus": young, "poisson": 0.3} for young in (0.0, polymer, steel)]
+    found = fuzzy_image_stiffness(image, phases, labels=[1, 2, 3], alpha=[0, 1], progress=False)
+    low, high = found.constants["E_z"].T
+    assert (low <= 200.02e9 / 3).all()
+    assert high[1] == pytest.approx(200.02e9 / 3, rel=1e-3)
+    assert high[1] >= 200.02e9 / 3
+    for bounds in found.constants.values():
+        assert (bounds[:, 0] <= bounds[:, 1]).all()
 
 
 @pytest.mark.parametrize("poisson", [-1 + 1.5e-8, -0.95, 0.49999999])

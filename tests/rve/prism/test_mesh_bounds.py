@@ -1,6 +1,7 @@
 """Guaranteed bounds of meshes of one's own, from displacements and stresses in equilibrium."""
 
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 pytest.importorskip("alphacut.rve.fenicsx")
 
-from alphacut.fuzzy import FailedError
+from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve import MeshModel, Phase, PrismModel, SeriesModel, VoigtPhase
 from alphacut.rve.mesh.file import write
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
@@ -17,7 +18,7 @@ from alphacut.rve.prism.mesh_bounds import ROTATION, mesh_bounds
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.prism.stress_functions import solved_fields_of_bounds
 from alphacut.rve.prism.theta_means import mean_over_theta
-from alphacut.rve.solver.krylov import SolverOptions
+from alphacut.rve.solver.krylov import ConvergenceError, SolverOptions
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from benchmarks.rve.mesh_bounds import work_of_stresses
 from tests.rve.prism.test_own_mesh import write_lattice
@@ -127,6 +128,50 @@ def test_a_laminate_has_its_own_stiffness(tmp_path, rng, amplitude):
     assert excess(bounds.upper, exact) > 0
     assert excess(exact, bounds.lower) > 0
     assert abs(bounds.upper - bounds.lower).max() < 1e-5 * exact.max()
+
+
+@pytest.mark.parametrize("ratio", [1e9, 1e10])
+def test_a_phase_of_very_unlike_directions_is_inside(tmp_path, rng, ratio):
+    """Of a homogeneous cell, by exact sums of its energies along soft directions."""
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    stiffness = (np.array([1e9, 1e9, 1e9 * ratio]) * turn) @ turn.T
+    stiffness = (stiffness + stiffness.T) / 2
+    phase = VoigtPhase(tuple(map(tuple, stiffness.tolist())))
+
+    def move(x, y, theta):
+        return 0.05 * np.sin(np.pi * y) * np.cos(np.pi * x + theta)
+
+    path = structured(
+        tmp_path / "one.msh", count=4, layers=1, phase_of=lambda x, _: abs(x) < 0.5, move=move
+    )
+    try:
+        bounds = MeshModel(path).bounds(LAW, {"soft": phase, "hard": phase})
+    except ConvergenceError:  # a system of such entries may be beyond the solver
+        return
+    vectors = np.linalg.eigh(stiffness)[1]
+    for vector in vectors.T[:2]:
+        energies = []
+        for matrix in (bounds.lower, phase.stiffness, bounds.upper):
+            terms = np.multiply.outer(vector, vector).ravel().tolist()
+            pairs = zip(map(Fraction, matrix.ravel().tolist()), map(Fraction, terms), strict=True)
+            energies.append(sum(entry * term for entry, term in pairs))
+        assert energies[0] <= energies[1] <= energies[2]
+
+
+@pytest.mark.parametrize("change", ["scaled", "reversed", "other"])
+def test_a_distribution_function_that_is_not_the_integral_of_its_density_is_refused(change):
+    class Wrong:
+        lower, upper = -3.0, 3.0
+        pdf = staticmethod(LAW.pdf)
+        quantile = staticmethod(LAW.quantile)
+
+        def cdf(self, theta):
+            right = np.asarray(LAW.cdf(theta))
+            return {"scaled": right / 2, "reversed": 1 - right, "other": right**1.01}[change]
+
+    phases = {"matrix": SOFT, "inclusion": HARD}
+    with pytest.raises(RefusedError, match="distribution function of θ"):
+        MeshModel(MESHES / "paper-coarse.msh").bounds(Wrong(), phases)
 
 
 @pytest.mark.parametrize("lattice", ["square", "hexagonal", [1.0, 1.2]])

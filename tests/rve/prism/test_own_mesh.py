@@ -15,6 +15,7 @@ from alphacut.fuzzy import FailedError, RefusedError
 from alphacut.rve import Ellipse, MeshModel, Phase, PrismModel, SeriesModel
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.file import write
+from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from tests.refused import refuses
 
@@ -60,7 +61,7 @@ def test_two_particles_are_as_stiff_as_plane_triangles():
         (Ellipse(1.0), 4, False, 2),
         (Ellipse(2.0, 30.0), 1e-2, False, 1),
         # columns of random phases: corners, and points where they cross
-        (Ellipse(1.0), 100, True, 1),
+        (Ellipse(1.0), 9, True, 1),
     ],
 )
 def test_the_error_of_a_refined_mesh_covers_that_to_a_mesh_four_times_finer(
@@ -81,6 +82,50 @@ def test_the_error_of_a_refined_mesh_covers_that_to_a_mesh_four_times_finer(
     assert (true < result.modulus_errors).all()
     energy_error = abs(result.energies.values - exact.energies.values)
     assert (energy_error <= result.energies.errors + 1e-9 * result.modulus).all()
+
+
+def quarters(path, phases):
+    """Write a square of four by four squares, whose phases are numbers in an array (4, 4)."""
+    corners, phase = [], []
+    for i, j in np.ndindex(4, 4):
+        square = np.array([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]]) / 2 - 1
+        corners += [square[[0, 1, 2]], square[[0, 2, 3]]]
+        phase += [phases[i, j]] * 2
+    x, y, z = vertices_and_midpoints().T
+    plane = np.stack([1 - x - y, x, y], axis=1) @ np.array(corners)
+    theta = np.broadcast_to(6 * z - 3, plane.shape[:2])
+    nodes = np.concatenate([plane, theta[..., np.newaxis]], axis=-1).reshape(-1, 3)
+    points, cells = np.unique(nodes.round(9), axis=0, return_inverse=True)
+    write(path, points, cells.reshape(-1, 15), np.array(phase), ("a", "b", "c")[: phases.max() + 1])
+    return path
+
+
+CHECKERBOARD = np.kron([[0, 1], [1, 0]], np.ones((2, 2), int))
+ACROSS_THE_SIDES = np.roll(CHECKERBOARD, (1, 1), axis=(0, 1))
+PARTICLE = np.pad(np.ones((2, 2), int), 1)
+TOUCHING_AT_CORNERS = np.diag([1, 1, 0, 0])
+THREE = np.array([[0, 0, 1, 1], [0, 0, 1, 1], [2, 2, 2, 2], [2, 2, 2, 2]])
+
+
+@pytest.mark.parametrize(
+    ("phases", "contrast", "declares"),
+    [
+        (CHECKERBOARD, 800, False),
+        (CHECKERBOARD, 5, True),
+        (ACROSS_THE_SIDES, 800, False),
+        (TOUCHING_AT_CORNERS, 1 / 800, False),
+        (PARTICLE, 800, True),
+        (PARTICLE, 1 / 800, True),
+        (THREE, 800, True),
+    ],
+)
+def test_no_error_is_declared_where_phases_meet_crosswise(tmp_path, phases, contrast, declares):
+    pytest.importorskip("gmsh")  # which writes the file
+    path = quarters(tmp_path / "quarters.msh", phases)
+    moduli = {"a": 1e9, "b": contrast * 1e9, "c": 30e9}
+    named = {name: Phase(moduli[name]) for name in grid_of(path).names}
+    [result] = MeshModel(path, refine=True).solve(LAW, named)
+    assert np.isfinite(result.modulus_errors).all() == declares
 
 
 def test_a_mesh_without_mid_levels_is_not_refined(tmp_path):
@@ -198,6 +243,12 @@ def test_levels_may_be_uneven(tmp_path):
             dict.fromkeys(("matrix", "ring", "particle"), SOFT),
             "law of θ",
         ),
+        # stretched onto the mesh, the law would move the geometry
+        (
+            TruncatedNormal(-3, 3 + 1e-7),
+            dict.fromkeys(("matrix", "ring", "particle"), SOFT),
+            "law of θ",
+        ),
     ],
 )
 def test_law_and_phases_that_do_not_fit_are_refused(law, phases, key):
@@ -247,6 +298,31 @@ def dented(points, cells, phase):
     return points, cells, phase
 
 
+ON_LEVELS = [6, 7, 9, 12, 13, 14]
+"""Middles of the edges of a prism's triangles."""
+
+
+def bulged(points, cells, phase):
+    """The middles of two opposite sides lie off them, alike at all levels."""
+    middles = np.unique(cells[:, ON_LEVELS])
+    off = middles[abs(abs(points[middles, 0]) - 1) < 1e-9]
+    points[off, 0] += 3e-7
+    return points, cells, phase
+
+
+def with_middles_of_its_own(points, cells, phase):
+    cells = cells.copy()
+    cells[np.ix_(phase == 1, ON_LEVELS)] += len(points)
+    return np.tile(points, (2, 1)), cells, phase
+
+
+def with_one_middle_too_few(points, cells, phase):
+    cells = cells.copy()
+    cells[:, 7] = cells[:, 6]
+    cells[:, 13] = cells[:, 12]
+    return points, cells, phase
+
+
 def begun_late(points, cells, phase):
     return points, cells, phase * (np.arange(len(phase)) >= len(phase) // 2)
 
@@ -261,6 +337,9 @@ def begun_late(points, cells, phase):
         (twice_the_particle, r"the prisms fill 112\.\d+% .* occ.fragment"),
         (cut_out, "has a prism on one side alone: a slit; .* Coherence"),
         (dented, "is folded; move corners .*Mesh.HighOrderOptimize"),
+        (bulged, r"middle node at \(.*, on the level|middle node at \(.* of the cell is off it"),
+        (with_middles_of_its_own, r"an edge has two middle nodes, at \(.* remove duplicate nodes"),
+        (with_one_middle_too_few, "one middle node|two middle nodes|columns of prisms"),
         (begun_late, "is matrix in a layer of θ and inclusion in the next; .* two meshes"),
     ],
 )
