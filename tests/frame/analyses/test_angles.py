@@ -58,10 +58,7 @@ def sampled_peaks(structure, inputs, angles, points):
 
 
 @pytest.mark.parametrize("case", range(10))
-def test_no_sampled_angle_exceeds_the_bound_of_random_plans(case):
-    seed = int(np.random.SeedSequence().generate_state(1)[0])
-    print(f"seed {seed}")
-    rng = np.random.default_rng(seed)
+def test_no_sampled_angle_exceeds_the_bound_of_random_plans(case, rng):
     changes = {}
     if case % 2:
         history = History(0.1, rng.normal(size=6))

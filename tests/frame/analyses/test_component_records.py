@@ -17,7 +17,6 @@ from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points
 from tests.refused import refuses
 
-SEED = int(np.random.SeedSequence().generate_state(1)[0])
 INPUTS = {"k": Interval(144.0, 156.0)}
 EAST, NORTH, UP = np.eye(4)[[0, 1, 3]]
 MOTION = {"duration": 1.2, "step": 0.05, "alpha": [0.0]}
@@ -49,9 +48,7 @@ def records(rng, count, components):
 
 @pytest.mark.parametrize("components", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("all_angles", [False, True])
-def test_motions_under_records_of_components_stay_within_the_bounds(components, all_angles):
-    print(f"seed {SEED}")
-    rng = np.random.default_rng([SEED, components, all_angles])
+def test_motions_under_records_of_components_stay_within_the_bounds(components, all_angles, rng):
     model = plan(rng, vertical=components == 3)
     suite = records(rng, 2, components)
     found = over_records(model, INPUTS, suite, **MOTION, all_angles=all_angles)
@@ -88,8 +85,7 @@ def test_motions_under_records_of_components_stay_within_the_bounds(components, 
 
 
 @pytest.mark.parametrize("measure", ["RotD50(T1)", "RotD100(T1)", "PGA"])
-def test_both_components_have_one_factor(measure):
-    rng = np.random.default_rng(SEED)
+def test_both_components_have_one_factor(measure, rng):
     model = plan(rng)
     suite = records(rng, 2, 2)
     found = over_records(model, INPUTS, suite, **MOTION, scale=2.5, measure=measure)
