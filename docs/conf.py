@@ -98,11 +98,23 @@ def without_modules(
 def with_keys(
     _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
 ) -> None:
-    """Adds the keys of a section of a case as a table, from the model's own fields."""
+    """Adds the keys of a section of a case as a table, from the model's own fields.
+
+    A section that is made from the options of an analysis is documented by their class.
+    """
+    from alphacut.case.analyses import ANALYSES
+    from alphacut.case.generated import section_at
     from alphacut.case.parse import allowed_values
     from alphacut.case.types import Section
 
     fields: dict[str, FieldInfo] = {}
+    for key, analysis in ANALYSES.items():
+        if (
+            analysis.section
+            == f"{getattr(documented, '__module__', '')}:{getattr(documented, '__name__', '')}"
+        ):
+            documented = section_at(key, analysis.section)
+            lines[:] = lines[:1]
     if isinstance(documented, type) and issubclass(documented, Section):
         fields = documented.described_fields()
     rows = [

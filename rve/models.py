@@ -1,13 +1,16 @@
 """The models of a cell with one particle: what each can solve, and where it stands.
 
-A new model is its own file, with the members of `CellModel`, and one entry here.
+A new model is its own file, with the members of `CellModel`, and one entry here; of another
+distribution, an entry point in the group "alphacut.cells", whose place is that of a `ModelEntry`.
+`demos/templates/cell_model.py` is one to copy.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 
+from alphacut.base.entry_points import registered
 from alphacut.rve.result.cell_model import CellModel
 
 
@@ -17,33 +20,46 @@ class ModelEntry:
 
     Args:
         name: Word for it in cases, `modulus.method`.
-        module: Module below `alphacut.rve`.
-        kind: Name of the class.
+        place: Place "module:Class" of its class.
         particles: Kinds of particles that it solves.
         needs_isotropy: Whether both phases must be isotropic.
     """
 
     name: str
-    module: str
-    kind: str
+    place: str
     particles: frozenset[str]
     needs_isotropy: bool = False
 
     def load(self) -> type[CellModel]:
         """Return the class; MissingLibraryError where DOLFINx is needed and missing."""
-        found: type[CellModel] = getattr(import_module(f"alphacut.rve.{self.module}"), self.kind)
+        found: type[CellModel] = resolve_name(self.place)
         return found
 
 
+ROUND = frozenset({"cylinders", "ellipses"})
 MODELS = [
     # The order is that of preference: series are exact to rounding, slices are plane finite
     # elements at nodes of θ, and prisms are finite elements that have θ as a third axis.
-    ModelEntry("series", "series.model", "SeriesModel", frozenset({"cylinders"}), True),
-    ModelEntry("series", "spheres.model", "SpheresModel", frozenset({"spheres"}), True),
-    ModelEntry("slices", "slices.model", "SlicesModel", frozenset({"cylinders", "ellipses"})),
-    ModelEntry("prism", "prism.model", "PrismModel", frozenset({"cylinders", "ellipses"})),
+    ModelEntry("series", "alphacut.rve.series.model:SeriesModel", frozenset({"cylinders"}), True),
+    ModelEntry("series", "alphacut.rve.spheres.model:SpheresModel", frozenset({"spheres"}), True),
+    ModelEntry("slices", "alphacut.rve.slices.model:SlicesModel", ROUND),
+    ModelEntry("prism", "alphacut.rve.prism.model:PrismModel", ROUND),
 ]
 """All models; where a case says "auto", the first that fits is taken."""
+
+
+def known_names(asked: str = "") -> tuple[str, ...]:
+    """Return the names of all models, each once.
+
+    Args:
+        asked: A name. If no model has it, and another distribution registers one of this name, that
+            model is added to `MODELS`.
+    """
+    if asked and all(entry.name != asked for entry in MODELS):
+        place = registered("alphacut.cells").get(asked)
+        if place is not None:
+            MODELS.append(resolve_name(place))
+    return tuple(dict.fromkeys(entry.name for entry in MODELS))
 
 
 def fitting_models(particles: str, *, is_isotropic: bool) -> dict[str, ModelEntry]:

@@ -33,3 +33,27 @@ class Quantity:
     fuzzy: bool = False
     is_integer: bool = False
     cure: str = ""
+
+    def admits(self, low: float, high: float) -> bool:
+        """Return whether all values from `low` to `high` are finite and within the range.
+
+        `low` must not be above `high`, which is not checked.
+        """
+        is_finite = math.isfinite(low) and math.isfinite(high)
+        is_inside = self.above < low and high < self.below
+        return is_finite and is_inside and self.minimum <= low and high <= self.maximum
+
+    @property
+    def range(self) -> str:
+        """The range in words, such as "positive" or "0 to 1"; empty for any number."""
+        if (self.above, self.below, self.maximum) == (0, math.inf, math.inf):
+            return "positive"
+        if math.isfinite(self.minimum) and math.isfinite(self.maximum):
+            return f"{self.minimum:g} to {self.maximum:g}"
+        bounds = {
+            f"above {self.above:g}": self.above,
+            f"{self.minimum:g} or greater": self.minimum,
+            f"below {self.below:g}": self.below,
+            f"up to {self.maximum:g}": self.maximum,
+        }
+        return " and ".join(text for text, bound in bounds.items() if math.isfinite(bound))

@@ -78,8 +78,7 @@ ANALYSES: dict[str, Analysis] = {
                 "Supports of the inputs in the case, and at the scale that exceeds no limit",
             )
         },
-        "alphacut.case.limits:TolerancesSection",
-        "alphacut.stages.answers:tolerances_of",
+        "alphacut.frame.analyses.tolerances:ToleranceQuestion",
     ),
     "fragility": Analysis(
         "alphacut.frame:Fragility",

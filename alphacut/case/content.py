@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 from alphacut.base.errors import RefusedError, require, require_choice
@@ -104,8 +104,8 @@ class Content(CellContent):
     def structure_sections(self) -> dict[str, StructureSection]:
         """The sections of structures in the case, of which there may be one, by their names."""
         # The fields of structures are those of the class that `with_structures` derives from this.
-        sections = {name: getattr(self, name, None) for name in STRUCTURES}
-        return {name: section for name, section in sections.items() if section is not None}
+        sections = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: x for name, x in sections.items() if isinstance(x, StructureSection)}
 
     @property
     def structure_section(self) -> StructureSection | None:
@@ -395,4 +395,4 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
         RefusedError: The file cannot be read; or a change is no "KEY=VALUE", or its key is unknown
             or given twice.
     """
-    return parse(with_structures(Content, built=True), path, changes)
+    return parse(partial(with_structures, Content, built=True), path, changes)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, asdict, fields
-from functools import reduce
+from functools import cache, reduce
 from operator import or_
 from pkgutil import resolve_name
 from types import UnionType
@@ -18,12 +20,13 @@ from alphacut.base.errors import RefusedError
 from alphacut.case.limits import AnalysisSection, AnyLimit, QuestionSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Levels, Names, Quantity, Section
-from alphacut.frame.analyses.question import Question
+from alphacut.frame.analyses.question import Asked, Question
 
 KINDS: dict[str, Any] = {"fuzzy": Names, "outputs": Names, "alpha": Levels}
 """Types of keys that all sections read alike."""
 
 
+@cache
 def section_at(key: str, place: str) -> type[Section]:
     """Return the section of a case with a key.
 
@@ -61,6 +64,7 @@ def section_of(key: str, question: type[Question]) -> type[AnalysisSection]:
     made.key = key
     made.made_from = question  # type: ignore[attr-defined]
     made.reads_peaks = question.reads_peaks
+    made.needs_magnitudes = question.needs_magnitudes  # type: ignore[attr-defined]
     made.records = question.records
     return made
 
@@ -100,8 +104,20 @@ class GeneratedSection(AnalysisSection):
 
     def require_answerable(self, structure: Structure, components: int) -> None:
         """Refuse what the question refuses of the nominal structure."""
-        try:
+        with self._by_its_keys():
             self.question(structure).require(structure.model)
+
+    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
+        """Refuse what the question refuses of the inputs."""
+        asked = Asked(structure.model, structure.inputs(fuzzy), (0.0,))
+        with self._by_its_keys():
+            self.question(structure).require_computable(asked)
+
+    @contextmanager
+    def _by_its_keys(self) -> Iterator[None]:
+        """Replace the name of a field in a RefusedError raised in the block by its key."""
+        try:
+            yield
         except RefusedError as error:
             key = error.key if error.key.startswith(f"{self.key}.") else f"{self.key}.{error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None

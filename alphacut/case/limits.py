@@ -374,28 +374,6 @@ class ProbabilitySection(QuestionSection):
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
-class TolerancesSection(QuestionSection):
-    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
-
-    key = "tolerances"
-    needs_magnitudes = True
-    reads_peaks = True
-
-    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
-    """largest scale that is tried; 1 is that of the case"""
-
-    def require_computable(self, structure: Structure, fuzzy: Sequence[str]) -> None:
-        """Refuse a largest scale of the supports at which an input is inadmissible."""
-        # takes time to import
-        from alphacut.frame.analyses.tolerances import require_admissible_scale
-
-        try:
-            require_admissible_scale(structure.model, structure.inputs(fuzzy), self.most)
-        except RefusedError as error:
-            # The analysis speaks of its own argument; the user wrote a key of the case.
-            raise RefusedError("tolerances.most", error.value, error.allowed, error.cure) from None
-
-
 class FragilitySection(QuestionSection):
     """Fraction of the records under which limits are exceeded, over a measure of records."""
 

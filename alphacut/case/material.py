@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, cast
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, PlainValidator, Tag
 
-from alphacut.base.errors import RefusedError, require, require_choice
+from alphacut.base.errors import RefusedError, require
 from alphacut.case.types import (
     ALPHA,
     AtFirstUse,
@@ -34,7 +34,7 @@ from alphacut.rve.cell.cell import Phase, VoigtPhase
 from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.cell.outline import Ellipse, circle, reach
 from alphacut.rve.image.phases import RIGID
-from alphacut.rve.models import MODELS, fitting_models
+from alphacut.rve.models import fitting_models, known_names
 from alphacut.stochastic import FractionMap, HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.shapes import DISCS, SPHERES, Shape
 
@@ -521,8 +521,8 @@ class Mesh(Section):
 
 def known_method(name: str) -> str:
     """Return a word for a model of the cell, or refuse another one."""
-    names = dict.fromkeys(entry.name for entry in MODELS)
-    require_choice("", name, ["auto", *names])
+    is_known = name == "auto" or name in known_names(name)
+    require(is_known, "", name, ", ".join(["auto", *known_names()]))
     return name
 
 
@@ -530,7 +530,7 @@ class ModulusSection(Section):
     """Computation of the fuzzy modulus."""
 
     method: Annotated[str, after(known_method)] = "auto"
-    """model of the cell, prism, slices or series; auto is the series"""
+    """model of the cell; auto is the first that fits, which is the series"""
     plan: Literal["general", "reduced", "signed"] = "general"
     """samples of the transformation method"""
     alpha: Levels = Field(default=ALPHA, description="α-levels")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from pydantic_core import ErrorDetails
 
 from alphacut.base.csv_columns import text_of
 from alphacut.base.errors import RefusedError, cure_of, printable, require
-from alphacut.case.types import Quantity, Section
+from alphacut.case.types import FirstUse, Quantity, Section
 from alphacut.io.files import BadInput, nearest, suggestion
 
 C = TypeVar("C", bound=Section)
@@ -43,11 +43,14 @@ class ParsedCase(Generic[C]):
         return self.path.stem
 
 
-def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> ParsedCase[C]:
-    """Read a TOML case file as the content `model`, with changes of the command line.
+def parse(
+    model_of: Callable[[Collection[str]], type[C]], path: Path | str, changes: Sequence[str] = ()
+) -> ParsedCase[C]:
+    """Read a TOML case file as a content, with changes of the command line.
 
     Args:
-        model: Class of the content; its fields are the sections and keys that are allowed.
+        model_of: Function of the names of its sections and keys that returns the class of the
+            content, whose fields are the sections and keys that are allowed.
         path: The file. Files that the case names are looked for in its folder.
         changes: Texts "KEY=VALUE" that replace keys of the file.
 
@@ -63,6 +66,7 @@ def parse(model: type[C], path: Path | str, changes: Sequence[str] = ()) -> Pars
     path = Path(path)
     text = text_of(path)
     table = _parse_toml(path, text)
+    model = model_of(table)
     changed = apply_changes(model, table, changes)
     try:
         content = model.model_validate(table, context={"folder": path.parent})
@@ -289,15 +293,19 @@ def apply_changes(
     if not changes:
         return ()
     # Studies are entries of an array, which a key without an index does not tell apart.
-    full_keys = [key for key in _names_of(model) if not key.startswith("study.")]
-    tables = tuple(f"{x}." for x, info, _ in _walk_keys("", model) if _has_free_names(info))
+    # Only sections that are named are made ready, which takes time.
+    sections = {re.split("[.=]", change)[0].strip() for change in changes}
+    walked = list(_walk_keys("", model, sections=sections))
+    known = {key for key, _, is_section in walked if not is_section and key[:6] != "study."}
+    tables = tuple(f"{key}." for key, info, _ in walked if _has_free_names(info))
     keys: list[str] = []
     for change in changes:
         key, equals, value = [part.strip() for part in change.partition("=")]
         allowed = "KEY=VALUE with a full key, as cell.matrix_modulus='20 GPa'"
         # For a key without its section the first section that has it is suggested; for any other
         # unknown key the known one that is spelt most alike.
-        if key not in full_keys and not key.startswith(tables):
+        if key not in known and not key.startswith(tables):
+            full_keys = [name for name in _names_of(model) if not name.startswith("study.")]
             close = [full for full in full_keys if full.endswith(f".{key}")]
             cure = suggestion(key, full_keys) or "docs/case-format.md has all keys"
             if close:
@@ -358,7 +366,11 @@ def _names_of(model: type[Section]) -> list[str]:
 
 
 def _walk_keys(
-    prefix: str, model: type[Section], *, described: bool = False
+    prefix: str,
+    model: type[Section],
+    *,
+    described: bool = False,
+    sections: Collection[str] | None = None,
 ) -> Iterator[tuple[str, FieldInfo, bool]]:
     """Yield the keys below a class of sections, each before the keys inside it.
 
@@ -366,15 +378,19 @@ def _walk_keys(
         prefix: Beginning of the full names, empty or with its dot, such as "cell.".
         model: The class. A key may take sections of several classes: their keys all follow.
         described: Whether the fields get their descriptions, for which sources are read.
+        sections: Keys of the class that are walked; all if left out.
 
     Yields:
         Full name such as "cell.fraction", Pydantic's field, and whether the key takes a section.
     """
     fields = model.described_fields() if described else model.model_fields
     for key, info in fields.items():
+        if sections is not None and key not in sections:
+            continue
         name = f"{prefix}{key}"
         # the annotation itself and all types inside it, as in tuple[ForceSection, ...]
-        parts = itertools.chain([info.annotation], _annotation_parts(info.annotation))
+        parts = [info.annotation, *info.metadata, *_annotation_parts(info.annotation)]
+        parts = [x.load() if isinstance(x, FirstUse) and x.load else x for x in parts]
         models = [part for part in parts if isinstance(part, type) and issubclass(part, Section)]
         yield name, info, bool(models)
         for inner in models:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, cast
 
@@ -25,24 +25,30 @@ from alphacut.frame import (
 )
 from alphacut.frame.structures.linear import LinearSystem, has_matrices
 from alphacut.frame.structures.model import StructureModel
+from alphacut.frame.structures.quantities import OF_STOREY_FRAME
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io.files import suggestion
 
-# The ranges are those in which structures vibrate: masses and stiffnesses are positive, so that
-# M and K are positive definite, and dampers are not negative, so that nothing feeds energy.
-Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
-Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
-Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
-Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
-Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
-YieldForce = Annotated[FuzzyNumber, Quantity("N", above=0, fuzzy=True)]
-Hardening = Annotated[FuzzyNumber, Quantity(minimum=0, maximum=1, fuzzy=True)]
-Damping = Annotated[FuzzyNumber, Quantity("N*s/m", minimum=0, fuzzy=True)]
-Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
-Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
-Rate = Annotated[FuzzyNumber, Quantity("1/s", minimum=0, fuzzy=True)]
-Delay = Annotated[FuzzyNumber, Quantity("s", minimum=0, fuzzy=True)]
+
+def _of_frame(symbol: str) -> Quantity:
+    """Return the type of a key that holds a parameter of a storey frame, which may be fuzzy."""
+    return Quantity(**(asdict(OF_STOREY_FRAME[symbol]) | {"fuzzy": True}))
+
+
+Mass = Annotated[FuzzyNumber, _of_frame("m")]
+Span = Annotated[FuzzyNumber, _of_frame("l")]
+Moment = Annotated[FuzzyNumber, _of_frame("I")]
+Count = Annotated[FuzzyNumber, _of_frame("c")]
+Stiffness = Annotated[FuzzyNumber, _of_frame("k")]
+YieldForce = Annotated[FuzzyNumber, _of_frame("fy")]
+YieldDrift = Annotated[FuzzyNumber, _of_frame("dy")]
+Hardening = Annotated[FuzzyNumber, _of_frame("hardening")]
+Damping = Annotated[FuzzyNumber, _of_frame("d")]
+Displacement = Annotated[FuzzyNumber, _of_frame("q")]
+Velocity = Annotated[FuzzyNumber, _of_frame("v")]
+Rate = Annotated[FuzzyNumber, _of_frame("rayleigh_mass")]
+Delay = Annotated[FuzzyNumber, _of_frame("rayleigh_stiffness")]
 Acceleration = Annotated[FuzzyNumber, Quantity("m/s^2", above=0, fuzzy=True)]
 Turning = Annotated[FuzzyNumber, Quantity("N*m*s", minimum=0, fuzzy=True)]
 Angle = Annotated[FuzzyNumber, Quantity("rad", fuzzy=True)]
@@ -98,7 +104,7 @@ def _parse_damping_ratios(value: object) -> MaterialDamping | tuple[FuzzyNumber,
 
 def _ratio(value: object) -> FuzzyNumber:
     """Return a fuzzy damping ratio; refuse one from 1 on, at which nothing oscillates."""
-    return cast("FuzzyNumber", Quantity(minimum=0, below=1, fuzzy=True).parse(value))
+    return cast("FuzzyNumber", _of_frame("zeta").parse(value))
 
 
 DampingRatios = Annotated[
@@ -320,7 +326,7 @@ class Frame(StructureSection):
     """stiffness of each storey, in place of columns and modulus"""
     yield_force: OneOrMany[YieldForce] | None = None
     """force of each storey at which its columns yield"""
-    yield_drift: OneOrMany[Span] | None = None
+    yield_drift: OneOrMany[YieldDrift] | None = None
     """drift at which they yield, in place of yield_force"""
     hardening: OneOrMany[Hardening] | None = None
     """stiffness of each storey after yielding over the initial one, 0 unless given"""

@@ -1,17 +1,19 @@
 """The kinds of structures of a case, by the names of their sections.
 
 A new kind is a file with its section, a `StructureSection` that gives a `StructureModel`, and one
-entry here.
+entry here; of another distribution, an entry point in the group "alphacut.structures".
+`demos/templates/structure.py` is one to copy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Collection, Mapping
+from functools import cache, partial
 from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import create_model
 
+from alphacut.base.entry_points import registered
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
 from alphacut.case.generated import section_at
@@ -26,21 +28,29 @@ STRUCTURES = {
 """Module and class of each section. The cell's commands know the names, and import none."""
 
 
-def with_structures(content: type[C], *, built: bool) -> type[C]:
+def with_structures(content: type[C], names: Collection[str] = (), *, built: bool) -> type[C]:
     """Return a class of cases that also has a field for each kind of structure and each analysis.
 
     Args:
         content: The class without them.
-        built: Whether the sections are validated and built, for which the modules of the structures
-            are imported; otherwise they are kept as the tables that stand in the file.
+        names: Names of the sections of the case. Structures of other distributions are looked for
+            where one of them is none of the project's own.
+        built: Whether the sections are validated and built, for which their modules are imported
+            once a case has the section; otherwise they are kept as the tables that stand in the
+            file.
 
     Returns:
         The class. The fields of structures stand after the fields that `content` inherits, and
         before its own; those of analyses stand behind. Errors are reported in this order.
     """
     analyses = {key: analysis.section for key, analysis in ANALYSES.items() if analysis.section}
-    structures = tuple(STRUCTURES.items())
-    return cast("type[C]", _whole_case(content, structures, tuple(analyses.items()), built=built))
+    structures = dict(STRUCTURES)
+    unknown = set(names) - set(content.model_fields) - set(analyses) - set(structures)
+    if unknown:
+        others = registered("alphacut.structures")
+        structures |= {name: others[name] for name in unknown & set(others)}
+    places = tuple(structures.items()), tuple(analyses.items())
+    return cast("type[C]", _whole_case(content, *places, built=built))
 
 
 @cache  # Pydantic takes 50 ms for the class, and tests read many cases
@@ -64,16 +74,15 @@ def _whole_case(
         built: Whether the fields take sections of these classes, or any value. Each may be left
             out, and is None then.
 
-    Raises:
-        ImportError: A class is to be built and its module cannot be imported.
     """
 
     def fields_of(places: Mapping[str, str]) -> dict[str, Any]:
         """Return the types of the fields of sections, with their defaults, by name."""
-        if not built:
-            return dict.fromkeys(places, (object, None))
-        sections = {name: section_at(name, place) for name, place in places.items()}
-        return {name: (Annotated[x, FirstUse()] | None, None) for name, x in sections.items()}
+        kinds: dict[str, Any] = dict.fromkeys(places, object)
+        if built:
+            for name, place in places.items():
+                kinds[name] = Annotated[object, FirstUse(partial(section_at, name, place))] | None
+        return {name: (kind, None) for name, kind in kinds.items()}
 
     # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest, and
     # at last those of analyses.

@@ -7,8 +7,9 @@ import inspect
 import itertools
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
@@ -154,15 +155,11 @@ class Quantity(base.Quantity):
             ends.extend(number.support)
         else:
             ends.append(number)
-        is_inside = all(self._contains(end) for end in ends)
+        is_inside = self.admits(min(ends), max(ends))
         require(
             is_inside, "", value, self.allowed, self.cure or self._cure_of_percentage(value, ends)
         )
         return number
-
-    def _contains(self, value: float) -> bool:
-        """Return whether a value in SI lies in the range."""
-        return self.above < value < self.below and self.minimum <= value <= self.maximum
 
     def _cure_of_percentage(self, value: object, ends: Sequence[float]) -> str:
         """Return what to write for a ratio that is too large, but would fit as a percentage.
@@ -179,7 +176,7 @@ class Quantity(base.Quantity):
         if self.si or self.is_integer or "%" in str(value):
             return ""
         # 5 for 5 % is the usual slip: it is named where the hundredth part would be allowed.
-        is_meant = all(end > 0 and self._contains(end / 100) for end in ends)
+        is_meant = min(ends) > 0 and self.admits(min(ends) / 100, max(ends) / 100)
         if not is_meant:
             return ""
         if is_number(value):
@@ -212,19 +209,29 @@ class Quantity(base.Quantity):
         return core_schema.no_info_plain_validator_function(self.parse)
 
 
+@dataclass(frozen=True)
 class FirstUse:
     """Metadata of the class of a section, which is made ready once a case has the section.
 
     Without it Pydantic makes the validators of all sections before it reads a case, in .05 s.
+
+    Args:
+        load: Function that imports the class, and returns it; None where it is the annotated one.
     """
+
+    load: Callable[[], type[Section]] | None = None
 
     def __get_pydantic_core_schema__(
         self, source: type[Section], _: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Return the schema by which Pydantic calls the class, and takes its errors as its own."""
-        return core_schema.with_info_plain_validator_function(
-            lambda value, info: source.model_validate(value, context=info.context)
-        )
+
+        def read(value: object, info: ValidationInfo) -> Section:
+            """Return the section that a table of the case states."""
+            section = source if self.load is None else self.load()
+            return section.model_validate(value, context=info.context)
+
+        return core_schema.with_info_plain_validator_function(read)
 
 
 text = PlainValidator

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import NamedTuple, TextIO, cast
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
             case.
     """
     # The section of the structure is not built: a cell is solved whatever its frame is like.
-    kind = with_structures(CellCase, built=False)
+    kind = partial(with_structures, CellCase, built=False)
     content = parse(kind, options.case, options.set).content
     require_petsc(options.petsc, content)
     problem = CellProblem.of(content, options.petsc)

@@ -18,7 +18,7 @@ def add_cell(parser: argparse.ArgumentParser) -> None:
         dest="set",
         action="append",
         type="modulus.method={}".format,  # --method is a short form of --set: it is checked there
-        help="prism, slices, series or auto; short for --set",
+        help="model of the cell, or auto; short for --set",
     )
     parser.add_argument(
         "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf"

@@ -17,7 +17,6 @@ from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
     ProbabilitySection,
-    TolerancesSection,
 )
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
@@ -27,11 +26,9 @@ from alphacut.frame import (
     Fragility,
     Probability,
     SuitePeaks,
-    Tolerances,
     decide,
     floor_spectrum,
     probability,
-    tolerances,
 )
 from alphacut.frame.analyses.answer import Answer
 from alphacut.frame.analyses.fragility import fragility_of, with_nominal
@@ -134,34 +131,6 @@ def probability_of(section: ProbabilitySection, response: Response, tick: Progre
         **response.times,
         alpha=response.task.section.alpha,
         samples=section.samples,
-        progress=tick,
-    )
-
-
-def tolerances_of(section: TolerancesSection, response: Response, tick: Progress) -> Tolerances:
-    """Return the answer to [tolerances]: the largest scale of the supports that keeps the limits.
-
-    Args:
-        section: Its limits, and the largest scale that is tried; scale 1 is the supports of the
-            case.
-        response: The structure, its inputs, and the peaks that are known at scale 1.
-        tick: Called with the completed fraction of the work.
-
-    Raises:
-        RefusedError: A limit does not fit the structure, or an input is inadmissible at a scale.
-        FailedError: A response could not be computed, or no bounds are found.
-    """
-    # The known peaks hold for the lowest α-cut, which is the support only at α = 0.
-    known_peaks = None
-    if response.task.section.alpha[0] == 0:
-        known_peaks = response.peaks
-    return tolerances(
-        response.structure.model,
-        response.inputs,
-        section.limits_of(response.structure),
-        **response.times,
-        most=section.most,
-        at_one=known_peaks,
         progress=tick,
     )
 

@@ -44,15 +44,20 @@ class Question(ABC):
     read as in [decision]. An analysis without a response has the fields `fuzzy`, the names of its
     fuzzy inputs, and `alpha`, the levels. An entry of `alphacut.case.analyses` makes it known.
 
-    `reads_peaks`: the answer follows from the peaks of the outputs in `limits`. `records`: whether
-    a suite of records is refused beside it, or allowed.
+    `reads_peaks`: the answer follows from the peaks of the outputs in `limits`.
+    `needs_magnitudes`: each output has one limit, of its magnitude. `records`: whether a suite of
+    records is refused beside it, or allowed.
     """
 
     reads_peaks: ClassVar[bool] = False
+    needs_magnitudes: ClassVar[bool] = False
     records: ClassVar[Literal["refused", "allowed", "needed"]] = "refused"
 
     def require(self, model: StructureModel) -> None:  # noqa: B027 - most refuse nothing
         """Refuse what the structure cannot answer, by the names of the fields."""
+
+    def require_computable(self, asked: Asked) -> None:  # noqa: B027 - most refuse nothing
+        """Refuse what cannot be computed, by the names of the fields; peaks are not known yet."""
 
     @abstractmethod
     def answer(self, asked: Asked, progress: Progress) -> Answer:

@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from alphacut.base.errors import RefusedError, checked_number
 from alphacut.base.number_text import MINUS, Table, engineering, rounded_ends
 from alphacut.base.progress_bar import Progress
+from alphacut.base.quantity import Quantity
 from alphacut.frame.analyses.answer import Answer, Record, table_of
 from alphacut.frame.analyses.limits import Limit, limits_by_name
 from alphacut.frame.analyses.peaks import PEAK_ERROR, Peak, Peaks, peaks
+from alphacut.frame.analyses.question import Asked, Question
 from alphacut.frame.boxes import boxes
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope, require_admissible
@@ -26,6 +29,39 @@ from alphacut.frame.structures.model import StructureModel
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.fuzzy.sets.numbers import enclosed_set
+
+
+@dataclass(frozen=True)
+class ToleranceQuestion(Question):
+    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded.
+
+    Args:
+        limits: Limits of magnitudes, one for each output, in SI units.
+        most: largest scale that is tried; 1 is that of the case
+    """
+
+    reads_peaks = True
+    needs_magnitudes = True
+    limits: tuple[Limit, ...]
+    most: Annotated[float, Quantity(above=0, maximum=100)] = 2.0
+
+    def require_computable(self, asked: Asked) -> None:
+        """Refuse a largest scale of the supports at which an input is inadmissible."""
+        require_admissible_scale(asked.model, asked.inputs, self.most)
+
+    def answer(self, asked: Asked, progress: Progress) -> Tolerances:
+        """Return the scales up to which no limit is exceeded, from the peaks known at scale 1."""
+        return tolerances(
+            asked.model,
+            asked.inputs,
+            self.limits,
+            duration=asked.duration,
+            step=asked.step,
+            most=self.most,
+            # The known peaks hold for the lowest α-cut, which is the support only at α = 0.
+            at_one=asked.peaks if asked.alpha[0] == 0 else None,
+            progress=progress,
+        )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ Behind the samples there may be text, such as ``*** End Data ***``.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import ClassVar, NamedTuple
@@ -380,12 +381,32 @@ def _smc_peaks(reals: Array) -> list[StatedPeak]:
     return [StatedPeak(0.01 * magnitude, time=time)]
 
 
-# How a line of a file of each format begins, in how many first lines, and its reader. The formats
-# are tried in this order. PEER's is the last, since its words are the most common ones; its heads
-# are long only with NPTS or DT in them, or with the name of the database.
+class RecordFormat(NamedTuple):
+    """A format of records with one channel a file.
+
+    Attributes:
+        name: Its name, for messages.
+        mark: How a line of such a file begins.
+        max_lines: In how many of its first lines the mark is looked for.
+        read: Function of the file, and of the unit that the user states or "", to the recording.
+    """
+
+    name: str
+    mark: re.Pattern[str]
+    max_lines: int
+    read: Callable[[TextFile, str], Recording]
+
+    def has_marked(self, file: TextFile) -> bool:
+        """Return whether a file is of this format by its mark."""
+        return any(self.mark.match(line) for line in file.lines[: self.max_lines])
+
+
+# The formats are tried in this order. PEER's is the last, since its words are the most common ones;
+# its heads are long only with NPTS or DT in them, or with the name of the database.
 FORMATS = (
-    (re.compile("Origin Time"), 1, read_knet),
-    (
+    RecordFormat("K-NET", re.compile("Origin Time"), 1, read_knet),
+    RecordFormat(
+        "SMC",
         re.compile(
             r"\s*[1-6]\s+(?:(?:(?:UN)?CORRECTED ACCELEROGRAM|VELOCITY|DISPLACEMENT)\s*$"
             r"|(?:RESPONSE|FOURIER)\b.*\bSPECTR)"
@@ -393,8 +414,9 @@ FORMATS = (
         1,
         read_smc,
     ),
-    (re.compile("SAMPLING_INTERVAL_S"), 80, read_esm),
-    (
+    RecordFormat("ESM", re.compile("SAMPLING_INTERVAL_S"), 80, read_esm),
+    RecordFormat(
+        "PEER AT2",
         re.compile(
             r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
             re.IGNORECASE,
@@ -403,3 +425,5 @@ FORMATS = (
         read_peer,
     ),
 )
+"""Formats with one channel a file; a further one is a line here, or an entry point in the group
+"alphacut.records". `demos/templates/record_format.py` is one to copy."""

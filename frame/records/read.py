@@ -6,15 +6,17 @@ import re
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
 
+from alphacut.base.entry_points import registered
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.extras import extra_named
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.geonet import is_geonet, read_geonet
-from alphacut.frame.records.networks import FORMATS
+from alphacut.frame.records.networks import FORMATS, RecordFormat
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak
 from alphacut.frame.records.tables import is_table, read_table
@@ -94,10 +96,11 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         return read_geonet(file, channel)
     if is_cosmos(file):
         return read_cosmos(file, channel, unit)
-    for mark, n_lines, read in FORMATS:
-        if any(mark.match(line) for line in file.lines[:n_lines]):
-            return read(file, unit)
-    allowed = "PEER AT2, COSMOS, CSMIP, GeoNet V2A, SMC, K-NET, ESM, miniSEED, SAC, UFF 58, CSV"
+    for known in FORMATS:
+        if known.has_marked(file):
+            return known.read(file, unit)
+    others = "COSMOS, CSMIP, GeoNet V2A, miniSEED, SAC, UFF 58, CSV"
+    allowed = ", ".join([*(known.name for known in FORMATS), others])
     is_described = bool(channel or (step and unit))
     if is_table(file, is_described=is_described):
         is_named = path.suffix.lower() in (".at2", ".v1", ".v2", ".v2a", ".smc")
@@ -109,6 +112,10 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         lost_head = is_named and begins_with_number and not (unit or channel)
         require(not lost_head, path.name, value, allowed, cure)
         return read_table(file, step, unit, channel)
+    for place in registered("alphacut.records").values():
+        further: RecordFormat = resolve_name(place)
+        if further.has_marked(file):
+            return further.read(file, unit)
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"
         raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)

@@ -252,13 +252,13 @@ class MatrixStructure(LinearSystem):
                 value = self.parameters.get(ratio, np.nan)
             else:
                 value = ratio
-            is_within = is_number(value) and Parameter("", range=RATIO).admits(value, value)
+            is_within = is_number(value) and RATIO.admits(value, value)
             is_allowed = is_allowed and is_within
         n_modes = len(self.massive)
         allowed = f"one for all modes, or {n_modes}, one for each"
         is_count = len(self.ratios) in (0, 1, n_modes)
         require(is_count, "ratios", f"{len(self.ratios)} damping ratios", allowed)
-        allowed = f"one number or parameter, or one a mode, {RATIO}"
+        allowed = f"one number or parameter, or one a mode, {RATIO.range}"
         require(is_allowed, "ratios", value=self.ratios, allowed=allowed)
 
     @property
@@ -367,7 +367,7 @@ class MatrixStructure(LinearSystem):
     def parameter(self, name: str) -> Parameter:
         """Return a parameter, whose range is known where it is a damping ratio."""
         if name in self.ratios:
-            return Parameter(name, range=RATIO)
+            return Parameter(name, RATIO)
         return Parameter(name)
 
     def with_outputs(self, names: Sequence[str]) -> Self:

@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-
 from alphacut.base.errors import require
+from alphacut.base.quantity import Quantity
 
 # SI unit and words of each kind of output, by its name without the number of the floor.
 OUTPUTS = {
@@ -27,11 +26,9 @@ OUTPUTS = {
 }
 # A name that texts of limits and peaks ("max roof"), files and tables can have.
 NAME = re.compile(r"[^\W\d]\w{0,63}")
-# Ranges of parameters, as messages say them.
-POSITIVE = "positive"
-NOT_NEGATIVE = "0 or greater"
-UP_TO_ONE = "0 to 1"
-RATIO = "0 or greater and below 1, the critical damping"
+ANY_NUMBER = Quantity()
+RATIO = Quantity(minimum=0, below=1)
+"""A damping ratio, of which 1 is the critical damping."""
 
 
 class Output(str):
@@ -111,53 +108,54 @@ class Parameter:
 
     Args:
         name: As ``m2``.
-        unit: SI unit; empty where it has none, or none is known.
-        range: `POSITIVE`, `NOT_NEGATIVE`, `UP_TO_ONE`, `RATIO`, or empty for any number.
+        quantity: Its unit and range, as far as they are known.
     """
 
     name: str
-    unit: str = ""
-    range: str = ""
+    quantity: Quantity = ANY_NUMBER
+
+    @property
+    def unit(self) -> str:
+        """SI unit; empty where it has none, or none is known."""
+        return self.quantity.si
+
+    @property
+    def range(self) -> str:
+        """The range in words; empty for any number."""
+        return self.quantity.range
 
     def admits(self, low: float, high: float) -> bool:
-        """Return whether all values from `low` to `high` are finite and within the range.
-
-        The range `self.range` is one of the texts "positive", "0 or greater", "0 to 1" (both ends
-        allowed) and "0 or greater and below 1, the critical damping", which say what is allowed.
-        Any other text, as the empty one, allows all finite values. `low` must not be above `high`,
-        which is not checked.
-        """
-        is_within = {
-            POSITIVE: low > 0,
-            NOT_NEGATIVE: low >= 0,
-            RATIO: low >= 0 and high < 1,
-            UP_TO_ONE: low >= 0 and high <= 1,
-        }
-        return bool(np.isfinite([low, high]).all() and is_within.get(self.range, True))
+        """Return whether all values from `low` to `high` are finite and within the range."""
+        return self.quantity.admits(low, high)
 
 
-# SI units and ranges of a storey frame's parameters, by names without the number of the floor.
 OF_STOREY_FRAME = {
-    "E": ("Pa", POSITIVE),
-    "I": ("m^4", POSITIVE),
-    "m": ("kg", POSITIVE),
-    "l": ("m", POSITIVE),
-    "k": ("N/m", POSITIVE),
-    "c": ("", POSITIVE),
-    "d": ("N*s/m", NOT_NEGATIVE),
-    "rayleigh_mass": ("1/s", NOT_NEGATIVE),
-    "rayleigh_stiffness": ("s", NOT_NEGATIVE),
-    "zeta": ("", RATIO),
-    "fy": ("N", POSITIVE),
-    "dy": ("m", POSITIVE),
-    "hardening": ("", UP_TO_ONE),
-    "q": ("m", ""),
-    "v": ("m/s", ""),
-    "F": ("N", ""),
-    "J": ("N*s", ""),
+    "E": Quantity("Pa", above=0),
+    "I": Quantity("m^4", above=0),
+    "m": Quantity("kg", above=0),
+    "l": Quantity("m", above=0),
+    "k": Quantity("N/m", above=0),
+    "c": Quantity(above=0),
+    "d": Quantity("N*s/m", minimum=0),
+    "rayleigh_mass": Quantity("1/s", minimum=0),
+    "rayleigh_stiffness": Quantity("s", minimum=0),
+    "zeta": RATIO,
+    "fy": Quantity("N", above=0),
+    "dy": Quantity("m", above=0),
+    "hardening": Quantity(minimum=0, maximum=1),
+    "q": Quantity("m"),
+    "v": Quantity("m/s"),
+    "F": Quantity("N"),
+    "J": Quantity("N*s"),
 }
+"""A storey frame's parameters, by names without the number of the floor.
+
+The ranges are those in which structures vibrate: masses and stiffnesses are positive, so that M and
+K are positive definite, and dampers are not negative, so that nothing feeds energy.
+"""
 
 
 def of_storey_frame(name: str) -> Parameter:
     """Return a parameter of a storey frame; without unit and range if the frame has no such."""
-    return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_\d+)?$", "", name), ()))
+    kind = re.sub(r"\d+(_\d+)?$", "", name)
+    return Parameter(name, OF_STOREY_FRAME.get(kind, ANY_NUMBER))

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple, Self, TypeGuard
+from typing import Annotated, Literal, NamedTuple, Self, TypeGuard
 
 import numpy as np
 
@@ -25,12 +25,13 @@ from alphacut.base.errors import (
     require_sequence,
 )
 from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.quantity import Quantity
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.structures.linear import Assembly, LinearSystem, Number, stack
 from alphacut.frame.structures.loads import Force, require_loads
 from alphacut.frame.structures.model import Dynamics, PlacedForce, StructureModel
-from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
+from alphacut.frame.structures.quantities import OF_STOREY_FRAME, Output, Parameter, of_storey_frame
 
 # Names of the parameters of each list field, with {} for the number of the floor or storey.
 SYMBOLS = {
@@ -121,25 +122,25 @@ class StoreyFrame(LinearSystem):
         (2, ('q1', 'q2'))
     """
 
-    masses: Sequence[float]
-    lengths: Sequence[float] = ()
-    modulus: float | None = None
-    second_moment: float | Sequence[float] | None = None
-    dampers: Sequence[float] = ()
+    masses: Annotated[Sequence[float], OF_STOREY_FRAME["m"]]
+    lengths: Annotated[Sequence[float], OF_STOREY_FRAME["l"]] = ()
+    modulus: Annotated[float | None, OF_STOREY_FRAME["E"]] = None
+    second_moment: Annotated[float | Sequence[float] | None, OF_STOREY_FRAME["I"]] = None
+    dampers: Annotated[Sequence[float], OF_STOREY_FRAME["d"]] = ()
     damper_placement: Literal["ground", "storey"] = "ground"
-    q0: Sequence[float] = ()
-    v0: Sequence[float] = ()
+    q0: Annotated[Sequence[float], OF_STOREY_FRAME["q"]] = ()
+    v0: Annotated[Sequence[float], OF_STOREY_FRAME["v"]] = ()
     outputs: tuple[str, ...] = ()
     rayleigh: tuple[float, float] = (0.0, 0.0)
     ground: Accelerogram | None = None
-    damping_ratio: float | Sequence[float] | None = None
-    columns: Sequence[float] = ()
-    stiffness: Sequence[float] = ()
-    gravity: float = 0.0
+    damping_ratio: Annotated[float | Sequence[float] | None, OF_STOREY_FRAME["zeta"]] = None
+    columns: Annotated[Sequence[float], OF_STOREY_FRAME["c"]] = ()
+    stiffness: Annotated[Sequence[float], OF_STOREY_FRAME["k"]] = ()
+    gravity: Annotated[float, Quantity("m/s^2", minimum=0)] = 0.0
     loads: Sequence[Force] = ()
-    yield_force: Sequence[float] = ()
-    yield_drift: Sequence[float] = ()
-    hardening: Sequence[float] = ()
+    yield_force: Annotated[Sequence[float], OF_STOREY_FRAME["fy"]] = ()
+    yield_drift: Annotated[Sequence[float], OF_STOREY_FRAME["dy"]] = ()
+    hardening: Annotated[Sequence[float], OF_STOREY_FRAME["hardening"]] = ()
     rayleigh_of: Literal["initial", "tangent"] = "initial"
 
     def __post_init__(self) -> None:
