@@ -335,16 +335,15 @@ Files = Annotated[tuple[tuple[Recording, ...], ...], text(_read_suite)]
 
 
 def _require_one_ground(first: Recording, other: Recording) -> None:
-    """Refuse two components of one record with other times, or with the same samples.
+    """Refuse two components of one record with other steps, or with the same samples.
 
     Raises:
-        RefusedError: Their steps or their numbers of samples differ, or all samples agree.
+        RefusedError: Their steps differ, or all samples agree.
     """
     ends = [f"{x.name} of {len(x.samples)} samples every {x.step:g} s" for x in (first, other)]
-    has_same_times = len(first.samples) == len(other.samples) and first.step == other.step
-    allowed = "components of one length and step"
-    cure = "cut the longer file, or bring both to one step"
-    require(has_same_times, "records.files", " and ".join(ends), allowed, cure)
+    allowed = "components of one step"
+    cure = "bring both to one step"
+    require(first.step == other.step, "records.files", " and ".join(ends), allowed, cure)
     is_other = not np.array_equal(first.samples, other.samples)
     require(is_other, "records.files", f"{first.name} twice", "a file for each component")
 

@@ -84,11 +84,14 @@ def _array(file: str, info: ValidationInfo) -> Array:
     array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
     if unknowns:
         names = unknowns
+        held: tuple[str, ...] = ()
         with suppress(RefusedError):  # of files that name no unknowns
             names = read_unknowns(path, name=member)
+            held = read_unknowns(path, name=member, held=True)
         context = {} if info.context is None else info.context
         of_files = context.setdefault("names_of_files", {}).setdefault(info.field_name, {})
         of_files.update(dict.fromkeys(names))
+        context["names_of_files"].setdefault("held", {}).update(dict.fromkeys(held))
         _require_shape(path.name, array, rows)
         require_symmetric(path.name, array, unknowns)
     largest = float(np.abs(array).max())
@@ -125,7 +128,11 @@ def _terms_of_exports(value: object, info: ValidationInfo) -> object:
             if name != "file"
         }
         exports.append((parameters, _array(export["file"], info)))
-    terms = affine_terms(exports, unknowns=info.data.get("unknowns", ()))
+    terms = affine_terms(
+        exports,
+        unknowns=info.data.get("unknowns", ()),
+        is_affine=info.data.get("affine", False),
+    )
     return [(Monomial.parse(str(factor)), array) for factor, array in terms]
 
 
@@ -288,6 +295,9 @@ class MatricesSection(StructureSection):
     """names of the unknowns in the order of the matrices, as NODE.DIRECTION; or a matrix file that
     names them"""
     parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
+    affine: bool = False
+    """whether matrices of exports are known to be affine in their parameters: then two exports for
+    one parameter are enough, and none tells whether it is so"""
     mass: Annotated[Terms, NotEmpty] = Field(description="pairs [factor, file] of M, or exports")
     stiffness: Annotated[Terms, NotEmpty]
     """pairs [factor, file] of K; or tables { file = FILE, NAME = VALUE } of exports for several
@@ -304,8 +314,8 @@ class MatricesSection(StructureSection):
     """file of the ground's acceleration; motion is relative to it"""
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
-    # Names of unknowns in the files of "mass", "stiffness" and "damping". A file without names
-    # counts as one that names all unknowns of the case.
+    # Names of unknowns in the files of "mass", "stiffness" and "damping", and of those that a file
+    # itself holds ("held"). A file without names counts as one that names all unknowns of the case.
     _names_of_files: Mapping[str, Collection[str]] = {}
 
     @model_validator(mode="after")
@@ -403,7 +413,8 @@ class MatricesSection(StructureSection):
     def file_warnings(self) -> Iterator[str]:
         """Yield sentences on unknowns that the case, or only one of M and K, does not name."""
         names = dict.fromkeys(chain.from_iterable(self._names_of_files.values()))
-        if unnamed := [name for name in names if name not in self.unknowns]:
+        held = self._names_of_files.get("held", ())
+        if unnamed := [x for x in names if x not in self.unknowns and x not in held]:
             shown = ", ".join(unnamed[:6])
             yield f"{len(unnamed)} unknowns of the files are not named, and so are held: {shown}"
         for key, other in (("mass", "stiffness"), ("stiffness", "mass")):

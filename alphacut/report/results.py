@@ -41,7 +41,7 @@ from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
 from alphacut.stages.summary import FrameResult, Parts
 
 Row = tuple[str, ...]
-MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
+MEANING = "Least … largest value if each input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from alphacut.base.number_text import engineering
 from alphacut.case.limits import FragilitySection
 from alphacut.case.loads import RecordsSection
@@ -98,7 +100,9 @@ def scaled_suite(section: RecordsSection, structure: Structure) -> ScaledSuite |
 def _corrected(section: RecordsSection) -> list[tuple[Accelerogram, ...]]:
     """Return the components of the records after their baseline correction.
 
-    The third component of a record is the vertical one.
+    The third component of a record is the vertical one. Instruments may stop their channels at
+    different times: components that are shorter than the longest one end in zeros, which is the
+    last of their remarks.
     """
     suite = []
     for components in section.suite:
@@ -106,8 +110,19 @@ def _corrected(section: RecordsSection) -> list[tuple[Accelerogram, ...]]:
         for k, recording in enumerate(components):
             ground = recording.accelerogram(section.baseline, is_vertical=k == VERTICAL)
             corrected.append(ground)
-        suite.append(tuple(corrected))
+        longest = max(len(ground.samples) for ground in corrected)
+        suite.append(tuple(_ended_in_zeros(ground, longest) for ground in corrected))
     return suite
+
+
+def _ended_in_zeros(ground: Accelerogram, count: int) -> Accelerogram:
+    """Return an accelerogram with as many samples, of which those behind its own are zero."""
+    missing = count - len(ground.samples)
+    if missing == 0:
+        return ground
+    remark = f"ends in {missing} zeros, since it is shorter than another component"
+    samples = np.append(ground.samples, np.zeros(missing))
+    return replace(ground, samples=samples, remarks=(*ground.remarks, remark))
 
 
 def _turned(record: ScaledRecord, angle: float) -> ScaledRecord:

@@ -76,11 +76,17 @@ class LimitDecision(LimitResult):
 
     @property
     def verdict_words(self) -> str:
-        """The verdict, with the lowest level for which it holds unless this is 0."""
+        """The verdict, with the lowest level for which it holds unless this is 0.
+
+        A verdict on all responses that rests on an estimate says that it is unproved.
+        """
         is_about_all = self.verdict in ("exceeded", "not exceeded")
+        words = self.verdict
         if is_about_all and self.from_level > 0:
-            return f"{self.verdict} from α = {self.from_level:g} up"
-        return self.verdict
+            words += f" from α = {self.from_level:g} up"
+        if is_about_all and self.nature is not Nature.GUARANTEED:
+            words += ", unproved"
+        return words
 
     @property
     def verdict_and_motion(self) -> str:

@@ -517,7 +517,12 @@ class Fragility(Answer):
         """Return the ranges of median and dispersion of the lognormal fit on a level as text."""
         text = f"median {_level_text(part.lognormal_median, level, self.unit)}"
         if part.dispersion is not None:
-            text += f", dispersion {_level_text(part.dispersion, level, '')}"
+            low = float(part.dispersion.lower[level])
+            high = float(part.dispersion.upper[level])
+            if low > 0:
+                text += f", dispersion {_range_text(low, high, '')}"
+            elif np.isfinite(high):  # each record may have its own structure of the cut
+                text += f", dispersion up to {engineering(high, '')}"
         return text
 
     def _crossings_text(self, part: LimitFragility) -> str:

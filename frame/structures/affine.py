@@ -21,7 +21,10 @@ MIN_STEP = 0.1
 
 
 def affine_terms(
-    exports: Sequence[tuple[Mapping[str, float], Array]], *, unknowns: Sequence[str] = ()
+    exports: Sequence[tuple[Mapping[str, float], Array]],
+    *,
+    unknowns: Sequence[str] = (),
+    is_affine: bool = False,
 ) -> tuple[tuple[str | float, Array], ...]:
     """Return the terms of a matrix that a program wrote for several values of its parameters.
 
@@ -36,6 +39,9 @@ def affine_terms(
             least in which it alone differs, by a tenth of its value or more; of several parameters
             all differ in one more.
         unknowns: Names of the n rows, for messages; their numbers, from 1 on, where empty.
+        is_affine: Whether the caller knows that the matrix is affine, as in the modulus of a model
+            of one material. Then one more export for each parameter is enough, and what is
+            computed from the exports is not checked by others unless there are some.
 
     Returns:
         Pairs (factor, array) as `MatrixStructure` takes them: the name of each parameter with K_i,
@@ -52,12 +58,12 @@ def affine_terms(
         >>> [(factor, float(array[0, 0])) for factor, array in affine_terms(exports)]
         [('k', 1.0), (1.0, 100.0)]
     """
-    _require_exports(exports, unknowns)
+    _require_exports(exports, unknowns, least=2 if is_affine else 3)
     names = tuple(exports[0][0])
     values = np.array([[parameters[name] for name in names] for parameters, _ in exports], float)
     arrays = np.array([array for _, array in exports], float)
-    chosen = [_chosen_export(values, k, name) for k, name in enumerate(names)]
-    is_joint = len(names) == 1 or bool((values != values[0]).all(axis=1).any())
+    chosen = [_chosen_export(values, k, name, is_affine) for k, name in enumerate(names)]
+    is_joint = is_affine or len(names) == 1 or bool((values != values[0]).all(axis=1).any())
     require(
         is_joint, "exports that move all parameters", 0, "one, to see that they do not multiply"
     )
@@ -140,13 +146,14 @@ class _AffineMatrix(NamedTuple):
         return tuple(terms)
 
 
-def _chosen_export(values: Array, k: int, name: str) -> int:
+def _chosen_export(values: Array, k: int, name: str, is_affine: bool) -> int:
     """Return the number of the export that moves a parameter alone, the farthest.
 
     Args:
         values: Parameters of all exports, shape (exports, P).
         k: Number of the parameter.
         name: Its name, for the message.
+        is_affine: Whether no further export must tell a straight line from a bent one.
 
     Raises:
         RefusedError: There are no two such exports, far enough from the nominal one and apart.
@@ -157,7 +164,7 @@ def _chosen_export(values: Array, k: int, name: str) -> int:
     far = int(np.abs(steps).argmax())
     # A further export tells a straight line from a bent one if it is well inside of its ends.
     inner = np.abs(steps * (steps[far] - steps)).max()
-    is_told = inner > MIN_STEP / 2 * steps[far] ** 2
+    is_told = is_affine or inner > MIN_STEP / 2 * steps[far] ** 2
     is_told = is_told and abs(steps[far]) >= MIN_STEP * abs(values[0, k])
     value = f"moved alone by {', '.join(f'{step:g}' for step in steps[:-1]) or 'none'}"
     cure = "move it by its own size, and once by half of this"
@@ -166,14 +173,17 @@ def _chosen_export(values: Array, k: int, name: str) -> int:
 
 
 def _require_exports(
-    exports: Sequence[tuple[Mapping[str, float], Array]], unknowns: Sequence[str]
+    exports: Sequence[tuple[Mapping[str, float], Array]], unknowns: Sequence[str], *, least: int
 ) -> None:
     """Check that exports have the same parameters and symmetric arrays of one shape.
 
     Raises:
-        RefusedError: One is of another kind, or there are fewer than three.
+        RefusedError: One is of another kind, or there are fewer than `least`, 2 or 3.
     """
-    require(len(exports) > 2, "exports", len(exports), "three or more, each with its parameters")
+    allowed = f"{least} or more, each with its parameters"
+    cure = "of a matrix that is known to be affine two are enough: affine = true says so"
+    is_enough = len(exports) >= least
+    require(is_enough, "exports", len(exports), allowed, cure if least > 2 else "")
     names = list(exports[0][0])
     shape = np.shape(exports[0][1])
     for number, (parameters, array) in enumerate(exports, 1):

@@ -94,7 +94,7 @@ def read_matrix(
     return np.array(array, float)
 
 
-def read_unknowns(path: str | Path, *, name: str = "") -> tuple[str, ...]:
+def read_unknowns(path: str | Path, *, name: str = "", held: bool = False) -> tuple[str, ...]:
     """Return the names of the free unknowns of a matrix in a file, in the order of its rows.
 
     They are NODE.DIRECTION, with the program's own numbers: "12.1" is node 12 along 1; of MAPDL it
@@ -105,6 +105,7 @@ def read_unknowns(path: str | Path, *, name: str = "") -> tuple[str, ...]:
         path: File of Abaqus in the formats MATRIX INPUT or LABELS (.mtx), of CalculiX (.sti or
             .mas) with its .dof beside, of Nastran's DMIG cards, or of MAPDL (.full).
         name: Name of the matrix in a file of several.
+        held: Whether the names of the held unknowns are returned instead.
 
     Raises:
         RefusedError: The file cannot be read, or has a matrix whose rows are not named.
@@ -119,7 +120,7 @@ def read_unknowns(path: str | Path, *, name: str = "") -> tuple[str, ...]:
     cure = cures.get(file.suffix.lower(), "list the names in the order of the rows")
     require(bool(names), file.name, "without names of unknowns", "a file that names them", cure)
     is_free = np.asarray(array.diagonal(), float) < HELD_STIFFNESS
-    return tuple(compress(names, is_free))
+    return tuple(compress(names, ~is_free if held else is_free))
 
 
 def _read_named(path: Path, name: str, *, max_rows: int) -> NamedMatrix:

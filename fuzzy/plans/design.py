@@ -119,11 +119,15 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
             )
     natures = tuple(Nature.GUARANTEED if x else Nature.ATTAINED for x in proved)
     evidence = f"which {len(samples.points):,} samples do not contradict"
+    # Where all inputs are crisp, no sign of an effect is needed.
+    basis: tuple[str, ...] = ()
+    if campaign.knowledge.signs:
+        basis = (f"{campaign.knowledge.words}, {evidence}",)
     return replace(
         bounds,
         natures=natures,
         nature=Nature.weakest(natures),
-        basis=(f"{campaign.knowledge.words}, {evidence}",),
+        basis=basis,
         inner=Ends(bounds.lower, bounds.upper),
     )
 

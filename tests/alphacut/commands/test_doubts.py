@@ -3,6 +3,7 @@
 import pytest
 
 from alphacut import main
+from tests.alphacut.small import FRAME as ONE_FLOOR
 from tests.alphacut.small import written
 
 FRAME = """
@@ -43,3 +44,14 @@ def test_a_size_that_betrays_a_wrong_unit_is_doubted(tmp_path, capfd, old, new, 
     assert warnings_of(tmp_path, capfd, FRAME) == []
     (warning, *_) = warnings_of(tmp_path, capfd, FRAME.replace(old, new))
     assert doubt in warning
+
+
+def test_a_yield_force_that_is_never_reached_is_no_doubt(tmp_path, capsys):
+    text = ONE_FLOOR.replace('masses = ["[9, 10, 11] t"]', 'masses = ["100 t", "10 t"]')
+    text = text.replace('fuzzy = ["E", "m"]', 'fuzzy = ["E"]')
+    for force, is_doubted in (("1 GN", False), ("0.5 kN", True)):
+        text = text.replace('method = "graph-follower"\n', "").replace('tolerance = "0.1 mm"\n', "")
+        forces = f'yield_force = ["200 kN", "{force}"]\n[envelope]'
+        case = written(tmp_path, text.replace("[envelope]", forces))
+        main(["check", str(case), "--quiet"])
+        assert ("frame.yield_force of two storeys differ" in capsys.readouterr().err) == is_doubted

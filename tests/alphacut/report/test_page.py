@@ -171,7 +171,7 @@ def test_the_first_tables_have_a_row_for_every_result(two_floors):
     assert 0.5 < sum(shares.values()) < 1.5
     assert len([row for row in answers(summary) if "tolerances" in row[0]]) == 2
     text = run_text(summary)
-    assert text.startswith("Least … largest value if every input stays in its range")
+    assert text.startswith("Least … largest value if each input stays in its range")
     assert max(map(len, text.splitlines())) <= 80
 
 
