@@ -22,6 +22,9 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.result import Ends, Envelope, within_steps
 from alphacut.fuzzy.result import Nature
 
+ROUNDING_MARGIN = 1e-9
+"""Margin of bounds and attained values for rounding, as a fraction of the peak of each output."""
+
 
 @dataclass(frozen=True, eq=False)
 class Goal:
@@ -138,7 +141,7 @@ class Hull:
     all closed sub-boxes holds for the whole box.
     """
 
-    def __init__(self, problem: UnitFlow, flow: LinearFlow) -> None:
+    def __init__(self, problem: UnitFlow, flow: LinearFlow, margin: Array) -> None:
         self.problem = problem
         self.flow = flow
         levels = len(problem.boxes.alpha)
@@ -155,6 +158,7 @@ class Hull:
         self.min_peak_lower = np.full((levels, outputs), np.inf)
         self.min_peak_upper = np.full((levels, outputs), np.inf)
         self.facts: dict[str, float] = {"parts": 0}
+        self.margin = margin  # what covers rounding of bounds and attained values, (m,)
 
     def incumbent(self, level: int) -> Array:
         """Return the largest attained value of each side over a level, shape (m, 2); 0 at least.
@@ -239,10 +243,11 @@ class Hull:
             is_better = self.attained[level + 1] > self.attained[level]
             self.attained[level][is_better] = self.attained[level + 1][is_better]
             self.attained_at[level][is_better] = self.attained_at[level + 1][is_better]
-        attained = self.attained
-        self._require_consistent(upper)
-
-        min_peak_upper = self._min_peak_upper_bounds(upper)
+        min_peak_upper = self._min_peak_upper_bounds(upper) + self.margin
+        min_peak_lower = np.maximum(self.min_peak_lower - self.margin, 0.0)
+        upper = upper + self.margin[:, np.newaxis]
+        attained = self.attained - self.margin[:, np.newaxis]
+        self._require_consistent(upper, attained)
         error = (upper - attained).max(axis=-1)
         largest = np.maximum(np.abs(upper).max(axis=(1, 3)), 1e-300)
         # The gap of an output at rest is judged by what the energy of the response allows.
@@ -263,32 +268,32 @@ class Hull:
             inner=Ends(-attained[..., 0], attained[..., 1]),
             between=self.between_nodes,
             least_peaks=Ends(
-                np.maximum.accumulate(self.min_peak_lower, axis=0),
+                np.maximum.accumulate(min_peak_lower, axis=0),
                 np.minimum.accumulate(min_peak_upper[::-1], axis=0)[::-1],
             ),
-            attained_error=self.attained_error if self.attained_error.any() else None,
+            attained_error=self.attained_error + 2 * self.margin,
             evaluations=int(facts.pop("evaluations", attained.size)),
             facts=facts,
             notes=tuple(notes),
         )
 
-    def _require_consistent(self, upper: Array) -> None:
+    def _require_consistent(self, upper: Array, attained: Array) -> None:
         """Raise FailedError where an attained value exceeds its guaranteed bound, or either is NaN.
 
         Args:
             upper: Guaranteed upper bounds, shape (A, T, m, 2): levels, time nodes, outputs q, and
-                the sides −q, q. Attained values `self.attained` have the same axes; both are in the
-                units of the outputs.
+                the sides −q, q.
+            attained: Attained values with the same axes; both are in the units of the outputs.
 
         Raises:
             FailedError: The message names the output of the first contradiction and the largest
                 excess.
         """
-        is_wrong = ~(self.attained <= upper)  # true also where one of both is NaN
+        is_wrong = ~(attained <= upper)  # true also where one of both is NaN
         if not is_wrong.any():
             return
         output = self.flow.outputs[int(np.argwhere(is_wrong)[0, 2])]
-        excess = np.nanmax(np.where(is_wrong, self.attained - upper, np.nan))
+        excess = np.nanmax(np.where(is_wrong, attained - upper, np.nan))
         what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
         raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 

@@ -34,7 +34,7 @@ from alphacut.frame.bounds.kernel import (
     call_examine,
     examine,
 )
-from alphacut.frame.bounds.model_error import remainder_bounds
+from alphacut.frame.bounds.remainders import remainder_bounds
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.modes.modal_model import ModalModel, wave_factors
 from alphacut.fuzzy.sets.boxes import chebyshev_points

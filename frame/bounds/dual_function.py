@@ -74,15 +74,6 @@ def data_without_modes() -> DualFunctionData:
     return DualFunctionData(**{name: np.zeros((0,) * count) for name, count in dimensions.items()})
 
 
-def roundings(modes: int, sources: int, inputs: int) -> int:
-    """Return the number of roundings of a term of D(μ) in its sums over variables and inputs.
-
-    The sums run over the variables of all modes, over pairs of inputs and single inputs, and over
-    the sources of truncated modes; 32 are for the operations of the term itself.
-    """
-    return 2 * modes * (sources + 2) + 2 * inputs**2 + 4 * inputs + 4 * sources + 32
-
-
 def require_in_range(fields: Mapping[str, Array]) -> None:
     """Raise UnprovedError where a number of models or tables is not finite or above `LARGEST`."""
     for name, values in fields.items():
@@ -90,8 +81,8 @@ def require_in_range(fields: Mapping[str, Array]) -> None:
             raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
 
 
-# The bounds of rounding hold for any order of a sum and for fused products, so the compiler may use
-# both. NaN and infinity keep their meaning.
+# The margin for rounding holds for any order of a sum and for fused products, so the compiler may
+# use both. NaN and infinity keep their meaning.
 loops = kernel(fastmath={"reassoc", "contract"})
 
 

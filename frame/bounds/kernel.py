@@ -48,7 +48,8 @@ class RemainderBounds(NamedTuple):
     """Bounds of what quadratic Taylor models of the outputs leave out, over the whole box."""
 
     third: Array  # of third derivatives, (T, m, d, d, d)
-    rounding: Array  # of the values, then of the slopes by the inputs, (T, m, 1 + d)
+    # what tables miss of the values, then of the slopes by the inputs, (T, m, 1 + d)
+    rounding: Array
 
 
 class Examination(NamedTuple):

@@ -15,21 +15,17 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.progress_bar import Progress
 from alphacut.frame import numbers
-from alphacut.frame.bounds.dual_function import DualFunctionData, require_in_range, roundings
+from alphacut.frame.bounds.dual_function import DualFunctionData, require_in_range
 from alphacut.frame.bounds.node_bounds import Effort, bound_nodes
 from alphacut.frame.calculus.monomials import monomials
-from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.modes.intervening import Excitation, Oscillator
 from alphacut.frame.modes.models import ModalResponseModels
-from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.oscillators import (
     Grid,
     ModalResponses,
     Oscillators,
     grid_over,
-    is_fed_through,
 )
 
 
@@ -38,40 +34,38 @@ class ResponseTable(NamedTuple):
 
     value: Array  # responses at the points of each mode's grid, (K, sources, T, Q W)
     max_magnitude: Array  # their largest magnitudes, (K, sources)
-    error: Array  # bounds of the error of bilinear interpolation and round-off, (K, sources, T)
+    error: Array  # bounds of the error of bilinear interpolation, (K, sources, T)
     # bounds of their distance from straight lines between time nodes, (K, sources, T)
     interpolation_error: Array
 
 
 def response_tables(
-    grids: Sequence[Grid], excitation: Excitation, orders: Sequence[int], inputs: int
+    grids: Sequence[Grid], excitation: Excitation, orders: Sequence[int]
 ) -> dict[int, ResponseTable]:
     """Return tables of the responses of K oscillators on grids, by the order of the derivative.
 
     Args:
         grids: Grid over the frequency ω and the quotient q = decay/ω of each oscillator, at least
             one; all have the same numbers of points.
-        excitation: Loads by name, T time nodes, and the names of the sources, at least one.
+        excitation: T time nodes and the sources, at least one.
         orders: Derivatives by time of the displacements (0, 1, 2) that outputs take, each once.
-        inputs: Number of inputs of the sums that the responses enter, for their rounding.
 
     Returns:
         For each order: `value`, responses at the grids' points, shape (K, sources, T, points) with
         ω running fastest; `max_magnitude`, shape (K, sources); `error`, bounds of the error of
-        bilinear interpolation and of rounding, and `interpolation_error`, bounds of the distance
+        bilinear interpolation, and `interpolation_error`, bounds of the distance
         from a straight line in the step before each node, shape (K, sources, T) each.
 
     Raises:
         UnprovedError: A response is not finite or above 1e100, or an oscillator turns too far
             within a sample interval of a load.
     """
-    loads, time, sources = excitation
+    time, sources = excitation
     by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
     for grid in grids:
-        oscillators = Oscillators(grid, loads, time, orders)
+        oscillators = Oscillators(grid, time, orders)
         for order, modes in by_order.items():
             modes.append([oscillators.responses(source, order) for source in sources])
-    rounding = 2 * gamma(roundings(len(grids), len(sources), inputs))
     tables = {}
     for order, modes in by_order.items():
         value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
@@ -81,7 +75,7 @@ def response_tables(
         tables[order] = ResponseTable(
             value=value,
             max_magnitude=max_magnitude.max(axis=-1),
-            error=error + rounding * max_magnitude,
+            error=error,
             interpolation_error=np.array([[x.line_deviation for x in mode] for mode in modes]),
         )
     return tables
@@ -116,45 +110,37 @@ def _table_points(oscillators: Sequence[Oscillator], duration: float) -> tuple[i
 class LevelModels:
     """Models of the response over the box of one level, and response tables."""
 
-    structure: ClassicalStructure  # the structure over the box
-    models: ModalResponseModels  # its response
+    models: ModalResponseModels  # the response over the box
+    orders: Ints  # derivative of the responses of oscillators that each output takes, (m,)
     grids: list[Grid]  # points of the tables of each oscillator
     tables: dict[int, ResponseTable]  # responses of the oscillators, by order of derivative
-    excitation: Excitation  # loads, time nodes, and sources
+    excitation: Excitation  # time nodes and sources
 
     def on_subbox(self, low: Array, high: Array) -> LevelModels:
         """Return the models over the sub-box low ≤ u ≤ high, with the same response tables."""
         return replace(self, models=self.models.on_subbox(low, high))
 
     @classmethod
-    def from_structure(
-        cls,
-        structure: ClassicalStructure,
-        excitation: Excitation,
-        truncation_tolerance: Array | None = None,
+    def from_models(
+        cls, models: ModalResponseModels, orders: Ints, excitation: Excitation
     ) -> LevelModels:
-        """Return models of a structure's response over its box, and tables of its oscillators.
+        """Return models of a response over a box with tables of the responses of its oscillators.
 
         Args:
-            structure: The structure as Taylor models over the box of the inputs.
-            excitation: Loads by name, T ≥ 1 rising time nodes t ≥ 0, and the names of the sources,
-                at least one.
-            truncation_tolerance: Allowed error of each of the m outputs by modes that are not
-                enclosed one by one, shape (m,), in its unit. As many modes as possible are enclosed
-                unless it is given.
+            models: At least one oscillator, and what couples them.
+            orders: Derivative by time of the oscillators' responses that each output takes, (m,).
+            excitation: T ≥ 1 rising time nodes t ≥ 0, and the sources, at least one.
 
         Raises:
-            UnprovedError: None of its modes can be enclosed, one may not oscillate, or a response
-                is out of the range of the tables.
+            UnprovedError: A response is out of the range of the tables.
         """
-        models = ModalResponseModels.from_structure(structure, excitation, truncation_tolerance)
         points = _table_points(models.oscillators, float(excitation.time[-1]))
         grids = [
             grid_over(mode.omega_range, mode.quotient_range, points) for mode in models.oscillators
         ]
-        inputs = structure.initial_state.inputs
-        tables = response_tables(grids, excitation, structure.distinct_orders, inputs)
-        return cls(structure, models, grids, tables, excitation)
+        distinct_orders = [int(order) for order in np.unique(orders)]
+        tables = response_tables(grids, excitation, distinct_orders)
+        return cls(models, orders, grids, tables, excitation)
 
     def interpolation_error(self) -> Array:
         """Bound the distance of outputs from a straight line within each time step, shape (T, m).
@@ -165,38 +151,11 @@ class LevelModels:
         error: Array = self.models.interpolation_error + sum(
             x.interpolation_error for x in self.models.truncated
         )
-        for o, order in enumerate(self.structure.derivative_orders):
+        for o, order in enumerate(self.orders):
             of_modes = self.tables[int(order)].interpolation_error
             for mode, of_mode in zip(self.models.oscillators, of_modes, strict=True):
                 error[:, o] += mode.participation.magnitude()[:, o] @ of_mode
-        # The tables of oscillators contain what forces add at once through these.
-        for source in self.excitation.sources:
-            if is_fed_through(source, 2):
-                deviation = load_deviation(self.excitation.loads[source], self.excitation.time)
-                error += np.outer(deviation, self._feedthrough_of_truncated_modes(source))
         return error
-
-    def _feedthrough_of_truncated_modes(self, source: str) -> Array:
-        """Bound what a unit of a force adds to outputs at once by truncated modes, shape (m,).
-
-        A force acts on accelerations at once, by M⁻¹ b f, of which the participation factors of the
-        oscillators are a part. The difference belongs to the truncated modes, which are not
-        enclosed one by one. Bounds of outputs that are no accelerations are 0.
-
-        Args:
-            source: Name of the force, "force1", "force2", …
-        """
-        index = self.excitation.sources.index(source)
-        structure = self.structure
-        coefficient = structure.force_accelerations[source][None] @ structure.output_rows.T
-        feedthrough = coefficient[0] * structure.output_factors
-        midpoint: Array = feedthrough.value
-        radius = feedthrough.deviation()
-        for mode in self.models.oscillators:
-            participation = mode.participation[index]
-            midpoint = midpoint - participation.value
-            radius = radius + participation.deviation()
-        return np.where(structure.derivative_orders == 2, np.abs(midpoint) + radius, 0.0)
 
 
 @dataclass(eq=False)
@@ -377,7 +336,7 @@ def _dual_function_data(
         `DualFunctionData`, and the constants (2, T) of `OutputBounds.constant`.
     """
     modes = level.models.oscillators
-    table = level.tables[int(level.structure.derivative_orders[output])]
+    table = level.tables[int(level.orders[output])]
     variables = concatenate(
         [
             x
@@ -391,11 +350,6 @@ def _dual_function_data(
     radius = np.maximum(radius, 1e-30)
     scaled = _scaled(variables, radius)
     expected_cubic = numbers.EXPECTED_CUBIC * np.asarray(np.abs(scaled.cubic).sum(axis=1))
-    # Rounding of the sums that multipliers enter: scaled variables are at most 1 by magnitude, and
-    # those of the tables' points, which reach a little further, are at most 2 or so.
-    sources = modes[0].participation.shape[0]
-    rounding = 8 * gamma(roundings(len(modes), sources, scaled.linear.shape[1]))
-
     midpoints = variables.value.reshape(len(modes), -1)
     radii = radius.reshape(len(modes), -1)
     grids = level.grids
@@ -423,7 +377,7 @@ def _dual_function_data(
         quadratic=scaled.quadratic,
         cubic=scaled.cubic,
         expected_cubic=expected_cubic,
-        remainder=scaled.remainder + rounding + expected_cubic,
+        remainder=scaled.remainder + expected_cubic,
         truncated_response=truncated.response,
         truncated_linear=truncated.linear,
         truncated_quadratic=truncated.quadratic,
@@ -460,19 +414,18 @@ def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_Tru
         (terms, d) and quadratic (terms, d (d + 1)/2) coefficients of their factors P and R; there
         are no terms if no mode is truncated. And the constants, shape (2, T): what the terms have
         at the midpoint of the box, and a bound of everything that is bounded by magnitude: coupling
-        of modes, errors of the tables of all modes, cubic terms, remainders, and rounding.
+        of modes, errors of the tables of all modes, cubic terms and remainders.
     """
     modes = level.models.oscillators
-    table = level.tables[int(level.structure.derivative_orders[output])]
+    table = level.tables[int(level.orders[output])]
     constant: Array = np.zeros((2, len(level.excitation.time)))
     constant[1] = level.models.coupling[:, output]
     for mode, error in zip(modes, table.error, strict=True):
         constant[1] += mode.participation.magnitude()[:, output] @ error
-    d = level.structure.rayleigh.inputs
+    d = modes[0].omega.inputs
     if not level.models.truncated:
-        # no terms, whatever the node; the constants are sums of one bound of each source and mode
+        # no terms, whatever the node
         none = _TruncatedTerms(np.zeros((0, 1)), np.zeros((0, d)), np.zeros((0, d * (d + 1) // 2)))
-        constant[1] *= 1 + gamma(len(modes) * (modes[0].participation.shape[0] + 1) + 4)
         return none, constant
 
     responses = list[Array]()
@@ -490,11 +443,6 @@ def _truncated_terms(level: LevelModels, output: int, side: float) -> tuple[_Tru
     scaled = _scaled(concatenate(factors, -1), np.ones(len(response)))
     # The cubic terms and the remainders of the factors are bounded by magnitude.
     constant[1] += (scaled.remainder + np.abs(scaled.cubic).sum(axis=1)) @ np.abs(response)
-    # Rounding of the linear and quadratic terms, and of these constants.
-    sources = modes[0].participation.shape[0]
-    magnitude = np.abs(scaled.linear).sum(axis=1) + np.abs(scaled.quadratic).sum(axis=1)
-    constant[1] += gamma(roundings(len(modes), sources, d)) * (magnitude @ np.abs(response))
-    constant[1] += gamma(len(response) + 4) * np.abs(constant).sum(axis=0)
     return _TruncatedTerms(response, scaled.linear, scaled.quadratic), constant
 
 
@@ -504,7 +452,7 @@ class _ScaledModels(NamedTuple):
     linear: Array  # (Z, d)
     quadratic: Array  # of u_i u_j, i ≤ j, packed by rows, (Z, d (d + 1)/2)
     cubic: Array  # (Z, monomials of third degree)
-    remainder: Array  # with the rounding of the coefficients, (Z,)
+    remainder: Array  # (Z,)
 
 
 def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
@@ -516,12 +464,10 @@ def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
 
     Returns:
         `linear` (Z, d), `quadratic` (Z, d (d + 1)/2), of u_i u_j for i ≤ j packed by rows, `cubic`
-        (Z, monomials of third degree), and `remainder` (Z,), which contains the rounding of the
-        coefficients. Constant coefficients are left out.
+        (Z, monomials of third degree), and `remainder` (Z,). Constant coefficients are left out.
     """
     pairs = monomials(models.inputs, 2)
     by_rows = np.lexsort((pairs[:, 1], pairs[:, 0]))  # the order i ≤ j that the kernels use
-    remainder = np.asarray(models.remainder + gamma(8) * models.magnitude())
     linear = models.homogeneous_part(1) / radius
     quadratic = models.homogeneous_part(2)[by_rows] / radius
     cubic = models.homogeneous_part(3) / radius
@@ -529,5 +475,5 @@ def _scaled(models: TaylorModel, radius: Array) -> _ScaledModels:
         linear=np.ascontiguousarray(linear.T),
         quadratic=np.ascontiguousarray(quadratic.T),
         cubic=np.ascontiguousarray(cubic.T),
-        remainder=remainder / radius,
+        remainder=models.remainder / radius,
     )

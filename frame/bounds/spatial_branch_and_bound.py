@@ -22,6 +22,7 @@ from alphacut.base.progress_bar import Progress
 from alphacut.base.threads import KernelThreads
 from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import (
+    ROUNDING_MARGIN,
     Answer,
     BisectionError,
     BoxBounds,
@@ -81,21 +82,28 @@ class SubBox:
         return [self.on_levels(rows, half) for half, rows in self.boxes.bisect(axis)]
 
 
-def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+def prove(
+    proof: BoxProof,
+    flow: UnitFlow,
+    progress: Progress | None = None,
+    margin: Callable[[UnitFlow], Array] | None = None,
+) -> Envelope:
     """Return the guaranteed envelope of all outputs on all α-levels, by bisection of the inputs.
 
     Args:
         proof: Bounds the outputs over any sub-box of the inputs.
         flow: The response as a function of the fuzzy inputs.
         progress: Called with the completed fraction, from 0 to 1.
+        margin: Returns what covers the rounding of each output, shape (m,); 1e-9 of the peaks
+            unless given.
 
     Raises:
-        UnprovedError: The system is not linear, its integrator is not the exact one, or bounds are
-            not proved.
+        UnprovedError: The system is not linear, its integrator is not the exact one, bounds are not
+            proved, or the margin for rounding exceeds a tenth of the wanted gap of a peak.
         FailedError: The proof contradicts a trajectory, and is wrong.
         RefusedError: A trajectory does not exist, or is not finite.
     """
-    queue = Queue(proof, flow)
+    queue = Queue(proof, flow, margin)
     queue.run(progress)
     return queue.hull.envelope(proof.name, queue.notes())
 
@@ -106,7 +114,12 @@ class Queue:
     Arrays with the axes (A, m, 2) belong to the peaks of −q and q of each output on each level.
     """
 
-    def __init__(self, proof: BoxProof, problem: UnitFlow) -> None:
+    def __init__(
+        self,
+        proof: BoxProof,
+        problem: UnitFlow,
+        margin: Callable[[UnitFlow], Array] | None = None,
+    ) -> None:
         boxes = problem.boxes
         self.proof = proof
         self.problem = problem
@@ -114,8 +127,13 @@ class Queue:
         self.workers = proof.workers or os.cpu_count() or 1
         with refusing():
             proof.forecast(self.flow, boxes)
-        self.hull = Hull(problem, self.flow)
+            of_outputs = ROUNDING_MARGIN * problem.peak if margin is None else margin(problem)
+        self.hull = Hull(problem, self.flow, of_outputs)
         self.gap = proof.peak_gap(problem)[:, np.newaxis]  # wanted gap of each peak, (m, 1)
+        if (of_outputs > 0.1 * self.gap[:, 0]).any():
+            largest = float((of_outputs / problem.peak).max())
+            what = f"rounding of the response may be {largest:.2g} of a peak"
+            raise UnprovedError(what, "take a wider gap, or stiffnesses that differ less")
         # gap above which bounds elsewhere are worth little either, (m, 1)
         self.wide_gap = numbers.WIDE * problem.peak[:, np.newaxis]
         self.refusals = 0

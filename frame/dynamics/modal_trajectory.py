@@ -62,7 +62,7 @@ def modal_trajectory(
     waves = [np.stack([free, time * free, time**2 * free], 1)]
     for load in loads:
         try:
-            found, _ = responses_at_nodes(rate.value.ravel(), load, time, 2)
+            found = responses_at_nodes(rate.value.ravel(), load, time, 2)
         except UnprovedError:
             return None
         by_mode = found.reshape(3, len(time), *rate.value.shape)

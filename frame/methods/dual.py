@@ -34,6 +34,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.result import Ends, Envelope
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.verification.rounding import rounding_margin
 
 Problems = dict[tuple[int, int], OutputBounds]
 """Bounds of -output (side 0) and output (side 1), by the indices of the output and of the side."""
@@ -85,7 +86,7 @@ class DualProof:
                 or the integrator is not the exact one.
             FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
-        return prove(self, flow, progress)
+        return prove(self, flow, progress, rounding_margin)
 
     @property
     def bounds_peaks_alone(self) -> bool:
@@ -184,7 +185,12 @@ class DualProof:
         gap = self.peaks * goal.peak
         if is_complete:
             gap = self.gap * goal.peak
-        level = box.level(nodes, numbers.TRUNCATION * gap[outputs], outputs)
+        level = box.level(
+            nodes,
+            numbers.TRUNCATION * gap[outputs],
+            outputs,
+            model_tolerance=numbers.TRUNCATION * self.peaks * goal.peak,
+        )
         problems: Problems = {}
         for o, s in np.argwhere(needed.any(axis=0)):
             index = int(np.searchsorted(outputs, o))
@@ -205,7 +211,7 @@ class DualProof:
                 unit[nodes, o, s] = problem.model_inputs
 
             # 2. The exact responses at these inputs attain values, which raise the incumbents.
-            attained, attained_error = _attained_values(box, needed, unit=unit)
+            attained = _attained_values(box, needed, unit=unit)
             for (o, s), problem in problems.items():
                 problem.wanted_gap = self.peaks * goal.peak[o]
                 problem.attained = max(problem.attained, attained[:, o, s].max())
@@ -240,7 +246,6 @@ class DualProof:
             attained_at=box.inputs(unit),
             between_nodes=between,
             gap_fractions=fractions,
-            attained_error=attained_error,
             pruned=PrunedPeaks(remaining, pruned_upper),
             least_peaks=least_peaks,
             facts={"single_modes": len(level.models.oscillators)},
@@ -395,7 +400,7 @@ class DualProof:
                 raise UnprovedError(what, "take narrower inputs", int(fractions.argmax()))
 
 
-def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Array]:
+def _attained_values(box: Box, needed: Mask, *, unit: Array) -> Array:
     """Return what exact responses attain, each bound at a point of its own.
 
     The last axis of two, the side, has first the output with its sign changed, then the output.
@@ -406,27 +411,18 @@ def _attained_values(box: Box, needed: Mask, *, unit: Array) -> tuple[Array, Arr
         unit: Unit coordinates of the points, shape (times, outputs, 2, inputs with a width).
 
     Returns:
-        The values less the bound of their rounding, shape (times, outputs, 2), -∞ for bounds that
-        are not asked for; and twice the larger bound of the rounding on both sides, shape (times,
-        outputs), 0 where neither is asked for.
+        Shape (times, outputs, 2), -∞ for bounds that are not asked for.
     """
     node, output, side = np.nonzero(needed)
     points = unit[needed]
-    at_midpoint = box.midpoint_response()
-    value = at_midpoint.value[node, output]
-    error = at_midpoint.error[node, output]
+    value = box.midpoint_modes.response(box.time)[node, output]
     # Most points may be the midpoint of the box, whose response is known.
     is_moved = points.any(axis=1)
     if is_moved.any():
-        moved = box.exact_values(points[is_moved], node[is_moved], output[is_moved])
-        value[is_moved] = moved.value
-        error[is_moved] = moved.error
+        value[is_moved] = box.exact_values(points[is_moved], node[is_moved], output[is_moved])
     attained = np.full(needed.shape, -np.inf)
-    attained[needed] = np.where(side == 1, value, -value) - error
-    attained_error = np.zeros(needed.shape[:2])
-    # The exact response may lie on either side of the computed one.
-    np.maximum.at(attained_error, (node, output), 2 * error)
-    return attained, attained_error
+    attained[needed] = np.where(side == 1, value, -value)
+    return attained
 
 
 def _least_peaks(
@@ -449,7 +445,7 @@ def _least_peaks(
         `lower`: guaranteed lower bounds of the smallest peaks, 0 or more; `upper`: upper bounds of
         the peak of one response that has a small one; shape (outputs,) each.
     """
-    count = len(level.structure.derivative_orders)
+    count = len(level.orders)
     found = list(pool.map(partial(least_peak, level), range(count)))
     lower = np.array([bound for bound, _ in found])
     unit = np.stack([point for _, point in found])
@@ -466,40 +462,23 @@ def _least_peaks(
         unit = tried[peaks.argmin(axis=0)]
     reached = []
     for o in range(count):
-        peak = box.peak_over_time(unit[o], between[:, [o]], np.array([o]))
-        reached.append(float(peak.item()))
+        reached.append(float(box.peak_over_time(unit[o], between)[o]))
     return Ends(lower, np.array(reached))
 
 
 def _exact_bounds(box: Box) -> BoxBounds:
     """Return the bounds over a box without width, which is one point: its exact response.
 
-    Guaranteed bounds lie above and attained values below it by the bound of its rounding.
-    Bisections cannot narrow this gap, so that no input accounts for it: `gap_fractions` is zero.
-
-    Args:
-        box: The box, whose lower and upper ends are equal.
-
-    Returns:
-        `upper` and `attained`, shape (times, outputs, 2), on the last axis first of the output with
-        its sign changed; `attained_at`, the point in SI units, with a further axis of the inputs;
-        `between_nodes`, the distance from straight lines between nodes, and `attained_error`, shape
-        (times, outputs); `gap_fractions`, shape (outputs, 2, inputs); and `least_peaks`, bounds of
-        the largest magnitude over all times, shape (outputs,).
+    No input accounts for a gap, since there is none: `gap_fractions` is zero.
     """
-    value, error = box.midpoint_response()
+    value = box.midpoint_modes.response(box.time)
     sides = np.stack([-value, value], axis=-1)
-    margin = error[..., np.newaxis]
-    between = box.midpoint_interpolation_error()
-    no_coordinates = np.zeros(0)
+    between = box.midpoint_modes.interpolation_error(box.time)
     return BoxBounds(
-        upper=sides + margin,
-        attained=sides - margin,
+        upper=sides,
+        attained=sides,
         attained_at=np.broadcast_to(box.low, (*sides.shape, len(box.low))).copy(),
         between_nodes=between,
         gap_fractions=np.zeros((*sides.shape[1:], len(box.low))),
-        attained_error=2 * error,
-        least_peaks=Ends(
-            (np.abs(value) - error).max(axis=0), box.peak_over_time(no_coordinates, between)
-        ),
+        least_peaks=Ends(np.abs(value).max(axis=0), box.peak_over_time(np.zeros(0), between)),
     )

@@ -5,7 +5,7 @@
    give the modal model q(t; p) = 2 Re Σ_k C_k exp(λ_k t), and likewise the response to a record
    (`frame.modes.damped`).
 2. The residual of these polynomials in the equations of motion is bounded over the whole box, and
-   with it the error of the response (`frame.bounds.model_error`). The degree rises until the error
+   with it the error of the response (`frame.modes.model_error`). The degree rises until the error
    takes a fifth of the wanted gap. If it does not fall that far, the box is bisected
    (`frame.bounds.spatial_branch_and_bound`).
 3. Branch and bound encloses the extreme values of the model at all nodes, for all outputs, sides
@@ -29,13 +29,7 @@ from alphacut.frame import numbers
 from alphacut.frame.bounds.box_proof import BisectionError, BoxBounds, Goal
 from alphacut.frame.bounds.branch_and_bound import Optima, bound_problems, first_optima
 from alphacut.frame.bounds.kernel import call_examine
-from alphacut.frame.bounds.model_error import (
-    direct_error_in_steps,
-    largest_growth,
-    proved_error,
-    remainder_bounds,
-    response_parts,
-)
+from alphacut.frame.bounds.remainders import remainder_bounds
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import DEFAULT_TOLERANCE, MAX_PARAMETERS, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -44,10 +38,19 @@ from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.modes.model_error import (
+    direct_error_in_steps,
+    error_between_nodes,
+    error_fractions,
+    largest_growth,
+    proved_error,
+    response_parts,
+)
 from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
 from alphacut.frame.response.duhamel import call_with_load
 from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.result import Envelope
+from alphacut.frame.verification.rounding import rounding_margin
 
 LOG = logging.getLogger(__name__)
 
@@ -108,7 +111,7 @@ class Proof:
             return prove_yielding(flow, self.name, gap, budget=self.boxes, progress=progress)
         # Without a tolerance the gap is the tolerance, too.
         tolerance = flow.tolerance(self.tolerance or self.gap)
-        return prove(replace(self, tolerance=tolerance), flow, progress)
+        return prove(replace(self, tolerance=tolerance), flow, progress, rounding_margin)
 
     def peak_gap(self, flow: UnitFlow) -> Array:
         """Return the largest gap allowed at the peak of each output, shape (outputs,)."""
@@ -264,7 +267,7 @@ class Proof:
         what = f"the proved error of the modes, {numbers.MAX_ERROR_FRACTION * excess:.3g} of it,"
         what += " takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        fractions = _error_fractions(model)
+        fractions = error_fractions(model)
         max_degree = _max_degree(len(model.boxes.names))
         # The error is extrapolated to the largest degree. There halving the inputs that contribute
         # divides the error of the degree N by 2^(N + 1), its first term that is left out. The
@@ -348,7 +351,7 @@ def bound_levels(
         n_boxes.append(count)
 
     # Within the steps, the model and its error deviate from straight lines.
-    error_between = _error_between_nodes(model, error, direct=direct / scale)
+    error_between = error_between_nodes(model, error, direct=direct / scale)
     between = (_line_deviation(model) + error_between) * scale
     facts = {
         "model_error": float(error.max()),
@@ -357,7 +360,7 @@ def bound_levels(
         "evaluations": 1 / n_levels,
     }
     shape = (*error.shape, 2)
-    fractions = np.broadcast_to(_error_fractions(model), (*shape[1:], len(model.boxes.names)))
+    fractions = np.broadcast_to(error_fractions(model), (*shape[1:], len(model.boxes.names)))
     attained_error = error + rounding
     bounds = []
     upper = np.full(2 * error.size, np.inf)
@@ -435,55 +438,6 @@ def _line_deviation(model: ModalModel) -> Array:
             by_modulus = np.outer(of_modulus, np.hypot(real[k], imag[k]))
             deviation += np.minimum(by_modulus, by_parts)
     return deviation
-
-
-def _error_between_nodes(model: ModalModel, error: Array, *, direct: Array) -> Array:
-    """Return by how much a model's error within a step may exceed the smaller one at its ends.
-
-    Args:
-        model: The model, which tells the growth rates of its modes and the step.
-        error: Bound of its error at the nodes, 0 or more, shape (times, outputs).
-        direct: Bound of that part of the error, within the step before each node, by which forces
-            act on accelerations at once, same shape; it may be zero at the nodes.
-
-    Returns:
-        Bound of the error in the step before each node minus the smaller one of the bounds at both
-        its ends, same shape; 0 for the first node.
-    """
-    # Without `direct` the bound of the error is a sum of functions of time that either rise or are
-    # in proportion to bounds of a mode's response, which decay no faster than exp(g t) with the
-    # upper bound g of its growth rate. With the most negative g of all modes, the bound within a
-    # step of the length h is at most exp(-g h) times its value at the end.
-    rate = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
-    swell = float(np.exp(np.maximum(-rate, 0.0).max() * model.flow.step))
-    within = swell * np.maximum(error[1:], error[:-1]) + direct[1:]
-    added = np.zeros_like(error)
-    added[1:] = within - np.minimum(error[1:], error[:-1])
-    return added
-
-
-def _error_fractions(model: ModalModel) -> Array:
-    """Return an estimate of the fraction of each input in the error of a modal model.
-
-    The error comes from the terms that the polynomials leave out. Its fractions are taken to be
-    those of the inputs in the terms of the highest degree, where an input counts by its exponent.
-
-    Args:
-        model: The model, with polynomials in the inputs as eigenvalues and coefficients.
-
-    Returns:
-        Fractions, shape (inputs,), which add up to 1, or are 0 if there are no such terms.
-    """
-    exponents = model.eigenvalue.exponents  # (terms, inputs)
-    weight = np.zeros(len(exponents))
-    for polynomials in (model.eigenvalue, model.coefficient):
-        magnitudes = np.abs(polynomials.coefficients).reshape(len(exponents), -1)
-        largest = np.maximum(magnitudes.max(axis=0), 1e-300)
-        # Polynomials of different units are compared by their coefficients over the largest one.
-        weight += (magnitudes / largest).max(axis=1)
-    is_highest = exponents.sum(axis=1) == model.degree
-    by_input = weight[is_highest] @ exponents[is_highest]
-    return np.asarray(by_input / max(float(by_input.sum()), 1e-300))
 
 
 def _max_degree(n_inputs: int) -> int:

@@ -1,13 +1,13 @@
 """Modes with dashpots as Taylor models over a box: q(t; p) = 2 Re Σ_k φ_k(p) exp(λ_k(p) t).
 
 (λ² M + λ D + K) φ = 0 is solved degree by degree about the midpoint of the box (perturbation
-series; Stewart, Sun 1990). The polynomials need no proof of their own: `bounds.model_error` bounds
+series; Stewart, Sun 1990). The polynomials need no proof of their own: `model_error` bounds
 what they miss in the equations of motion, whatever the distances of the eigenvalues.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,8 +49,16 @@ class DampedStructure:
     feeds: TaylorModel | None
 
     @classmethod
-    def over_box(cls, system: LinearSystem, boxes: Boxes, order: int) -> DampedStructure:
+    def over_box(
+        cls,
+        system: LinearSystem,
+        boxes: Boxes,
+        order: int,
+        fixed: Mapping[str, float] | None = None,
+    ) -> DampedStructure:
         """Return the structure over the widest of some boxes, as Taylor models of an order.
+
+        Other parameters have the values in `fixed`, or else nominal ones.
 
         Raises:
             UnprovedError: The mass at the midpoint, or a quantity that must be positive, is not so,
@@ -60,7 +68,8 @@ class DampedStructure:
 
         d = len(boxes.names)
         inputs = TaylorModel.variables(boxes.centre, boxes.radius, order)
-        parameters = {x: TaylorModel.constant(v, d, order) for x, v in system.parameters.items()}
+        values = {**system.parameters, **(fixed or {})}
+        parameters = {name: TaylorModel.constant(x, d, order) for name, x in values.items()}
         for i, name in enumerate(boxes.names):
             parameters[name] = inputs[i]
         full = system.assembly(parameters)
@@ -418,18 +427,21 @@ def _reciprocal(x: TaylorModel) -> TaylorModel:
     return solution_series(matrices, ones)[..., 0, 0]
 
 
-def require_dissipation(system: LinearSystem, boxes: Boxes) -> None:
+def require_dissipation(
+    system: LinearSystem, boxes: Boxes, fixed: Mapping[str, float] | None = None
+) -> None:
     """Check that a structure is known to lose energy everywhere in the widest of some nested boxes.
 
     Args:
         system: The structure.
         boxes: Boxes of its inputs, the widest one first.
+        fixed: Values of other parameters by name, where they are not nominal.
 
     Raises:
         UnprovedError: A parameter leaves the range in which it has a meaning, unknowns have no
             mass, or a term of the damping may feed energy into the structure.
     """
-    lowest = dict(system.parameters)
+    lowest = {**system.parameters, **(fixed or {})}
     for name, low, high in zip(boxes.names, boxes.lower[0], boxes.upper[0], strict=True):
         lowest[name] = float(low)
         parameter = system.parameter(name)

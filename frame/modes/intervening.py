@@ -15,7 +15,7 @@ a_j β_j, as if it were a mode; what couples the oscillators is bounded
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 from typing import NamedTuple
@@ -28,8 +28,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import Block
 from alphacut.frame.modes.clusters import Subspaces
 from alphacut.frame.modes.structure import ClassicalStructure
-from alphacut.frame.records.history import History
-from alphacut.frame.response.oscillators import Grid
+from alphacut.frame.response.oscillators import Grid, Source
 
 Ends = tuple[float, float]
 """Lower and upper end of a range."""
@@ -38,9 +37,8 @@ Ends = tuple[float, float]
 class Excitation(NamedTuple):
     """What moves a structure, and when its response is wanted."""
 
-    loads: Mapping[str, History]  # histories of loads and forces by name
     time: Array  # time nodes, (T,), in s
-    sources: Sequence[str]  # names of the loads, and "velocity", "start"
+    sources: Sequence[Source]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +77,8 @@ class Oscillator:
             decay=decay,
             quotient=quotient,
             participation=participation,
-            omega_range=_overlap(_range(omega), self.omega_range),
-            quotient_range=_overlap(_range(quotient), self.quotient_range),
+            omega_range=_overlap(range_of(omega), self.omega_range),
+            quotient_range=_overlap(range_of(quotient), self.quotient_range),
         )
 
     def table_cell(self, grid: Grid) -> Ints:
@@ -218,14 +216,14 @@ def oscillators(
         decay = a * 0.5 + b * eigenvalue * 0.5 + ratios[j] * eigenvalue**0.5
         omega = (eigenvalue - decay * decay) ** 0.5
         quotient = decay * omega**-1.0
-        q_low, q_high = _range(quotient)
+        q_low, q_high = range_of(quotient)
         lowest_omega = float(low / np.sqrt(1 + q_high**2))  # ω² = λ / (1 + (g/ω)²)
         oscillator = Oscillator(
             omega=omega,
             decay=decay,
             quotient=quotient,
             participation=factors[j] * structure.output_factors,
-            omega_range=_overlap(_range(omega), (lowest_omega, high)),
+            omega_range=_overlap(range_of(omega), (lowest_omega, high)),
             quotient_range=(max(q_low, 0.0), q_high),
         )
         result.append(oscillator)
@@ -277,7 +275,7 @@ def damped_ranges(
     )
 
 
-def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> TaylorModel:
+def source_patterns(structure: ClassicalStructure, sources: Sequence[Source]) -> TaylorModel:
     """Return the vectors v of sources on the n unknowns, in the order given, shape (sources, n).
 
     v is the initial displacements of "start", the initial velocities of "velocity", the
@@ -286,7 +284,7 @@ def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> Ta
 
     Args:
         structure: The structure as Taylor models over the box.
-        sources: Names of the sources, at least one.
+        sources: The sources, at least one.
 
     Raises:
         KeyError: The structure has no source of a name.
@@ -299,7 +297,7 @@ def source_patterns(structure: ClassicalStructure, sources: Sequence[str]) -> Ta
         "start": displacements,
         **structure.force_accelerations,
     }
-    return concatenate([vectors[name][None] for name in sources], -2)
+    return concatenate([vectors[source.name][None] for source in sources], -2)
 
 
 def column_products(a: TaylorModel, b: TaylorModel) -> TaylorModel:
@@ -307,7 +305,7 @@ def column_products(a: TaylorModel, b: TaylorModel) -> TaylorModel:
     return (a * b).T @ np.ones(a.shape[0])
 
 
-def _range(x: TaylorModel) -> Ends:
+def range_of(x: TaylorModel) -> Ends:
     """Return the range of a scalar Taylor model over the box."""
     low, high = x.bounds()
     return float(low), float(high)

@@ -8,6 +8,7 @@ the response to each load are the parts of the model.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -79,7 +80,13 @@ class ModalModel:
 
     @classmethod
     def of_degree(
-        cls, flow: LinearFlow, boxes: Boxes, degree: int, tolerance: Array | float = 0.0
+        cls,
+        flow: LinearFlow,
+        boxes: Boxes,
+        degree: int,
+        tolerance: Array | float = 0.0,
+        *,
+        fixed: Mapping[str, float] | None = None,
     ) -> ModalModel:
         """Return the model by polynomials of one degree over the widest of some nested boxes.
 
@@ -89,6 +96,7 @@ class ModalModel:
             degree: Total degree of the polynomials.
             tolerance: Modes are left out that are together worth no more than this in each output,
                 shape (m,), or one number for all. At 0 no mode is left out that adds anything.
+            fixed: Values of other parameters by name, where they are not nominal.
 
         Raises:
             UnprovedError: The integrator is not the exact one, the structure is not known to have a
@@ -96,8 +104,8 @@ class ModalModel:
                 one, or the mass may be singular in the box.
             numpy.linalg.LinAlgError: A mode is defective at the midpoint of the box.
         """
-        require_dissipation(exact_flow(flow).system, boxes)
-        structure = DampedStructure.over_box(flow.system, boxes, degree)
+        require_dissipation(exact_flow(flow).system, boxes, fixed)
+        structure = DampedStructure.over_box(flow.system, boxes, degree, fixed)
         loads = list(histories(flow.system).values())
         chosen = needed_modes(structure, loads, flow.time, tolerance)
         return cls.from_modes(flow, boxes, structure, DampedModes.of_structure(structure, chosen))

@@ -28,8 +28,9 @@ from alphacut.frame.modes.truncated_modes import (
     response_of_truncated_modes,
     truncated_modes,
 )
+from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.oscillators import POWERS, feedthrough, read_response
+from alphacut.frame.response.oscillators import POWERS, Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class ModalResponseModels:
 
         Args:
             structure: The structure over the box.
-            excitation: Loads, time nodes and sources.
+            excitation: Time nodes and sources.
             truncation_tolerance: Allowed error of each output by truncated modes, shape (m,). All
                 modes are enclosed, as precisely as possible, unless it is given.
 
@@ -138,7 +139,38 @@ class ModalResponseModels:
         others = truncated_modes(structure, found, participations, rows, patterns, excitation)
         if others is not None:
             truncated.append(others)
+        # The tables of oscillators contain what forces add at once through these.
+        for s, source in enumerate(excitation.sources):
+            if source.is_force and source.load:
+                of_others = _feedthrough_of_others(structure, source, all_oscillators, s)
+                deviation = load_deviation(source.load, excitation.time)
+                interpolation_error = interpolation_error + np.outer(deviation, of_others)
         return cls(all_oscillators, truncated, coupling, interpolation_error)
+
+
+def _feedthrough_of_others(
+    structure: ClassicalStructure, source: Source, enclosed: list[Oscillator], index: int
+) -> Array:
+    """Bound what a unit of a force adds to outputs at once by modes not enclosed one by one, (m,).
+
+    A force acts on accelerations at once, by M⁻¹ b f, of which the participation factors of the
+    oscillators are a part. Bounds of outputs that are no accelerations are 0.
+
+    Args:
+        structure: The structure over the box.
+        source: The force.
+        enclosed: The oscillators.
+        index: Index of the force among the sources.
+    """
+    coefficient = structure.force_accelerations[source.name][None] @ structure.output_rows.T
+    feedthrough = coefficient[0] * structure.output_factors
+    midpoint: Array = feedthrough.value
+    radius = feedthrough.deviation()
+    for mode in enclosed:
+        participation = mode.participation[index]
+        midpoint = midpoint - participation.value
+        radius = radius + participation.deviation()
+    return np.where(structure.derivative_orders == 2, np.abs(midpoint) + radius, 0.0)
 
 
 def inverse_with_rounding(basis: Array, *, like: TaylorModel) -> TaylorModel:
@@ -196,10 +228,10 @@ def required_modes(
         structure: The structure over the box.
         centre: Its mass and stiffness in coordinates that are modal at the midpoint.
         patterns: Vectors of the sources in these coordinates, shape (sources, n).
-        excitation: Loads, time nodes and sources.
+        excitation: Time nodes and sources.
         tolerance: Largest allowed error of each output in its own unit, shape (m,).
     """
-    loads, time, sources = excitation
+    time, sources = excitation
     time = time[:: -(-len(time) // 500)]  # 500 nodes at most, which suffice for an estimate
     eigenvalues = centre.eigenvalues
     n = centre.mode_count
@@ -215,17 +247,17 @@ def required_modes(
     sensitivity = np.zeros((n, len(tolerance)))  # of outputs to ln λ_k
     for s, source in enumerate(sources):
         # ρ and its derivative by σ, (2, modes, T)
-        if source in loads:
-            rho = responses_at_nodes(sigma[:, 0], loads[source], time, 1)[0].swapaxes(1, 2)
+        if source.load:
+            rho = responses_at_nodes(sigma[:, 0], source.load, time, 1).swapaxes(1, 2)
         else:
             rho = np.stack([np.exp(sigma * time), time * np.exp(sigma * time)])
         for o, order in enumerate(structure.derivative_orders):
-            response = read_response(source, sigma, sigma**order * rho[0])
-            response = response + feedthrough(source, loads, int(order), time)
+            response = source.read(sigma, sigma**order * rho[0])
+            response = response + source.feedthrough(int(order), time)
             # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
             largest = np.abs(rho[1]).max(axis=1)
             slope = largest * omega**order / 2
-            if source == "start":  # whose response is not divided by ω
+            if source.is_displacement:  # whose response is not divided by ω
                 slope = slope * omega
             sensitivity[:, o] += np.abs(output_modes[o] * participation[s]) * slope
             errors = [

@@ -19,6 +19,10 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import Assembly, LinearSystem, histories, stack
 
 
+class CoupledModesError(UnprovedError):
+    """Undamped modes do not uncouple a structure or its outputs, and damped ones may do."""
+
+
 @dataclass(frozen=True, eq=False)
 class ClassicalStructure:
     """A structure with classical modes over a box of d inputs; n unknowns, m outputs."""
@@ -183,11 +187,11 @@ def _require_classical(assembly: Assembly[TaylorModel]) -> None:
         UnprovedError: The dashpots or this factor may differ from zero in the box.
     """
     if assembly.dashpots.magnitude().any():
-        raise UnprovedError(
+        raise CoupledModesError(
             "dashpots couple the modes", "give damping ratios or Rayleigh's factors in their place"
         )
     if assembly.weights is not None and assembly.rayleigh[1].magnitude() > 0:
-        raise UnprovedError(
+        raise CoupledModesError(
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
@@ -206,11 +210,11 @@ def _constant_rows(assembly: Assembly[TaylorModel]) -> tuple[Array, Array]:
     """
     if not isinstance(assembly.rows, np.ndarray):
         cure = "take the method proof with few inputs, or leave the overturning moment out"
-        raise UnprovedError("the overturning moment adds storeys by factors of inputs", cure)
+        raise CoupledModesError("the overturning moment adds storeys by factors of inputs", cure)
     displacements, velocities = np.split(assembly.rows, 2, axis=1)
     derivatives = [displacements, velocities, assembly.accelerated]
     taken = np.count_nonzero([rows.any(axis=1) for rows in derivatives], axis=0)
     if (taken > 1).any():
         what = "an output mixes displacements, velocities or accelerations"
-        raise UnprovedError(what, "observe them apart")
+        raise CoupledModesError(what, "observe them apart")
     return displacements, velocities

@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from alphacut.base.arrays import Array
+from alphacut.base.arrays import Array, Ints
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -53,6 +53,7 @@ from alphacut.frame.response.oscillators import (
     POWERS,
     Oscillators,
     Ranges,
+    Source,
     grid_over,
     response_ranges,
 )
@@ -72,6 +73,16 @@ class TruncatedModes:
     # bound of the distance of the response from straight lines between nodes, without what forces
     # add to accelerations at once, (T, m)
     interpolation_error: Array
+
+    def at(self, nodes: Ints | slice, outputs: Ints | slice) -> TruncatedModes:
+        """Return the response at some nodes and for some outputs."""
+        return TruncatedModes(
+            participation=self.participation[:, outputs],
+            amplitude=self.amplitude[:, outputs],
+            response_midpoint=self.response_midpoint[:, outputs][..., nodes],
+            response_radius=self.response_radius[:, outputs][..., nodes],
+            interpolation_error=self.interpolation_error[nodes][:, outputs],
+        )
 
     @property
     def radius(self) -> Array:
@@ -117,7 +128,7 @@ def truncated_modes(
         participations: How each block takes part in the response.
         rows: Rows of the outputs in the coordinates of the modes, shape (m, n).
         patterns: Vectors of the sources in these coordinates, shape (sources, n).
-        excitation: Loads by name, T time nodes and names of the sources.
+        excitation: T time nodes and sources.
 
     Returns:
         None if all modes are enclosed. Else C m(t) ± R r(t) for each source and output:
@@ -158,7 +169,7 @@ def response_of_truncated_modes(
         ranges: Ends of ω = √(λ − g²), in rad/s, and of the quotient of decay g and ω.
         structure: The structure over the box, with m outputs.
         found: The enclosed modes, for the inputs that `sums` are functions of.
-        excitation: Loads by name, T time nodes and names of the sources.
+        excitation: T time nodes and sources.
 
     Returns:
         C m(t) ± R r(t): Taylor models C and R, shape (sources, m), and m and r, shape (sources, m,
@@ -167,7 +178,6 @@ def response_of_truncated_modes(
     responses = response_ranges(
         ranges.omega,
         ranges.quotient,
-        excitation.loads,
         excitation.time,
         excitation.sources,
         structure.distinct_orders,
@@ -437,7 +447,7 @@ def coupling_bounds(
         structure: The structure over the box, with m outputs.
         participation: The block and how it takes part in the response.
         found: All enclosed modes, with ranges of their eigenvalues.
-        excitation: Loads by name, T time nodes and names of the sources.
+        excitation: T time nodes and sources.
 
     Returns:
         `at_nodes`, a bound of what the coupling adds to outputs, and `interpolation_error`, of its
@@ -447,7 +457,7 @@ def coupling_bounds(
     Raises:
         UnprovedError: One of the modes may not oscillate, or N = Xᵀ M X may be singular.
     """
-    loads, time, sources = excitation
+    time, sources = excitation
     factors = _coupling_factors(structure, participation)
     low, high = _eigenvalue_range(participation, found, factors.off_diagonal)
     ranges = damped_ranges(structure, low, high, participation.block.modes)
@@ -461,7 +471,7 @@ def coupling_bounds(
     along_quotient = (max_quotient - min_quotient) * high_omega / spacing
     points = int(np.clip(along_omega, 1, 120)) + 1, int(np.clip(along_quotient, 1, 120)) + 1
     orders = structure.distinct_orders
-    table = Oscillators(grid_over(*ranges, points), loads, time, orders)
+    table = Oscillators(grid_over(*ranges, points), time, orders)
 
     max_sigma = high_omega * float(np.sqrt(1 + max_quotient**2))
     shape = (len(time), len(structure.derivative_orders))
@@ -484,7 +494,7 @@ def coupling_bounds(
             # first is off a line by |a N^-½| |N^½ β| ℓ at most and the second by Σ |a_j β_j| ℓ,
             # hence the coupling by twice `by_range` ℓ; or by twice its own largest value within the
             # step.
-            max_force = loads[source].extremes[0] if source in loads else 0.0
+            max_force = source.load.extremes[0] if source.load else 0.0
             G, G_slope = _largest_within_steps(
                 response.largest, time, max_force=max_force, max_sigma=max_sigma, order=order
             )
@@ -602,7 +612,7 @@ def _largest_within_steps(
 
 
 def response_slopes(
-    source: str, G: Array, G_slope: Array, omega: Array | float, quotient: Array | float
+    source: Source, G: Array, G_slope: Array, omega: Array | float, quotient: Array | float
 ) -> Array:
     """Bound |de/dλ| of the responses e of oscillators by their eigenvalue λ, in the shape of G.
 
@@ -610,14 +620,14 @@ def response_slopes(
     λ − g) ≤ 1, since g′ λ ≤ g, and 2 ω³ |d(g/ω)/dλ| = |2 g′ λ − g| ≤ g.
 
     Args:
-        source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
+        source: The source.
         G: Bounds of |G| = |σ^ν ρ|, of any shape, where ν is the order of the derivative by time and
             ρ the Duhamel integral of the source, or exp(σ t).
         G_slope: Bounds of |dG/dσ|, same shape.
         omega: Smallest ω, in rad/s, positive; a number, or in the shape of G.
         quotient: Largest g/ω, likewise.
     """
-    if source == "start":  # e = Re G + (g/ω) Im G
+    if source.is_displacement:  # e = Re G + (g/ω) Im G
         return (1 + quotient) * G_slope / (2 * omega) + G * quotient / (2 * omega**2)
     # e = ± Im G/ω, with |dω/dλ| ≤ |dσ/dλ|
     return G_slope / (2 * omega**2) + G / (2 * omega**3)

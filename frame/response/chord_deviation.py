@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.records.history import History
 from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 
@@ -89,7 +88,7 @@ class Chords(NamedTuple):
         return np.asarray(bound + np.maximum(bound[self.before], bound[self.after]))
 
 
-def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array, Array]:
+def responses_of(sigma: Array, load: History | None, time: Array) -> Array:
     """Return the Duhamel integral ρ = ∫₀ᵗ exp(σ τ) f(t − τ) dτ with two derivatives by σ.
 
     Args:
@@ -98,7 +97,7 @@ def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array
         time: Time nodes t ≥ 0, rising, shape (T,), in s.
 
     Returns:
-        ρ, dρ/dσ and d²ρ/dσ², shape (3, T, S), and bounds of the rounding of ρ, shape (T, S).
+        ρ, dρ/dσ and d²ρ/dσ², shape (3, T, S).
 
     Raises:
         UnprovedError: An exponent turns too far within a sample interval of the load, or grows too
@@ -106,10 +105,8 @@ def responses_of(sigma: Array, load: History | None, time: Array) -> tuple[Array
     """
     if load is not None:
         return responses_at_nodes(sigma, load, time, 2)
-    # ∂ⁿ exp(σ t)/∂σⁿ = tⁿ exp(σ t). The rounding of σ t shifts exp(σ t) by |σ| t u, relative to
-    # its magnitude; the exponential and the product have 4 roundings of their own at most.
-    rho = np.exp(sigma * time[:, None]) * time[:, None] ** np.arange(3)[:, None, None]
-    return rho, UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(rho[0])
+    # ∂ⁿ exp(σ t)/∂σⁿ = tⁿ exp(σ t)
+    return np.exp(sigma * time[:, None]) * time[:, None] ** np.arange(3)[:, None, None]
 
 
 def moments_of(decay: float, load: History | None, time: Array) -> Array:
@@ -208,14 +205,12 @@ class _Largest:
 
     Attributes:
         amplitude: |F| and |F″| of F = σ^order A, shape (2, P) for P segments.
-        rounding: Bound of the rounding of σ^order ρ, shape (N,) for N ends of segments.
         off: Of H, which is σ^order ρ less the chord of the step: |H|, |H″|, |Im H/ω|, and
             |Im H/ω + f| with the load f, less its chord, before and after each end, shape (5, N).
     """
 
     def __init__(self, segments: int) -> None:
         self.amplitude = np.zeros((2, segments))
-        self.rounding = np.zeros((1, segments + 1))
         self.off = np.zeros((5, segments + 1))
 
 
@@ -226,7 +221,7 @@ def line_deviations(
     orders: Collection[int],
     *,
     is_force: bool = False,
-    at_nodes: tuple[Array, Array, Array] | None = None,
+    at_nodes: tuple[Array, Array] | None = None,
 ) -> dict[int, Array]:
     """Return bounds of the distance of σ^order ρ, and of its imaginary part over ω, from chords.
 
@@ -238,8 +233,8 @@ def line_deviations(
         orders: Powers of σ.
         is_force: Whether the load itself is added to the imaginary part of order 2, as a force is
             part of the relative acceleration.
-        at_nodes: ρ with two derivatives, its rounding, and bounds of its derivatives, where they
-            are known: (3, T, S), (T, S) and (5, T).
+        at_nodes: ρ with two derivatives, and bounds of its derivatives, where they are known: (3,
+            T, S) and (5, T).
 
     Returns:
         For each order bounds in the step that ends at each node, shape (2, T): of the modulus, then
@@ -261,7 +256,7 @@ def line_deviations(
     if at_nodes is None:
         bounds = moments_of(decay, load, times)
     else:
-        bounds = at_nodes[2]
+        bounds = at_nodes[1]
 
     # The load that is added, less its chord, before and after each end. Even where it vanishes at
     # all these ends, the load differs from lines by `pieces.bend`.
@@ -274,18 +269,15 @@ def line_deviations(
     for batch in _batches(len(times), sigma.size):
         points = sigma.ravel()[batch]
         if at_nodes is None:
-            rho, error = responses_of(points, load, times)
+            rho = responses_of(points, load, times)
         else:
             rho = at_nodes[0][..., batch]
-            error = at_nodes[1][..., batch]
         A = rho[:, :-1]
         if load is not None:
             A = A + _of_line(points, pieces.first, slope)
         for order in orders:
             F, _, F2 = with_power(points, A, order)
             _raise_to(largest[order].amplitude, F, F2)
-            rounding = _error_with_power(points, rho[0], error, order)
-            _raise_to(largest[order].rounding, rounding)
         if not is_inside.any():
             continue
         off_chords = chords.deviations(rho)
@@ -317,9 +309,6 @@ def line_deviations(
         fourth_off = np.minimum(chords.with_ends(fourth), of_chords)
         missed = is_inside * between * (second + between * fourth_off)
         missed_imaginary = (missed + is_inside * h_omega * imaginary) / low
-        (error,) = largest[order].rounding
-        error = np.maximum(error, chords.with_ends(error) - error)
-        curved += 4 * np.maximum(error[:-1], error[1:])
         curved_imaginary = curved / low + 0.0 * pieces.bend
         if is_added[order]:
             curved_imaginary = curved / low + pieces.bend
@@ -400,12 +389,6 @@ def _of_line(sigma: Array, first: Array, slope: Array) -> Array:
         [2 * (1 / sigma**3), 6 * (1 / sigma**4)],
     ]
     return np.asarray(np.stack([first, slope], 1) @ np.array(by_order))
-
-
-def _error_with_power(sigma: Array, rho: Array, error: Array, order: int) -> Array:
-    """Return a bound of the rounding of σ^order ρ from that of ρ, shape (T, S) like both."""
-    relative = 2 * (order + 9) * UNIT_ROUNDOFF
-    return np.asarray(np.abs(sigma) ** order * (error + relative * np.abs(rho)))
 
 
 def _raise_to(largest: Array, *values: Array) -> None:

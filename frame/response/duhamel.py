@@ -9,9 +9,7 @@ Over a time h in which the load f is linear with slope s and has the value a at 
     ρ(t + h) = exp(σ h) ρ(t) + a J₀ − s J₁,    J_n = ∫₀ʰ τⁿ exp(σ τ) dτ
 
 exactly (Clough, Penzien 1993, chapter 7). The derivatives by σ follow likewise. Time nodes lie
-anywhere; samples of the load need not be nodes. `_respond` is the one recursion over a load. A
-bound of its rounding is carried beside the values (running error analysis, Higham 2002, section
-3.3).
+anywhere; samples of the load need not be nodes. `_respond` is the one recursion over a load.
 
 With z = σ h and φ_n(z) = ∫₀¹ sⁿ exp(z s) ds, J_n = hⁿ⁺¹ φ_n(z), and integration by parts gives
 
@@ -44,8 +42,6 @@ FROM_RECURRENCE = 2.0
 """|z| from which the recurrence is used. It amplifies rounding by 3!/2³ there, the series by e²."""
 MAX_PHASE = 1e8
 """Largest |σ h|: beyond, the rounding of the phase σ h alone passes 1e-8."""
-ERROR_OF_INTEGRALS = 12.0
-"""Bound of the error of φ_n at small |z| and Re z ≤ 0, in units of u / (n + 1); tests reach 6."""
 
 Orders = Array
 """An empty array whose number of dimensions says how many orders of derivatives are wanted, order 0
@@ -64,8 +60,6 @@ class LinearPieces(NamedTuple):
         interval: Index of the interval of each node, rising, shape (T,).
         offsets: Distinct times from the beginning of an interval to a node in it, shape (P,), in s.
         offset: Index among `offsets` for each node, shape (T,).
-        time_rounding: Bound of the rounding of each node's time since its interval began, shape
-            (T,), in s.
     """
 
     first: Array
@@ -74,7 +68,6 @@ class LinearPieces(NamedTuple):
     interval: Ints
     offsets: Array
     offset: Ints
-    time_rounding: Array
 
 
 def linear_pieces(history: History, time: Array) -> LinearPieces:
@@ -92,7 +85,7 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
         For I intervals the load at the beginning, `first`, and at the end, `last`, of each (I,),
         and the `step` in s; for each node the index of its interval, `interval` (T,), and the index
         `offset` (T,) of its time since that interval began in the list `offsets` (P,) of all such
-        times; and `time_rounding`, a bound of what these times miss (T,), in s.
+        times.
     """
     samples = history.samples
     step = history.step
@@ -120,9 +113,7 @@ def linear_pieces(history: History, time: Array) -> LinearPieces:
     offset[order] = np.cumsum(is_new) - 1
     offsets = since[order][is_new]
     offsets[offsets <= same] = 0.0
-    # A node is moved to the offset that it shares with others, by what they differ by.
-    time_rounding = np.abs(since - offsets[offset]) + UNIT_ROUNDOFF * time
-    return LinearPieces(first[:count], last[:count], step, interval, offsets, offset, time_rounding)
+    return LinearPieces(first[:count], last[:count], step, interval, offsets, offset)
 
 
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
@@ -138,7 +129,7 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
     """
     load = linear_pieces(history, time)
     out: Array = np.empty((5, len(time)))
-    _absolute_moments(load, load.offsets[load.offset] + load.time_rounding, decay, out)
+    _absolute_moments(load, load.offsets[load.offset], decay, out)
     return out
 
 
@@ -213,7 +204,7 @@ def responses_at_nodes(
     *,
     node: Ints | None = None,
     window: int | None = None,
-) -> tuple[Array, Array]:
+) -> Array:
     """Return ρ(σ; t) = ∫ exp(σ τ) f(t − τ) dτ at time nodes t, with derivatives by σ.
 
     Args:
@@ -227,8 +218,7 @@ def responses_at_nodes(
             the window before. Otherwise they all begin at t = 0.
 
     Returns:
-        ρ and its derivatives, shape (1 + derivatives, T or N, S), and a bound of the rounding of
-        ρ alone, shape (T or N, S).
+        ρ and its derivatives, shape (1 + derivatives, T or N, S).
 
     Raises:
         UnprovedError: A σ is out of range, as `require_in_range` says.
@@ -241,28 +231,14 @@ def responses_at_nodes(
         g = replace(history, frequency=0.0)
         lower: Any = sigma - 1j * omega
         upper: Any = sigma + 1j * omega
-        minus, minus_rounding = responses_at_nodes(
-            lower, g, time, derivatives, node=node, window=window
-        )
-        plus, plus_rounding = responses_at_nodes(
-            upper, g, time, derivatives, node=node, window=window
-        )
+        minus = responses_at_nodes(lower, g, time, derivatives, node=node, window=window)
+        plus = responses_at_nodes(upper, g, time, derivatives, node=node, window=window)
         t = times[:, None]
         angle = omega * (t - history.start) + history.phase
         phasor = np.exp(1j * angle)
-        # the sum and its factors have 8 roundings, besides that of the angle
-        size = np.abs(minus[0]) + np.abs(plus[0])
-        # Rounding of an exponent changes ρ by |ρ′| ≤ t ∫ |g| exp(Re σ τ) dτ, t the elapsed time.
-        elapsed = times[:, None]
-        if window and node is None:
-            elapsed = _time_in_window(time, window)[:, None]
-        slope = np.exp(np.maximum(sigma.real * elapsed, 0.0)) * history.extremes[0] * elapsed**2
-        rounding = (8 + np.abs(angle)) * size + (np.abs(sigma) + omega) * slope
-        error = (minus_rounding + plus_rounding) / 2 + UNIT_ROUNDOFF * rounding
-        return (phasor * minus - phasor.conj() * plus) / 2j, error
+        return np.asarray((phasor * minus - phasor.conj() * plus) / 2j)
     length = len(time)
     longest = float(time[-1])
-    sample_roundings = 0.0
     if window:
         length = window
         longest = float(time[min(window, len(time) - 1)] - time[0])
@@ -273,35 +249,17 @@ def responses_at_nodes(
             places = np.arange((len(samples) - 1) * divisions + 1) / divisions
             resampled = np.interp(places, np.arange(len(samples)), samples)
             history = replace(history, step=history.step / divisions, samples=resampled)
-            # Roundings of a sample, relative to the largest one: its place and the new step, which
-            # move it by u t in its slope of at most 2/step, and the interpolation.
-            sample_roundings = 8 + 4 * float(time[-1]) / history.step
     # a mode that grows is integrated over a window, or over an interval if that is longer
     require_in_range(sigma, history.step, max(history.step, longest))
     out = np.empty((1 + derivatives, len(times), sigma.shape[-1]), complex)
-    error = np.empty(out.shape[1:])
     pieces = linear_pieces(history, time)
     orders = np.zeros((0,) * (1 + derivatives))
     with PARALLEL_LOOP:
         if node is None:
-            _respond_at_nodes(sigma, pieces, orders, length, out, error)
+            _respond_at_nodes(sigma, pieces, orders, length, out)
         else:
-            _respond_at_given(sigma, pieces, orders, node, out, error)
-    if sample_roundings and node is None:
-        # ∫ |δf| exp(Re σ τ) dτ over the time since the window began
-        elapsed = _time_in_window(time, length)[:, None]
-        grown = np.exp(np.maximum(sigma.real * elapsed, 0.0))
-        error += UNIT_ROUNDOFF * sample_roundings * history.extremes[0] * elapsed * grown
-    return out, error
-
-
-def _time_in_window(time: Array, window: int) -> Array:
-    """Return the time from the beginning of its window to each of T nodes, shape (T,), in s.
-
-    Windows begin at each `window`-th node, which itself belongs to the window before.
-    """
-    begin = np.maximum(np.arange(len(time)) - 1, 0) // window * window
-    return np.asarray(time - time[begin])
+            _respond_at_given(sigma, pieces, orders, node, out)
+    return out
 
 
 def require_in_range(sigma: Array, step: float, duration: float) -> None:
@@ -328,7 +286,7 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
 
 @parallel
 def _respond_at_nodes(
-    sigma: Array, load: LinearPieces, orders: Orders, length: int, out: Array, error: Array
+    sigma: Array, load: LinearPieces, orders: Orders, length: int, out: Array
 ) -> None:
     """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, for S exponents at all T time nodes.
 
@@ -339,7 +297,6 @@ def _respond_at_nodes(
             derivatives that are written, order 0 included.
         length: Nodes in a window; integrals begin anew after the last node of each window.
         out: Overwritten with ρ and derivatives, shape (orders, T, S).
-        error: Overwritten with bounds of the rounding of ρ, shape (T, S).
     """
     for s in prange(len(sigma)):
         factors = _propagators(sigma[s], load.offsets)
@@ -351,15 +308,14 @@ def _respond_at_nodes(
                 start = (load.interval[node], load.offset[node])  # it begins at this node
                 first = node + 1
             inside = slice(first, node + length + 1)
-            nodes = load.interval[inside], load.offset[inside], load.time_rounding[inside]
+            nodes = load.interval[inside], load.offset[inside]
             rho = out[:, inside, s]
-            rounding = error[inside, s]
-            _respond(sigma[s], load, orders, nodes, load.offsets, factors, start, rho, rounding)
+            _respond(sigma[s], load, orders, nodes, load.offsets, factors, start, rho)
 
 
 @parallel
 def _respond_at_given(
-    sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array, error: Array
+    sigma: Array, load: LinearPieces, orders: Orders, node: Ints, out: Array
 ) -> None:
     """Write ρ = ∫ exp(σ τ) f(t − τ) dτ and derivatives by σ, for rows of exponents at a node each.
 
@@ -372,17 +328,15 @@ def _respond_at_given(
             derivatives that are written, order 0 included.
         node: Index of the time node of each row, shape (N,).
         out: Overwritten with ρ and derivatives, shape (orders, N, S).
-        error: Overwritten with bounds of the rounding of ρ, shape (N, S).
     """
     for s in prange(len(sigma)):
         here = slice(node[s], node[s] + 1)
         offsets = load.offsets[load.offset[node[s]] : load.offset[node[s]] + 1]
-        nodes = load.interval[here], np.zeros(1, np.int64), load.time_rounding[here]
+        nodes = load.interval[here], np.zeros(1, np.int64)
         for k in range(sigma.shape[1]):
             factors = _propagators(sigma[s, k], offsets)
             rho = out[:, s : s + 1, k]
-            rounding = error[s : s + 1, k]
-            _respond(sigma[s, k], load, orders, nodes, offsets, factors, (0, -1), rho, rounding)
+            _respond(sigma[s, k], load, orders, nodes, offsets, factors, (0, -1), rho)
 
 
 @compiled
@@ -390,12 +344,11 @@ def _respond(
     sigma: complex,
     load: LinearPieces,
     orders: Orders,
-    nodes: tuple[Ints, Ints, Array],
+    nodes: tuple[Ints, Ints],
     offsets: Array,
-    factors: tuple[Array, Array, Array],
+    factors: tuple[Array, Array],
     start: tuple[int, int],
     out: Array,
-    error: Array,
 ) -> None:
     """Write ρ and derivatives for one exponent at N nodes, interval by interval of the load.
 
@@ -403,31 +356,25 @@ def _respond(
         sigma: The exponent.
         load: The load.
         orders: Says how many orders of derivatives are written.
-        nodes: Interval, index among `offsets`, and rounding of the time, of each node.
+        nodes: Interval, and index among `offsets`, of each node.
         offsets: Times from the beginning of an interval to nodes in it, shape (P,).
         factors: `_propagators` of these offsets.
         start: Where the integral begins: an interval, and an index among `offsets` or −1 for the
             beginning of the interval.
         out: Receives ρ and derivatives, shape (orders, N).
-        error: Receives bounds of the rounding of ρ, shape (N,).
     """
-    interval, offset, time_rounding = nodes
-    turns, integrals, roundings = factors
+    interval, offset = nodes
+    turns, integrals = factors
     h = load.step
-    rate = abs(sigma.real) + abs(sigma.imag)
-    E, J, U = _propagators(sigma, np.array([h]))
+    E, J = _propagators(sigma, np.array([h]))
     e = E[0]
     J0 = J[0, 0]
     J1 = J[0, 1]
     J2 = J[0, 2]
     J3 = J[0, 3]
-    of_product = U[0, 0]
-    of_integrals = U[0, 1]
-    decay = U[0, 2]
     # ρ and its derivatives a time `since` after the beginning of the interval, less what f adds
     # between the beginning and that time
     r0 = r1 = r2 = 0.0 + 0.0j
-    rounding = 0.0
     node = 0
     since = 0.0
     begin, j = start
@@ -439,7 +386,6 @@ def _respond(
         r0 = slope * P[1] - a * P[0]
         r1 = slope * P[2] - a * P[1]
         r2 = slope * P[3] - a * P[2]
-        rounding = roundings[j, 1] * (abs(a) + abs(slope) * since / 2)
     # ρ(t + h) = exp(σ h) ρ(t) + a J₀ − slope J₁; derivatives by σ follow from the product rule, in
     # which ∂J_n/∂σ = J_{n+1}
     for i in range(begin, interval[-1] + 1):
@@ -449,26 +395,12 @@ def _respond(
             x = offsets[j]
             w = turns[j]
             P = integrals[j]
-            u = roundings[j]
             a = load.first[i] + slope * x
             elapsed = x
-            fading = u[2]
-            of_difference = 0.0
             if since > 0:
                 elapsed -= since
                 w = np.exp(sigma * elapsed)
-                fading = abs(w)
-                of_difference = UNIT_ROUNDOFF * rate * elapsed  # of x − since in the exponent
-            free = w * r0
-            value = free + a * P[0] - slope * P[1]
-            node_rounding = fading * rounding
-            node_rounding += (u[0] + of_difference) * (abs(free.real) + abs(free.imag))
-            node_rounding += u[1] * (abs(a) + abs(slope) * x / 2)
-            size = abs(value.real) + abs(value.imag)
-            # |dρ/dt| ≤ |σ ρ| + |a|
-            node_rounding += time_rounding[node] * (rate * size + abs(a))
-            out[0, node] = value
-            error[node] = node_rounding
+            out[0, node] = w * r0 + a * P[0] - slope * P[1]
             if orders.ndim > 1:
                 out[1, node] = w * (r1 + elapsed * r0) + a * P[1] - slope * P[2]
             if orders.ndim > 2:
@@ -478,28 +410,20 @@ def _respond(
         a = load.last[i]
         elapsed = h
         w = e
-        fading = decay
-        of_difference = 0.0
         if since > 0:
             elapsed -= since
             w = np.exp(sigma * elapsed)
-            fading = abs(w)
-            of_difference = UNIT_ROUNDOFF * rate * elapsed
             since = 0.0
         if orders.ndim > 2:
             second = r2 + 2 * elapsed * r1 + elapsed * elapsed * r0
             r2 = w * second + a * J2 - slope * J3
         if orders.ndim > 1:
             r1 = w * (r1 + elapsed * r0) + a * J1 - slope * J2
-        r0 = w * r0
-        rounding = fading * rounding
-        rounding += (of_product + of_difference) * (abs(r0.real) + abs(r0.imag))
-        rounding += of_integrals * (abs(a) + abs(slope) * h / 2)
-        r0 += a * J0 - slope * J1
+        r0 = w * r0 + a * J0 - slope * J1
 
 
 @compiled
-def _propagators(sigma: complex, times: Array) -> tuple[Array, Array, Array]:
+def _propagators(sigma: complex, times: Array) -> tuple[Array, Array]:
     """Return the factors of ρ(t + x) = exp(σ x) ρ(t) + a J₀ − slope J₁ for P times x.
 
     ρ is the Duhamel integral of a load that is linear over x, with this slope and the value a at
@@ -510,24 +434,15 @@ def _propagators(sigma: complex, times: Array) -> tuple[Array, Array, Array]:
         times: x, shape (P,), in s.
 
     Returns:
-        The factors exp(σ x), shape (P,); the integrals J_n, n = 0 … 3, shape (P, 4); and an array
-        of shape (P, 3) with the rounding relative to |exp(σ x) ρ|, the rounding in s that is to be
-        multiplied by |a|, and |exp(σ x)|.
+        The factors exp(σ x), shape (P,), and the integrals J_n, n = 0 … 3, shape (P, 4).
     """
-    # in units of u, besides |σ x|: 3 of exp, √5 of the complex product, 2 of the sums
-    error_of_propagator = 8.0
     factors: Array = np.empty(len(times), np.complex128)
     integrals: Array = np.empty((len(times), 4), np.complex128)
-    rounding: Array = np.empty((len(times), 3))
-    rate = abs(sigma.real) + abs(sigma.imag)
     for j in range(len(times)):
         x = times[j]
         factors[j] = np.exp(sigma * x)
         step_integrals(sigma, x, integrals[j])
-        rounding[j, 0] = UNIT_ROUNDOFF * (error_of_propagator + rate * x)
-        rounding[j, 1] = error_of_integrals(sigma, x)
-        rounding[j, 2] = abs(factors[j])
-    return factors, integrals, rounding
+    return factors, integrals
 
 
 @compiled
@@ -558,23 +473,3 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
     for n in range(1, 4):
         integral = (grown - n * integral) / z
         out[n] = integral * h ** (n + 1)
-
-
-@compiled
-def error_of_integrals(sigma: complex, h: float) -> float:
-    """Return one bound, in s, of the rounding of both J₀ and 2 J₁/h, J_n = ∫₀ʰ τⁿ exp(σ τ) dτ.
-
-    It belongs to the values of `step_integrals`, and is 0 for h = 0. Bounds are a few units of
-    rounding times h, times exp(Re σ h) where this grows.
-
-    Args:
-        sigma: σ, in 1/s: |σ h| ≤ 1e8 and Re σ h ≤ 700.
-        h: In s.
-    """
-    size = abs(sigma) * h
-    growth = sigma.real * h
-    factor = 1.0
-    if size >= FROM_RECURRENCE:  # below, `step_integrals` takes the power series
-        # rounding of exp(z), whose phase is rounded by u |z|, and of sums, both divided by |z|
-        factor = min(1.0, np.exp(min(growth, 0.0)) / 4 + 4 / size)
-    return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * factor * np.exp(max(growth, 0.0))

@@ -64,8 +64,7 @@ def filtered_record(
     kappa = omega**2 / sigma.imag
     h = ground.step / substeps
     time = h * np.arange(ceil(duration / h) + 2, dtype=float)
-    states, rounding = responses_at_nodes(np.array([sigma]), ground, time)
-    rho = states[0, :, 0]
+    rho = responses_at_nodes(np.array([sigma]), ground, time)[0, :, 0]
     # Where the record begins or ends with a jump, a node has a value before and one behind it.
     behind = ground.values(time)
     before = ground.before(time)
@@ -92,12 +91,12 @@ def filtered_record(
     magnitude, slope = ground.extremes
     largest_rho = float(np.abs(rho).max()) + h * magnitude
     jerk = kappa * omega**2 * (omega * largest_rho + magnitude) + omega**2 * slope
-    # Rounding: the bound of that of ρ enters each term with powers of Ω h; sums of N numbers have
-    # N − 1 roundings; 32 are more than any other term has.
+    # Rounding matters here, since D is a small difference: that of ρ, some units for each interval
+    # of the record, enters each term with powers of Ω h; sums of N numbers have N − 1 roundings.
     growth = kappa * np.exp(omega * h) / omega
     of_sums = h * (np.abs(samples).sum() + growth * (np.abs(behind) + np.abs(before)).sum())
-    roundings = growth * float(rounding.max())
-    roundings += UNIT_ROUNDOFF * (len(time) * of_sums + 32 * growth * (largest_rho + magnitude * h))
+    of_responses = (32 + 8 * len(ground.samples)) * growth * (largest_rho + magnitude * h)
+    roundings = UNIT_ROUNDOFF * (len(time) * of_sums + of_responses)
     error = float(np.abs(coefficients).max()) + h**4 / 24 * jerk + roundings
     return FilteredRecord(Accelerogram(h, samples, name=ground.name), error * (1 + 1e-9))
 

@@ -33,11 +33,10 @@ from numpy.typing import NDArray
 from alphacut.base.arrays import Ints
 from alphacut.base.kernels import compiled
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.records.history import History
-from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
+from alphacut.frame.response.duhamel import responses_at_nodes
 
 Complex = NDArray[np.complex128]
 REACH = 6.0
@@ -84,75 +83,34 @@ class LoadTable:
         # tuned: the terms |z|ⁿ/n! fall from n = e |z| on, and what is left out is `truncation`
         order = ceil(2.72 * radius + 18)
         self.midpoint = midpoint
-        self.max_rate = abs(midpoint) + deviation
         self.scale = 1 / (length * h)
         self.time = time
         self.ends = np.arange(length, steps, length)
         self.truncation = np.array([2 * _exponential_tail(radius, order - q) for q in range(3)])
         # Taylor coefficients, (T, order), by Cauchy's integral over that circle (a Fourier series)
         rate = midpoint + radius * self.scale * np.exp(2j * np.pi / order * np.arange(order))
-        (values,), rounding = responses_at_nodes(rate, history, time, window=length)
+        (values,) = responses_at_nodes(rate, history, time, window=length)
         self.moment = np.fft.fft(values, axis=1) / order / radius ** np.arange(order)
 
-        # The points of the circle are rounded: in x they are off by u (|midpoint| L + 8 r) at most.
-        # There |dF/dx| ≤ ∫ |a| exp(Re midpoint τ) dτ max(1, exp(Re x)).
-        integral = absolute_moments(-midpoint.real, history, time)[0]
-        growth = np.exp(np.maximum(rate.real - midpoint.real, 0.0) / self.scale)
-        of_points = UNIT_ROUNDOFF * (abs(midpoint) / self.scale + 8 * radius)
-        error = rounding + of_points * np.outer(integral, growth)
-        # The Fourier transform adds γ Σ_j |F_j| to each sum of N terms at most, in whatever order
-        # it forms them (Higham 2002, section 3.1; 4 N + 40 is more roundings than any path of a
-        # term has). Horner's scheme has 4 rounded operations for each coefficient on any path, and
-        # x has 3 roundings, each of which counts i times in x^i.
-        of_transform = gamma(4 * order + 40) * np.sqrt(order) + gamma(8 * order + 40)
-        root_mean_square = np.sqrt(np.mean(error**2, axis=1))
-        root_mean_square += of_transform * np.sqrt(np.mean(np.abs(values) ** 2, axis=1))
-        # rounding of the series and of its derivatives by λ within the windows, (3, T)
-        self.rounding_in_windows = np.stack(
-            [
-                _norm_of_powers(order, q) / (radius * self.scale) ** q * root_mean_square
-                for q in range(3)
-            ]
-        )
-
-    def errors(self, waves: Array, growth: float) -> Array:
-        """Bound truncation and rounding of R, dR/dλ and d²R/dλ² in `response`, shape (3, T).
-
-        At the end t_w of a window R and its derivatives have errors E_p. A time τ later exp(λ τ) R
-        has contributed Σ_q binomial(p, q) τ^(p − q) E_q exp(Re λ τ) to the error of the p-th
-        derivative, and the series of the next window its own error.
+    def errors(self, waves: Array) -> Array:
+        """Bound what the series miss of R, dR/dλ and d²R/dλ² in `response`, shape (3, T).
 
         Args:
-            waves: Bounds of |∂^r R/∂λ^r|, ∫ τ^r exp(growth τ) |a(t − τ)| dτ, in row r = 0, 1, 2;
-                further rows are not used. Shape (3 or more, T).
-            growth: Upper bound of Re λ over the eigenvalues and of Re midpoint, in 1/s, with which
-                `waves` are formed.
+            waves: Bounds of |∂^r R/∂λ^r|, ∫ τ^r exp(g τ) |a(t − τ)| dτ with an upper bound g of Re
+                λ over the eigenvalues and of Re midpoint, in row r = 0, 1, 2; further rows are not
+                used. Shape (3 or more, T).
         """
-        # A node belongs to the window that begins at the last one of `begins` before it.
-        begins = np.append(0, self.ends)
-        window = np.maximum(np.searchsorted(begins, np.arange(len(self.time))) - 1, 0)
-        tau = self.time - self.time[begins[window]]
-        # Rounding of exp(λ τ), whose exponent has two rounded factors, and of what it multiplies,
-        # relative to these products. They are at most `waves`.
-        relative = UNIT_ROUNDOFF * (24 + 4 * self.max_rate * tau)
-        own = relative * waves[:3] + self.rounding_in_windows
-        factor = (1 + relative) * np.exp(growth * tau)
-        at_begin: Array = np.zeros((3, len(begins)))
-        for k, end in enumerate(self.ends):
-            carried = _shifted(at_begin[:, k], tau[end])
-            at_begin[:, k + 1] = factor[end] * carried + own[:, end]
-        errors = factor * _shifted(at_begin[:, window], tau) + own
-        # What the series of a window leave out is carried on likewise. The time since the end of
-        # the window is less than t − s for each a(s) in it, so that all windows together leave out
-        # at most Σ_q binomial(p, q) truncation[q] L^q ∫ (t − s)^(p − q) |a(s)| exp(g (t − s)) ds,
-        # g = `growth`.
+        # What the series of a window leave out is multiplied by exp(λ τ) later. The time since the
+        # end of the window is less than t − s for each a(s) in it, so that all windows together
+        # leave out at most Σ_q binomial(p, q) truncation[q] L^q ∫ (t − s)^(p − q) |a(s)| exp(g (t −
+        # s)) ds.
         length = 1 / self.scale
+        errors: Array = np.zeros((3, len(self.time)))
         for p in range(3):
             for q in range(p + 1):
                 truncated = self.truncation[q] * length**q * waves[p - q]
                 errors[p] += comb(p, q) * truncated
-        # with the rounding of these bounds themselves
-        return np.asarray((1 + 1e-9) * errors)
+        return errors
 
     def response(self, rate: Array, node: Ints) -> Array:
         """Return R = ∫ exp(λ (t − s)) a(s) ds, dR/dλ, d²R/dλ² for N eigenvalues and nodes.
@@ -206,18 +164,14 @@ class LoadTables:
             tables.append(table)
         return tables
 
-    def errors(self, waves: Array, growth: Array) -> Array:
+    def errors(self, waves: Array) -> Array:
         """Bound the errors of R, dR/dλ and d²R/dλ² as `response` returns them, shape (3, T, n).
 
         Args:
             waves: Bounds of |∂^r R/∂λ^r| at T nodes for n modes, r = 0, 1, 2, shape (3 or more, T,
                 n).
-            growth: Upper bounds of Re λ_k over a box about the midpoint, with which they are
-                formed, shape (n,), in 1/s.
         """
-        of_modes = [
-            table.errors(waves[:, :, k], float(growth[k])) for k, table in enumerate(self.tables)
-        ]
+        of_modes = [table.errors(waves[:, :, k]) for k, table in enumerate(self.tables)]
         return np.stack(of_modes, axis=-1)
 
     def at_nodes(self, rate: Array) -> Array:
@@ -225,7 +179,7 @@ class LoadTables:
 
         It is computed without the tables, and its rounding is not bounded by `errors`.
         """
-        (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
+        (driven,) = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
         return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
 
     def response(self, rate: Array, node: Ints) -> Array:
@@ -254,22 +208,9 @@ class Direct(LoadTables):
     R of the first mode is a(t), and R of all others is zero.
     """
 
-    def errors(self, waves: Array, growth: Array) -> Array:
-        """Bound the rounding of a(t) at T nodes, shape (3, T, n): zero for derivatives by λ.
-
-        Args:
-            waves: Not used.
-            growth: Not used.
-        """
-        load = self.history
-        # The place between two samples is off by some u t/step. The line between them turns this
-        # into at most twice as much times the largest sample. The phase of a sine has the rounding
-        # of Ω t.
-        turned = load.frequency * self.time + abs(load.phase)
-        roundings = 16 + 4 * self.time / load.step + 4 * turned
-        errors: Array = np.zeros((3, *waves.shape[1:]))
-        errors[0, :, 0] = UNIT_ROUNDOFF * roundings * load.extremes[0]
-        return errors
+    def errors(self, waves: Array) -> Array:
+        """Return zeros, shape (3, T, n): a(t) has no error."""
+        return np.zeros((3, *waves.shape[1:]))
 
     def at_nodes(self, rate: Array) -> Array:
         """Return these R at all T nodes for S sets of eigenvalues: shape (S, T, n)."""
@@ -291,25 +232,6 @@ def _exponential_tail(radius: float, order: int) -> float:
     """
     first = exp(order * log(radius) - lgamma(order + 1))
     return (1 + 1e-9) * first / (1 - radius / (order + 1))
-
-
-def _norm_of_powers(order: int, q: int) -> float:
-    """Return √(Σ_i (i (i − 1) … (i − q + 1))²) over i < order: of the q-th derivatives of x^i."""
-    i = np.arange(order, dtype=float)
-    factors = np.prod([i - k for k in range(q)], axis=0) * np.ones(order)
-    return float(np.linalg.norm(factors))
-
-
-def _shifted(errors: Array, tau: Array) -> Array:
-    """Return Σ_q binomial(p, q) τ^(p − q) E_q for p = 0, 1, 2, shape (3, …).
-
-    Args:
-        errors: E, shape (3, …).
-        tau: τ, shape (…), in s.
-    """
-    value, slope, curvature = errors
-    bent = curvature + 2 * tau * slope + tau**2 * value
-    return np.stack([value, slope + tau * value, bent])
 
 
 @compiled

@@ -30,7 +30,6 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.records.history import History
 from alphacut.frame.response.chord_deviation import (
     fourth_derivative,
@@ -39,10 +38,61 @@ from alphacut.frame.response.chord_deviation import (
     responses_of,
     with_power,
 )
-from alphacut.frame.response.duhamel import absolute_moments, require_in_range
+from alphacut.frame.response.duhamel import require_in_range
 
 POWERS = (0.0, 0.5, 1.0)
 """Powers κ of λ in `response_ranges`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """What moves oscillators, and how their response e is read from G = σ^ν ρ.
+
+    Args:
+        name: Name, for the vector on the unknowns that belongs to it.
+        load: History f of ρ = ∫ exp(σ (t − s)) f(s) ds; None for an initial state, ρ = exp(σ t).
+        is_displacement: Whether e is Re G + (g/ω) Im G, as after an initial displacement; if not,
+            it is sign · Im G/ω.
+        sign: −1 for an acceleration a of the ground, which acts as −M ι a; else 1.
+        is_force: Whether f itself is part of the response with ν = 2.
+    """
+
+    name: str
+    load: History | None = None
+    is_displacement: bool = False
+    sign: float = 1.0
+    is_force: bool = False
+
+    @classmethod
+    def named(cls, name: str, load: History | None = None) -> Source:
+        """Return the source with a name of `structures.linear.histories`, "velocity" or "start"."""
+        return cls(
+            name,
+            load,
+            is_displacement=name == "start",
+            sign=-1.0 if name == "load" else 1.0,
+            is_force=name.startswith("force"),
+        )
+
+    def read(self, sigma: Array, G: Array) -> Array:
+        """Return the responses e of oscillators from G = σ^ν ρ, without feedthrough.
+
+        Args:
+            sigma: σ = −g + iω of the oscillators, ω > 0, of any shape S.
+            G: Complex, shape (…, *S).
+
+        Returns:
+            Real numbers of the shape of G.
+        """
+        if self.is_displacement:
+            return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
+        return np.asarray(self.sign * G.imag / sigma.imag)
+
+    def feedthrough(self, order: int, time: Array) -> Array:
+        """Return the direct feedthrough f(t) of a force to accelerations, else zeros, (T,)."""
+        if self.is_force and order == 2 and self.load is not None:
+            return self.load.values(time)
+        return np.zeros_like(time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +101,7 @@ class ModalResponses:
 
     Args:
         value: Responses at the points of the grid, shape (T, Q, W).
-        error: Bound of their distance from bilinear interpolation in the grid's cells, with
-            rounding, shape (T,).
+        error: Bound of their distance from bilinear interpolation in the grid's cells, shape (T,).
         line_deviation: Bound of their distance, between two nodes, from the chord of the step that
             ends at each node, shape (T,).
         largest: Bounds of |G| and |G′| over the whole grid, shape (2, T).
@@ -107,12 +156,11 @@ def grid_over(
 class _Table(NamedTuple):
     """ρ of a source on a grid of S points at T nodes.
 
-    `rho` holds ρ and two derivatives by σ, shape (3, T, S); `rounding` bounds the rounding of ρ,
-    shape (T, S); `bounds` bounds the derivatives of ρ of orders 0 to 4 over the grid, shape (5, T).
+    `rho` holds ρ and two derivatives by σ, shape (3, T, S); `bounds` bounds the derivatives of ρ of
+    orders 0 to 4 over the grid, shape (5, T).
     """
 
     rho: Array
-    rounding: Array
     bounds: Array
 
 
@@ -121,7 +169,6 @@ class Oscillators:
 
     Args:
         grid: The oscillators.
-        loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
         orders: Orders ν of the derivatives by time that are asked for.
 
@@ -129,88 +176,66 @@ class Oscillators:
         UnprovedError: An oscillator is out of range, as `require_in_range` says.
     """
 
-    def __init__(
-        self, grid: Grid, loads: Mapping[str, History], time: Array, orders: Collection[int]
-    ) -> None:
+    def __init__(self, grid: Grid, time: Array, orders: Collection[int]) -> None:
         self.grid = grid
-        self.loads = loads
         self.time = time
         self.orders = orders
-        self._deviations = dict[str, dict[int, Array]]()
+        self._deviations = dict[tuple[History | None, bool], dict[int, Array]]()
         sigma = grid.sigma.ravel()
         duration = float(time[-1])
         require_in_range(sigma, duration, duration)
         self.decay = float((grid.quotient[:, None] * grid.omega).min())
-        self._tables = dict[str, _Table]()
+        self._tables = dict[History | None, _Table]()
 
-    def _table(self, source: str) -> _Table:
-        """Return the Duhamel integral ρ of a source for the grid's oscillators, made at first use.
-
-        Initial velocities and displacements, "velocity" and "start", are no loads and share ρ =
-        exp(σ t).
+    def _table(self, load: History | None) -> _Table:
+        """Return the Duhamel integral ρ of a load for the grid's oscillators, made at first use.
 
         Args:
-            source: Name of a load or force, "velocity" or "start"; any other name is taken as one
-                of these two.
+            load: The load; None for an initial state, ρ = exp(σ t).
 
         Returns:
-            ρ with two derivatives by σ at T nodes and S points, shape (3, T, S), bounds of the
-            rounding of ρ (T, S), and bounds of its derivatives of orders 0 to 4 over the grid (5,
-            T).
+            ρ with two derivatives by σ at T nodes and S points, shape (3, T, S), and bounds of its
+            derivatives of orders 0 to 4 over the grid (5, T).
         """
-        load = self.loads.get(source)
-        name = ""
-        if load:
-            name = source
-        if name not in self._tables:
+        if load not in self._tables:
             bounds = moments_of(self.decay, load, self.time)
-            rho, rounding = responses_of(self.grid.sigma.ravel(), load, self.time)
-            self._tables[name] = _Table(rho, rounding, bounds)
-        return self._tables[name]
+            rho = responses_of(self.grid.sigma.ravel(), load, self.time)
+            self._tables[load] = _Table(rho, bounds)
+        return self._tables[load]
 
-    def responses(self, source: str, order: int) -> ModalResponses:
+    def responses(self, source: Source, order: int) -> ModalResponses:
         """Return the responses e to a unit of a source, differentiated ν = `order` times by time.
 
         They are tabulated on a grid of Q quotients q = g/ω and W frequencies ω at T time nodes.
 
         Args:
-            source: "load" (the ground), "force1", …, "velocity" or "start" (initial displacements).
+            source: The source.
             order: ν, among the orders given at the construction.
 
         Returns:
             `value` of e at the points, shape (T, Q, W), with what a force adds at once; `error`, a
-            bound of the distance of e from bilinear interpolation between them, with rounding,
-            shape (T,); `line_deviation`, of its distance from a straight line in the step before
-            each node, shape (T,); and `largest`, bounds of |G| and |dG/dσ| over the grid, G = σ^ν
-            ρ, shape (2, T).
+            bound of the distance of e from bilinear interpolation between them, shape (T,);
+            `line_deviation`, of its distance from a straight line in the step before each node,
+            shape (T,); and `largest`, bounds of |G| and |dG/dσ| over the grid, G = σ^ν ρ, shape (2,
+            T).
 
         Raises:
             KeyError: `order` is none of those given.
         """
         grid = self.grid
-        is_start = source == "start"
+        is_start = source.is_displacement
         sigma = grid.sigma.ravel()
-        table = self._table(source)
+        table = self._table(source.load)
         G = with_power(sigma, table.rho, order)
-        direct = feedthrough(source, self.loads, order, self.time)
-        value = read_response(source, sigma, G[0])
+        direct = source.feedthrough(order, self.time)
+        value = source.read(sigma, G[0])
         if direct.any():
             value += direct[:, None]
-        # Rounding of σ^ν ρ, then of the part of it that is the response; the largest over the grid.
-        # |Im G/ω| errs by at most the error of G over the smallest ω, and Re G + q Im G by 1 + q
-        # times the error of G.
         magnitudes = np.abs(G).max(-1)
-        rounding = float(np.abs(sigma).max()) ** order * table.rounding.max(-1)
-        rounding += 2 * (order + 3) * UNIT_ROUNDOFF * magnitudes[0]
-        if is_start:
-            rounding = rounding * (1 + grid.quotient[-1])
-        else:
-            rounding = rounding / grid.omega[0]
-        rounding += 8 * UNIT_ROUNDOFF * np.abs(direct)
         error, largest = self._error(magnitudes, table.bounds, order, start=is_start)
         return ModalResponses(
             value=value.reshape(-1, *grid.sigma.shape),
-            error=error + rounding,
+            error=error,
             line_deviation=self._line_deviation(source, order),
             largest=largest,
         )
@@ -255,85 +280,50 @@ class Oscillators:
             across = high * second
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
-    def _line_deviation(self, source: str, order: int) -> Array:
+    def _line_deviation(self, source: Source, order: int) -> Array:
         """Return a bound of the distance of responses from their chord in each step, shape (T,).
 
         The chord is the straight line between the values at both nodes. Row j belongs to the step
         that ends at node j. The bounds of a source are computed for all orders at its first use.
 
         Args:
-            source: Name of a load or force, "velocity" or "start" (initial displacements).
+            source: The source.
             order: Order of the derivative by time, among those given at the construction.
         """
-        if source not in self._deviations:
-            self._deviations[source] = line_deviations(
+        key = source.load, source.is_force
+        if key not in self._deviations:
+            self._deviations[key] = line_deviations(
                 self.grid.sigma,
-                self.loads.get(source),
+                source.load,
                 self.time,
                 self.orders,
-                is_force=is_fed_through(source, 2),
-                at_nodes=self._table(source),
+                is_force=source.is_force,
+                at_nodes=self._table(source.load),
             )
-        of_modulus, of_response = self._deviations[source][order]
-        if source == "start":
+        of_modulus, of_response = self._deviations[key][order]
+        if source.is_displacement:
             # |Re G + q Im G| ≤ (1 + q) |G|
             return np.asarray(of_modulus * (1 + self.grid.quotient[-1]))
         return np.asarray(of_response)
 
-    def deviation_without_feedthrough(self, source: str, order: int) -> Array:
+    def deviation_without_feedthrough(self, source: Source, order: int) -> Array:
         """Return a bound of the distance of responses from straight lines in each step, shape (T,).
 
         Row j belongs to the step that ends at node j. What a force adds to accelerations at once,
         its feedthrough f(t), is left out of the responses.
 
         Args:
-            source: Name of a load or force, "velocity" or "start" (initial displacements).
+            source: The source.
             order: Order of the derivative by time, among those given at the construction.
 
         Raises:
             KeyError: `order` is none of these.
         """
         deviation = self._line_deviation(source, order)
-        if not is_fed_through(source, order):
+        if not (source.is_force and order == 2):
             return deviation
-        of_modulus, _ = self._deviations[source][order]
+        of_modulus, _ = self._deviations[source.load, True][order]
         return np.asarray(of_modulus / self.grid.omega[0])  # |Im G/ω| ≤ |G|/ω
-
-
-def read_response(source: str, sigma: Array, G: Array) -> Array:
-    """Return the responses e of oscillators to a source from G = σ^ν ρ, without feedthrough.
-
-    ρ is the Duhamel integral of the source, exp(σ t) for an initial state, and ν the order of the
-    derivative by time. e = −Im G/ω for "load", an acceleration a of the ground, which acts as −M ι
-    a; Im G/ω for "force1", …, "velocity", and "component2", …, which are −M ι times an acceleration
-    of the ground; and Re G + (g/ω) Im G for "start", an initial displacement.
-
-    Args:
-        source: One of these names.
-        sigma: σ = −g + iω of the oscillators, ω > 0, of any shape S.
-        G: Complex, shape (…, *S).
-
-    Returns:
-        Real numbers of the shape of G.
-    """
-    if source == "start":
-        return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
-    sign = 1.0
-    if source == "load":
-        sign = -1.0
-    return np.asarray(sign * G.imag / sigma.imag)
-
-
-def is_fed_through(source: str, order: int) -> bool:
-    """Return whether a source is part of the response itself, as a force is of accelerations."""
-    return order == 2 and source.startswith("force")
-
-
-def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
-    """Return the direct feedthrough f(t) of a force to accelerations at nodes, else zeros, (T,)."""
-    if is_fed_through(source, order):
-        return loads[source].values(time)
-    return np.zeros_like(time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,24 +345,20 @@ class Ranges:
 def response_ranges(
     omega: tuple[float, float],
     quotient: tuple[float, float],
-    loads: Mapping[str, History],
     time: Array,
-    sources: Sequence[str],
+    sources: Sequence[Source],
     orders: Sequence[int],
 ) -> dict[int, Ranges]:
     """Return ranges of λ^κ e over all oscillators with ω and g/ω in given ranges, at time nodes.
 
     e is the response of an oscillator with σ = −g + iω and λ = |σ|² to a unit of a source,
-    differentiated ν times by time. With G = σ^ν ρ, ρ the Duhamel integral of the source's load or
-    exp(σ t), e is −Im G/ω for "load" (the ground), Im G/ω for "force1", …, (plus the force itself
-    if ν = 2) and for "velocity", and Re G + (g/ω) Im G for "start" (initial displacements).
+    differentiated ν times by time.
 
     Args:
         omega: Smallest and largest frequency ω > 0, in rad/s.
         quotient: Smallest and largest g/ω ≥ 0.
-        loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
-        sources: Names of the sources.
+        sources: The sources.
         orders: Orders ν of the derivatives of e by time, from 0 to 2.
 
     Returns:
@@ -395,7 +381,7 @@ def response_ranges(
     ratio = (omega[1] / omega[0] * (1 + 1e-9)) ** (1 / pieces)
     for n in range(pieces):
         piece = (omega[0] * ratio**n, omega[0] * ratio ** (n + 1))
-        _widen_by_piece(found, piece, quotient, loads=loads, time=time, sources=sources)
+        _widen_by_piece(found, piece, quotient, time=time, sources=sources)
     return found
 
 
@@ -404,9 +390,8 @@ def _widen_by_piece(
     omega: tuple[float, float],
     quotient: tuple[float, float],
     *,
-    loads: Mapping[str, History],
     time: Array,
-    sources: Sequence[str],
+    sources: Sequence[Source],
 ) -> None:
     """Widen ranges of λ^κ e, in place, to those of the oscillators of a piece of frequencies.
 
@@ -416,9 +401,8 @@ def _widen_by_piece(
             shape (3 exponents κ, sources, T) each; changed in place.
         omega: Smallest and largest frequency ω of the piece, in rad/s.
         quotient: Smallest and largest g/ω.
-        loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
-        sources: Names of the sources; those that are no loads are "velocity" and "start".
+        sources: The sources.
 
     Raises:
         UnprovedError: An oscillator is out of the range in which responses are computed to
@@ -428,28 +412,29 @@ def _widen_by_piece(
     decay = quotient[0] * slowest  # least g
     largest_sigma = fastest * np.sqrt(1 + quotient[1] ** 2)
     step = np.diff(time, prepend=time[0])
-    tables = _tables_of_piece(omega, quotient, loads=loads, time=time, orders=found)
-    # bounds of |ρ| of any oscillator of the piece
-    rho_bounds = {name: absolute_moments(decay, load, time)[0] for name, load in loads.items()}
+    tables = None
+    if any(source.load for source in sources):
+        tables = _tables_of_piece(omega, quotient, time=time, orders=found)
     scale = largest_sigma ** (2 * np.array(POWERS)[:, None])  # largest λ^κ
     for s, source in enumerate(sources):
-        rho = rho_bounds.get(source, np.exp(-decay * time))
+        # bound of |ρ| of any oscillator of the piece
+        rho = moments_of(decay, source.load, time)[0]
         # in the step to a node |ρ| grows by at most step · max|f|
         rho_in_step = np.append(rho[:1], rho[:-1])
-        if source in loads:
-            rho_in_step = np.maximum(rho_in_step + step * loads[source].extremes[0], rho)
+        if source.load:
+            rho_in_step = np.maximum(rho_in_step + step * source.load.extremes[0], rho)
         for order, ranges in found.items():
             # |e| ≤ factor |ρ|, as e is Im(σ^ν ρ)/ω, or Re(σ^ν ρ) + q Im(σ^ν ρ) of a start
-            if source == "start":
+            if source.is_displacement:
                 factor = largest_sigma**order * (1 + quotient[1])
             else:
                 factor = largest_sigma**order * (1 / slowest)
-            direct = np.abs(feedthrough(source, loads, order, time))
+            direct = np.abs(source.feedthrough(order, time))
             high = scale * (factor * rho + direct)
             low = -high
             # A response of at most r in the step is no farther than 2 r from its chord.
             deviation = 2 * scale * factor * rho_in_step
-            if tables and source in loads:
+            if tables and source.load:
                 table = tables.responses(source, order)
                 for row, power in enumerate(POWERS):
                     weights = np.abs(tables.grid.sigma) ** (2 * power)
@@ -467,7 +452,6 @@ def _tables_of_piece(
     omega: tuple[float, float],
     quotient: tuple[float, float],
     *,
-    loads: Mapping[str, History],
     time: Array,
     orders: Collection[int],
 ) -> Oscillators | None:
@@ -476,12 +460,11 @@ def _tables_of_piece(
     Args:
         omega: Smallest and largest frequency ω of the piece, in rad/s.
         quotient: Smallest and largest quotient g/ω of decay and frequency.
-        loads: History of each load or force by the name of its source.
         time: Time nodes, shape (T,), in s.
         orders: Orders of the derivatives by time that are asked for.
 
     Returns:
-        None without loads, or where more than 240 points along ω would be needed.
+        None where more than 240 points along ω would be needed.
     """
     # A response changes over a distance in σ of about the decay or the inverse duration. Points
     # are .4 of it apart; tighter ones cost memory, wider ones are no better than the integral.
@@ -492,10 +475,10 @@ def _tables_of_piece(
     distance = 0.4 * (decay + 2 / max(float(time[-1]), 1e-300))
     along = int(np.ceil((fastest - slowest) / distance)) + 1
     across = int(np.ceil((quotient[1] - quotient[0]) * fastest / distance)) + 1
-    if not loads or along > 240:
+    if along > 240:
         return None
     points = (max(along, 2), int(np.clip(across, 2, 8)))
-    return Oscillators(grid_over(omega, quotient, points), loads, time, orders)
+    return Oscillators(grid_over(omega, quotient, points), time, orders)
 
 
 def _bounds_over_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:

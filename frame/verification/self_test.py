@@ -72,7 +72,7 @@ def with_motions_tested(
             inputs.
     """
     cuts = boxes(envelope.inputs, list(envelope.alpha))
-    states = structures_at(system, envelope, cuts.lower[:1])[0].rows.shape[1]
+    states = structures_at(system, cuts.names, cuts.lower[:1])[0].rows.shape[1]
     # A tenth of a proof's work: a proof takes 2·10⁴ multiplications for a bound, of which a level,
     # node and output have two, and a response 15 (the terms of its series) for each node, output,
     # state and time of a step. From 24 to 240 responses are tested; more find little.
@@ -84,19 +84,19 @@ def with_motions_tested(
     facts = {**envelope.facts, "motions_tested": len(points)}
     if not len(points):
         return replace(envelope, facts=facts)
-    motions = structures_at(system, envelope, points)
+    motions = structures_at(system, cuts.names, points)
     Trial(envelope, cuts.lower, cuts.upper).require_agreement(points, motions, highest)
     return replace(envelope, facts=facts, tested_structures=variables(points, motions, highest))
 
 
-def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
+def structures_at(system: LinearSystem, names: Sequence[str], points: Array) -> list[LinearMotion]:
     """Return the matrices of a structure at each of S sets of its inputs.
 
     Static forces and impulses at t = 0 are contained in the initial state.
 
     Args:
         system: The structure.
-        envelope: Its `inputs` are the names of n inputs, in order; other parameters are nominal.
+        names: Names of its n inputs; other parameters are nominal.
         points: The inputs, shape (S, n), in SI units.
 
     Returns:
@@ -105,7 +105,7 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
     Raises:
         numpy.linalg.LinAlgError: A mass, or a stiffness under a static force, is singular.
     """
-    matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
+    matrices, rows = evaluate(system, names, points, derivatives=False)
     n = matrices.mass.value.shape[-1]
     record: Array = np.zeros(0)
     record_step = 0.0

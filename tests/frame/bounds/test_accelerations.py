@@ -14,7 +14,6 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Interval
 from tests.frame.motions import exact_motions, random_points, require_inside
 
@@ -84,15 +83,14 @@ def test_bounds_of_outputs_on_matrices_hold(plan, rng, method):
     assert (slack < 0.25 * size).all()
 
 
-def test_a_mixture_of_displacements_and_accelerations_is_left_to_branch_and_bound(plan, rng):
-    """The dual bound adds modes by one derivative of the displacements."""
+@pytest.mark.parametrize("method", ["dual", "auto"])
+def test_a_mixture_of_displacements_and_accelerations_is_proved(plan, method, rng):
+    """By the damped modes, which take all outputs off displacements and velocities."""
     row = np.eye(9)[7] + 20.0 * np.eye(9)[1]
     mixed = MatrixStructure(
         plan.parameters, plan.mass, plan.stiffness, {"sum": row}, ratios=[0.05], ground=plan.ground
     )
     motion = {"duration": 1.5, "step": 0.05, "alpha": [0.0], "progress": False}
-    with pytest.raises(UnprovedError, match="mixes displacements, velocities or accelerations"):
-        envelope(mixed, INPUTS, DualProof(), **motion)
-    found = envelope(mixed, INPUTS, **motion)
+    found = envelope(mixed, INPUTS, method, **motion)
     assert found.nature == "guaranteed"
     require_inside(exact_motions(mixed, random_points(INPUTS, 100, rng), INPUTS, 1.5, 0.05), found)

@@ -44,20 +44,19 @@ from alphacut.frame.bounds.kernel import (
     examine,
     stays_below,
 )
-from alphacut.frame.bounds.model_error import (
-    EnergyNorms,
-    largest_growth,
-    majorant_parts,
-    proved_error,
-    remainder_bounds,
-    response_parts,
-)
+from alphacut.frame.bounds.remainders import majorant_parts, remainder_bounds
 from alphacut.frame.bounds.spatial_branch_and_bound import prove
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.methods.proof import bound_levels
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, require_dissipation
 from alphacut.frame.modes.modal_model import ModalModel
+from alphacut.frame.modes.model_error import (
+    EnergyNorms,
+    largest_growth,
+    proved_error,
+    response_parts,
+)
 from alphacut.fuzzy import Interval, Triangular
 from tests.frame import test_forces
 from tests.frame.methods import test_methods
@@ -383,28 +382,6 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_errors_of_the_model() -> N
     off = np.abs(model.at(*at, 0 * at[1])[0].reshape(21, 61) - truth).max(0)
     of_values = remainder_bounds(model, np.ones(1), np.ones(1)).rounding[:, 0, 0]
     assert 0.5 < (off / (proved_error(model)[:, 0] + of_values))[1:].max() <= 1
-
-
-def test_rounding_of_late_phases_is_in_the_margin() -> None:
-    model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
-    margin = remainder_bounds(model, -narrow, narrow).rounding[:, 0, 0]
-    unit = np.random.default_rng(2).uniform(-narrow, narrow, (200, 1))
-    powers = np.longdouble(unit) ** model.eigenvalue.exponents[:, 0]
-    phase = powers @ model.eigenvalue.coefficients[:, 0].imag
-    growth = powers @ model.eigenvalue.coefficients[:, 0].real
-    share = [
-        powers @ part[:, 0, 0]
-        for part in (model.coefficient.coefficients.real, model.coefficient.coefficients.imag)
-    ]
-    nodes = np.array([1, 10, 100])
-    for node in nodes:
-        t = np.longdouble(model.flow.time[node])
-        exact = (
-            2 * np.exp(growth * t) * (share[0] * np.cos(phase * t) - share[1] * np.sin(phase * t))
-        )
-        off = np.abs(model.at(unit, np.full(200, node), np.zeros(200, int))[0] - exact)
-        assert 0 < off.max() <= margin[node]
-        assert off.max() > 1e-3 * margin[node]
 
 
 # branch and bound

@@ -67,4 +67,4 @@ def test_one_floor_with_a_dashpot_and_its_overturning_moment_is_proved(gravity, 
     size = np.abs(values).max((0, 1))
     assert (reached <= bound + 1e-12 * size).all()
     peak_gap = (bound.max((0, 1)) - reached.max((0, 1))) / size
-    assert (peak_gap <= (0.02 if width else 1e-9)).all()
+    assert (peak_gap <= (0.02 if width else 2e-9)).all()  # the margin for rounding

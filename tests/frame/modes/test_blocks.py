@@ -49,8 +49,8 @@ from alphacut.frame.modes.truncated_modes import (
 )
 from alphacut.frame.response.oscillators import (
     Oscillators,
+    Source,
     grid_over,
-    read_response,
     response_ranges,
 )
 
@@ -262,9 +262,9 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     p = TaylorModel.variables(centre, 1e-3 * centre).widened(0.03 * centre)
     springs = classical_structure(masses_on_springs(centre), {x: p[i] for i, x in enumerate("abc")})
     both = springs.initial_state.widened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
-    level = LevelModels.from_structure(
-        replace(springs, initial_state=both), Excitation({}, time, ("velocity",))
-    )
+    excitation = Excitation(time, [Source.named("velocity")])
+    models = ModalResponseModels.from_structure(replace(springs, initial_state=both), excitation)
+    level = LevelModels.from_models(models, springs.derivative_orders, excitation)
     bounds = [OutputBounds.initial(level, 0, s, 1e-6) for s in (0, 1)]
     for of_side in bounds:
         of_side.improve(np.arange(len(time)), of_side.effort(240, 100, 1.0, 0.25))
@@ -308,7 +308,7 @@ def coupled(own, structure, time):
     """The only block of a structure: its oscillators and the bounds of what couples them."""
     middle, used = centred_matrices(structure.mass, structure.stiffness)
     found = enclose_subspaces(middle, used, 2)
-    excitation = Excitation({}, time, sources(own, structure))
+    excitation = Excitation(time, sources(own, structure))
     to_modal = inverse_with_rounding(middle.basis, like=structure.initial_state)
     patterns = source_patterns(structure, excitation.sources) @ to_modal.T
     rows = structure.initial_state.like(structure.output_rows) @ middle.basis
@@ -364,8 +364,9 @@ def test_no_response_falls_faster_with_its_eigenvalue(source, quotient, share):
     squared = omega**2 + decay**2 + np.array([-h, 0, h])[:, None]
     sigma = -decay + 1j * np.sqrt(squared - decay**2)
     rho = np.exp((sigma + decay) * time)  # of all decays alike, which exp(g t) undoes
-    e = read_response(source, sigma, rho)
-    bound = response_slopes(source, np.abs(rho[1]), time * np.abs(rho[1]), omega, quotient)
+    moved = Source.named(source)
+    e = moved.read(sigma, rho)
+    bound = response_slopes(moved, np.abs(rho[1]), time * np.abs(rho[1]), omega, quotient)
     reached = np.abs(e[2] - e[0]) / (2 * h) / bound
     assert share < reached.max() <= 1 + 1e-6
 
@@ -415,7 +416,8 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         "alphacut.frame.modes.models.required_modes",
         lambda *_, **__: ModeSelection(1, np.zeros(9)),
     )
-    excitation = Excitation({"load": RECORD}, time, ("load",))
+    load = Source.named("load", RECORD)
+    excitation = Excitation(time, [load])
     models = ModalResponseModels.from_structure(structure, excitation, np.ones(1))
     (others,) = models.truncated
     assert len(models.oscillators) == 1
@@ -425,7 +427,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         squared, shape = np.linalg.eigh(K)
         omega = np.sqrt(squared[1] * (1 - 0.03**2))
         point = grid_over((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
-        wave = Oscillators(point, {"load": RECORD}, time, {0}).responses("load", 0).value[:, 0, 0]
+        wave = Oscillators(point, time, {0}).responses(load, 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
         share, size = (x.at(u[None])[0, 0, 0] for x in (others.participation, others.amplitude))
         width = (size + others.amplitude.remainder[0, 0]) * others.response_radius[0, 0]
@@ -439,18 +441,17 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_ranges_hold_all_responses_times_powers_of_frequency(order):
     time, ends, quotient = np.linspace(0, 3, 31), (8.0, 90.0), (0.02, 0.05)
-    found = response_ranges(ends, quotient, {"load": RECORD}, time, ("load", "velocity"), [order])[
-        order
-    ]
+    sources = [Source.named("load", RECORD), Source.named("velocity")]
+    found = response_ranges(ends, quotient, time, sources, [order])[order]
     fine = grid_over(ends, quotient, (400, 4))
     squared = np.abs(fine.sigma) ** 2
-    for s, source in enumerate(("load", "velocity")):
-        value = Oscillators(fine, {"load": RECORD}, time, {order}).responses(source, order).value
+    for s, source in enumerate(sources):
+        value = Oscillators(fine, time, {order}).responses(source, order).value
         for k, power in enumerate((0.0, 0.5, 1.0)):
             scaled = (value * squared**power).reshape(len(time), -1)
             assert (scaled.max(1) <= found.high[k, s] + 1e-9).all()
             assert (scaled.min(1) >= found.low[k, s] - 1e-9).all()
-            if source == "load":
+            if source.load:
                 reached = np.ptp(scaled, axis=1)[1:] / (found.high[k, s] - found.low[k, s])[1:]
                 assert reached.max() > TIGHT
 
@@ -665,7 +666,7 @@ def test_coupling_within_a_block_attains_its_bounds_at_nodes_and_between(rng):
     found = SimpleNamespace(
         eigenvalue_low=np.full(2, squared - off), eigenvalue_high=np.full(2, squared + off)
     )
-    excitation = Excitation({}, time, ("start",))
+    excitation = Excitation(time, [Source.named("start")])
     added, deviation, _ = coupling_bounds(structure, of_block, found, excitation)
     largest_read = 1 + variation / 2
 

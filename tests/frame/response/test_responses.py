@@ -1,7 +1,6 @@
 """Responses of single modes to a load: by forty steps or a million, in tables, and off their chords.
 
-They agree with fifty digits or a fine march. What is said of their rounding, of errors of tables
-and of what they stray from chords between nodes, over ranges of ω and g/ω, is never too little, and
+They agree with fifty digits or a fine march. What is said of errors of tables and of what they stray from chords between nodes, over ranges of ω and g/ω, is never too little, and
 hardly more than needed.
 """
 
@@ -14,23 +13,21 @@ import pytest
 from alphacut.frame import Accelerogram, History, UnprovedError
 from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
 from alphacut.frame.response.duhamel import (
-    ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
     absolute_moments,
-    error_of_integrals,
     responses_at_nodes,
     step_integrals,
 )
 from alphacut.frame.response.load_tables import LoadTable
-from alphacut.frame.response.oscillators import Grid, Oscillators, grid_over
+from alphacut.frame.response.oscillators import Grid, Oscillators, Source, grid_over
 from tests.frame import test_forces
 
 UNIT = 2.0**-53
 """Relative error of one rounding."""
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""
-IDLE = 0.01
-"""Share of a bound of rounding that the largest of some errors reaches at least."""
+ROUNDING = 1e-10
+"""Rounding of a response, as a share of a bound of it: a tenth of the margin of proofs."""
 
 
 @pytest.fixture(autouse=True)
@@ -54,33 +51,28 @@ def exact_integrals(sigma, h):
 
 
 def error_at(z, h):
-    """Errors of the integrals at σ h = z, in units of u hⁿ⁺¹/(n + 1), and of their bound."""
+    """Errors of the integrals at σ h = z, in units of u hⁿ⁺¹/(n + 1)."""
     sigma, out = complex(z) / h, np.empty(4, complex)
     step_integrals(sigma, h, out)
     off = [
         float(abs(mp.mpc(complex(value)) - true))
         for value, true in zip(out, exact_integrals(sigma, h), strict=True)
     ]
-    bound = error_of_integrals(sigma, h)
-    scaled = [(n + 1) * x / h ** (n + 1) / UNIT for n, x in enumerate(off)]
-    return scaled, max(off[0], 2 * off[1] / h) / bound
+    return [(n + 1) * x / h ** (n + 1) / UNIT for n, x in enumerate(off)]
 
 
 @pytest.mark.parametrize("low", [-8, -1, 0, 1, 3])
 def test_integrals_of_a_step_agree_with_fifty_digits(low):
     """Both sides of the change of rule, and undamped, damped and overdamped exponents."""
-    rng, errors, shares = np.random.default_rng(low + 8), [], []
+    rng, errors = np.random.default_rng(low + 8), []
     for _ in range(15):
         angle = np.pi * rng.choice([0.5, rng.uniform(0.5, 1), 1])
         size = 10 ** rng.uniform(low, low + 1 if low > -8 else -1)
         z = 1j * size if angle == np.pi / 2 else size * np.exp(1j * angle)
         at_change = z / size * (FROM_RECURRENCE + rng.choice([-1e-12, 1e-12]))
         for exponent in (z, at_change):
-            scaled, share = error_at(exponent, rng.uniform(0.01, 1))
-            errors.append(scaled)
-            shares.append(share)
-    assert np.max(errors) <= ERROR_OF_INTEGRALS
-    assert IDLE <= np.max(shares) <= 1
+            errors.append(error_at(exponent, rng.uniform(0.01, 1)))
+    assert np.max(errors) <= 12
 
 
 def exact_response(sigma, ground, time):
@@ -109,26 +101,21 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_responses_are_off_by_their_rounding_at_most(case):
+def test_responses_agree_with_fifty_digits(case):
     omega, quotient, step, node_step = CASES[case]
     rng = np.random.default_rng(len(case))
     ground = Accelerogram(step, rng.normal(size=40))
     time = np.arange(61) * node_step
     sigma = omega * np.array([0.3, 1.0, 1.01]) * (-quotient + 1j)
-    value, error = responses_at_nodes(sigma, ground, time, 2)
+    value = responses_at_nodes(sigma, ground, time, 2)
     nodes = rng.choice(np.arange(1, 61), 8, replace=False)
-    shares = [
-        float(
-            abs(mp.mpc(complex(value[0, node, s])) - exact_response(sigma[s], ground, time[node]))
-        )
-        / error[node, s]
-        for node in nodes
-        for s in range(3)
-    ]
-    assert IDLE <= np.max(shares) <= 1
+    for s in range(3):
+        size = np.abs(value[0, :, s]).max()
+        for node in nodes:
+            exact = complex(exact_response(sigma[s], ground, time[node]))
+            assert abs(value[0, node, s] - exact) <= 1e-11 * size
     named = responses_at_nodes(np.tile(sigma, (8, 1)), ground, time, 2, node=nodes)
-    assert np.allclose(named[0], value[:, nodes], rtol=1e-13, atol=0)
-    assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
+    assert np.allclose(named, value[:, nodes], rtol=1e-13, atol=0)
 
 
 RECORD = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
@@ -140,8 +127,8 @@ def test_windows_begin_at_rest(ground, node_step):
     """What arose before a window goes on freely; the rest is the window's own."""
     time, sigma = np.arange(41) * node_step, np.array([-0.3 + 9j, 0.4 - 20j, -30 + 2j, -2e3 + 9j])
     length = 7
-    whole, _ = responses_at_nodes(sigma, ground, time, 0)
-    (found,), _ = responses_at_nodes(sigma, ground, time, window=length)
+    whole = responses_at_nodes(sigma, ground, time, 0)
+    (found,) = responses_at_nodes(sigma, ground, time, window=length)
     before = (np.maximum(np.arange(41) - 1, 0) // length) * length
     free = np.exp(sigma * (time - time[before])[:, None]) * whole[0, before]
     assert np.allclose(found + free, whole[0], atol=1e-13 * np.abs(whole).max(), rtol=1e-11)
@@ -151,7 +138,7 @@ def test_windows_begin_at_rest(ground, node_step):
 def test_windows_late_in_a_long_interval_of_the_load_are_exact():
     """Up to there a growing exponent of a window's series would have grown by e⁴⁵."""
     time, sigma = np.arange(81) * 0.02, np.array([60 + 9j])
-    (found,), _ = responses_at_nodes(sigma, LATE, time, window=4)
+    (found,) = responses_at_nodes(sigma, LATE, time, window=4)
     elapsed = time[1:] - time[(np.arange(80) // 4) * 4]
     exact = np.expm1(sigma[0] * elapsed) / sigma[0]
     late = time[1:] > 0.5
@@ -180,11 +167,6 @@ def test_exponents_out_of_range_are_refused(sigma):
         responses_at_nodes(np.array([[sigma]]), ground, time, 1, node=np.array([2]))
 
 
-IDLE_OF_TABLES = 1e-7
-"""Share of a bound that the largest of some errors reaches at least; the bounds add up what only
-partly comes together, such as the errors of the points of a circle."""
-
-
 def exact_jet(response, rate):
     """R, dR/dλ and d²R/dλ² by fifty digits and differences, which leave some twenty."""
     step = mp.mpf(10) ** -12
@@ -193,10 +175,10 @@ def exact_jet(response, rate):
 
 
 def errors_and_bounds(table, history, response, rates, nodes):
-    """Errors of R and of its derivatives at some nodes, and their bounds, shape (3, N) each."""
+    """Errors of R and of its derivatives at some nodes, and bounds with rounding, (3, N) each."""
     growth = max(rates.real)
     waves = absolute_moments(-growth, history, table.time)
-    bounds = table.errors(waves, growth)[:, nodes]
+    bounds = table.errors(waves)[:, nodes] + ROUNDING * waves[:3, nodes]
     errors = np.zeros(bounds.shape)
     for i, node in enumerate(nodes):
         for rate in rates:
@@ -244,7 +226,6 @@ def test_tables_miss_the_integrals_by_their_errors_at_most(case, rng):
         table, history, lambda rate, t: exact_table_response(rate, history, t), rates, nodes
     )
     assert (errors <= bounds).all()
-    assert (errors.max(axis=1) >= IDLE_OF_TABLES * bounds.max(axis=1)).all()
 
 
 @pytest.mark.parametrize("hertz", [0.0, 1.3])
@@ -273,28 +254,6 @@ def test_a_harmonic_load_is_followed_through_windows(hertz):
     assert (bounds <= 1e-8 * waves.max(axis=1, keepdims=True)).all()
 
 
-def test_rounding_of_a_record_with_a_million_samples_in_a_step_is_in_the_errors():
-    """Each sample multiplies R by the same rounded exponential: errors add up with their number.
-
-    What operations for each time node would add is less than the bound, and with the exponential of
-    most machines less than the error.
-    """
-    samples = 1_000_000
-    time = np.array([0.0, 1.0])
-    history = History(1.0 / samples, np.ones(samples + 1), is_held=True)
-    midpoint, deviation = 0.7j, 0.01
-    table = LoadTable(history, time, midpoint, deviation)
-
-    def response(rate, t):
-        return (mp.exp(rate * mp.mpf(float(t))) - 1) / rate
-
-    rates = midpoint + deviation * np.array([0.0, 1.0, -1.0, 1j, -1j])
-    errors, bounds, waves = errors_and_bounds(table, history, response, rates, np.array([1]))
-    assert (errors <= bounds).all()
-    by_nodes = 2 * UNIT * (8 * len(time) + 100) * np.exp(6.0)
-    assert bounds[0, 0] > by_nodes * waves[0, 0]
-
-
 # tables over grids of ω and g/ω
 
 TWO_TONES = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(200) * 0.47))
@@ -304,11 +263,12 @@ TWO_TONES = Accelerogram(0.02, np.sin(np.arange(200) * 0.11) * np.sin(np.arange(
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
     time = np.arange(0, 3, 0.05)
+    moved = Source.named(source, TWO_TONES if source == "load" else None)
     fine = Grid(np.linspace(9.5, 10.5, 41), np.linspace(0.02, 0.035, 41))
     for omega, quotient in ((5, 1), (1, 10), (5, 10)):  # points of the fine grid in a cell
         coarse = Grid(fine.omega[::omega], fine.quotient[::quotient])
-        table = Oscillators(coarse, {"load": TWO_TONES}, time, {order}).responses(source, order)
-        exact = Oscillators(fine, {"load": TWO_TONES}, time, {order}).responses(source, order).value
+        table = Oscillators(coarse, time, {order}).responses(moved, order)
+        exact = Oscillators(fine, time, {order}).responses(moved, order).value
         at = table.value
         for axis, (own, grid) in enumerate(
             ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
@@ -324,7 +284,7 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
 def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
     """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
     grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
-    oscillators = Oscillators(grid, {}, np.zeros(1), range(3))
+    oscillators = Oscillators(grid, np.zeros(1), range(3))
     zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
     error, _ = oscillators._error(zero, fourth, 0, start=True)
     exact = 5 * h**4 / 384
@@ -339,9 +299,10 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
     for source, ground, step in (*cases, ("load", ended, 0.01)):
         coarse = step * (np.arange(120) + 0.5)
         time = coarse[0] + step / parts * np.arange(119 * parts + 1)
+        moved = Source.named(source, ground if source == "load" else None)
         for order in (0, 1, 2):
-            wide = Oscillators(grid, {"load": ground}, coarse, {order}).responses(source, order)
-            fine = Oscillators(grid, {"load": ground}, time, {order}).responses(source, order).value
+            wide = Oscillators(grid, coarse, {order}).responses(moved, order)
+            fine = Oscillators(grid, time, {order}).responses(moved, order).value
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
             line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
@@ -377,7 +338,7 @@ def off_chords(sigma, load, order, kappa):
     fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
     rho = np.exp(sigma * fine[:, None])
     if load is not None:
-        rho = responses_at_nodes(sigma, load, fine, 0)[0][0]
+        rho = responses_at_nodes(sigma, load, fine, 0)[0]
     y = (kappa * sigma**order * rho).real.sum(1)
     return np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
 
@@ -402,7 +363,7 @@ def test_bounds_over_a_coarse_grid_fall_with_the_step_where_samples_lie_within(r
         bounds.append(line_deviations(sigma, load, time, (0,))[0][1].max())
         fine = np.linspace(0, time[-1], 8 * len(time) - 7)
         w, q = rng.uniform(*omega, 5), rng.uniform(*quotient, 5)
-        rho = responses_at_nodes((-q + 1j) * w, load, fine, 0)[0][0]
+        rho = responses_at_nodes((-q + 1j) * w, load, fine, 0)[0]
         y = (rho / (1j * w)).real.T
         chords = [np.interp(fine, time, x[::8]) for x in y]
         assert np.abs(y - chords).max() <= bounds[-1]
@@ -429,7 +390,7 @@ def test_resonance_between_two_points_of_a_grid_is_in_the_bound(order, samples_i
     fine = np.linspace(TIME[0], TIME[-1], PARTS * (len(TIME) - 1) + 1)
     for omega in middle * np.linspace(1 - width, 1 + width, 11):
         sigma = np.array([1j * omega])
-        rho = responses_at_nodes(sigma, load, fine, 0)[0][0, :, 0]
+        rho = responses_at_nodes(sigma, load, fine, 0)[0, :, 0]
         y = (sigma**order * rho).imag / omega
         off = np.abs(y - np.interp(fine, TIME, y[::PARTS]))[1:].reshape(-1, PARTS).max(1)
         assert (off <= bound * (1 + 1e-9) + 1e-15).all()
@@ -455,7 +416,7 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
     columns = []
     for sample in np.eye(len(TIME)):
         load = History(step, sample)
-        rho, _ = responses_at_nodes(points, load, TIME, 2)  # with two derivatives, (3, T, 3)
+        rho = responses_at_nodes(points, load, TIME, 2)  # with two derivatives, (3, T, 3)
         # A = ρ + a/σ + b/σ² at the beginning of the last step, with its second derivative
         a, b = sample[-2], (sample[-1] - sample[-2]) / step
         value = rho[0, -2] + a / points + b / points**2
@@ -465,7 +426,7 @@ def test_what_a_response_is_between_points_at_which_it_and_its_curvature_vanish(
     on_grid = np.concatenate([values[0, :2], values[1, :2]])
     load = History(step, samples_that_vanish_on_a_grid(on_grid, values[0, 2]))
     fine = np.linspace(TIME[-2], TIME[-1], 41)
-    rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0][0, -41:, 0]
+    rho = responses_at_nodes(points[2:], load, np.append(TIME[:-2], fine), 0)[0, -41:, 0]
     off = np.abs(rho - np.linspace(rho[0], rho[-1], 41)).max()
     assert off > 1e-6 * np.abs(rho).max()
     assert off <= line_deviations(sigma, load, TIME, (0,))[0][0, -1]

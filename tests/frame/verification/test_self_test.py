@@ -101,7 +101,7 @@ def test_each_check_alone_sees_its_fault(found, change, check):
             patch.setattr(Trial, other, lambda *_: None)
         with pytest.raises(ContradictionError):
             Trial(faulty, cuts[..., 0], cuts[..., 1]).require_agreement(
-                points, structures_at(frame(), faulty, points)
+                points, structures_at(frame(), tuple(faulty.inputs), points)
             )
 
 
@@ -114,7 +114,7 @@ def test_a_deviation_between_nodes_a_quarter_too_small_is_refused(rng):
     system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
     found = motion(system, inputs, method=DualProof(), alpha=(1.0,))
     wide = np.abs(found.upper).max(1, keepdims=True) * np.ones_like(found.upper)
-    (exact,) = structures_at(system, found, np.array([[4e6]]))
+    (exact,) = structures_at(system, tuple(found.inputs), np.array([[4e6]]))
     deviation = np.zeros_like(found.between)
     nodes = exact.outputs(found.time)[0]
     for fraction in np.arange(1, 40) / 40:
@@ -163,7 +163,7 @@ def test_a_fault_far_below_all_tolerances_is_seen_by_its_check(change, check, wo
     system = replace(frame(), ground=Accelerogram(0.03, rng.normal(size=40)))
     found = motion(system, {"k1": Crisp(4e6)}, method=DualProof(), alpha=(1.0,))
     point = np.array([[4e6]])
-    (exact,) = structures_at(system, found, point)
+    (exact,) = structures_at(system, tuple(found.inputs), point)
     faulty, others = change(found, exact), {"require_inside", "require_attained"}
     with pytest.MonkeyPatch.context() as patch:
         for other in (others | {"require_interpolation_error"}) - {check}:

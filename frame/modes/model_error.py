@@ -1,4 +1,4 @@
-"""Guaranteed bounds of the error of a modal model, and of what its quadratic models leave out.
+"""Guaranteed bounds of the error of a modal model in comparison with the true response.
 
 Polynomials φ_k, ψ_k, λ_k make q(t) = 2 Re Σ φ_k exp(λ_k t) a response that nearly obeys the
 equations of motion, with the velocity 2 Re Σ ψ_k exp(λ_k t). What it misses there, the defects
@@ -9,11 +9,6 @@ anew, and nothing rests on a distance between eigenvalues.
 
 Damping by one ratio ζ, 2 ζ (M # K), is no polynomial, but a Taylor model (`geometric_mean`), whose
 remainder is contained in the defect.
-
-A part of a modal model is 2 Re Σ_k C_k(p) w(t; λ_k(p)) with the wave w = exp(λ t) or w = R =
-∫ exp(λ (t − s)) a(s) ds. The r-th derivative of w by λ is bounded by t^r exp(g t), or by
-∫ τ^r exp(g τ) |a(t − τ)| dτ, where g is a bound of Re λ. From these follow bounds of what quadratic
-Taylor models of the part leave out.
 """
 
 from __future__ import annotations
@@ -23,8 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.bounds.kernel import RemainderBounds
-from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.damped import DampedModes, DampedStructure, norm_of
@@ -51,7 +44,7 @@ def proved_error(model: ModalModel) -> Array:
     since damping only takes energy; for a load a, ‖η(0)‖ is the norm after a unit impulse times ∫
     |a|. An output takes at most its norm of this deviation, `EnergyNorms.outputs`; the errors of
     its coefficients add to it. The w_k of the model are exact: what their tables miss is in
-    `remainder_bounds`.
+    `bounds.remainders`.
 
     Args:
         model: Modal model of a structure that is known to lose energy everywhere in the box.
@@ -108,6 +101,57 @@ def direct_error_in_steps(model: ModalModel) -> Array:
             of_unit = (feedthrough - load.share.real[0] * 2.0).magnitude()
             error += np.outer(load.history.largest_in_steps(model.flow.time), of_unit)
     return (1 + ROUNDING) * error
+
+
+def error_between_nodes(model: ModalModel, error: Array, *, direct: Array | None = None) -> Array:
+    """Return by how much a model's error within a step may exceed the smaller one at its ends.
+
+    Args:
+        model: The model, which tells the growth rates of its modes and the step.
+        error: Bound of its error at the nodes, 0 or more, shape (times, outputs).
+        direct: Bound of that part of the error, within the step before each node, by which forces
+            act on accelerations at once, same shape; it may be zero at the nodes. None for none.
+
+    Returns:
+        Bound of the error in the step before each node minus the smaller one of the bounds at both
+        its ends, same shape; 0 for the first node.
+    """
+    # Without `direct` the bound of the error is a sum of functions of time that either rise or are
+    # in proportion to bounds of a mode's response, which decay no faster than exp(g t) with the
+    # upper bound g of its growth rate. With the most negative g of all modes, the bound within a
+    # step of the length h is at most exp(-g h) times its value at the end.
+    rate = largest_growth(model.eigenvalue, np.ones(model.eigenvalue.inputs))
+    swell = float(np.exp(np.maximum(-rate, 0.0).max() * model.flow.step))
+    within = swell * np.maximum(error[1:], error[:-1])
+    if direct is not None:
+        within = within + direct[1:]
+    added = np.zeros_like(error)
+    added[1:] = within - np.minimum(error[1:], error[:-1])
+    return added
+
+
+def error_fractions(model: ModalModel) -> Array:
+    """Return an estimate of the fraction of each input in the error of a modal model.
+
+    The error comes from the terms that the polynomials leave out. Its fractions are taken to be
+    those of the inputs in the terms of the highest degree, where an input counts by its exponent.
+
+    Args:
+        model: The model, with polynomials in the inputs as eigenvalues and coefficients.
+
+    Returns:
+        Fractions, shape (inputs,), which add up to 1, or are 0 if there are no such terms.
+    """
+    exponents = model.eigenvalue.exponents  # (terms, inputs)
+    weight = np.zeros(len(exponents))
+    for polynomials in (model.eigenvalue, model.coefficient):
+        magnitudes = np.abs(polynomials.coefficients).reshape(len(exponents), -1)
+        largest = np.maximum(magnitudes.max(axis=0), 1e-300)
+        # Polynomials of different units are compared by their coefficients over the largest one.
+        weight += (magnitudes / largest).max(axis=1)
+    is_highest = exponents.sum(axis=1) == model.degree
+    by_input = weight[is_highest] @ exponents[is_highest]
+    return np.asarray(by_input / max(float(by_input.sum()), 1e-300))
 
 
 class EnergyNorms:
@@ -194,27 +238,6 @@ def _start_errors(structure: DampedStructure, modes: DampedModes, norms: EnergyN
     return np.hypot(
         norms.of_spring_force(spring_force.magnitude()), norms.of_force(momentum.magnitude())
     )
-
-
-def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
-    """Return bounds of polynomials' derivatives over a box, as the coefficients of a majorant.
-
-    The majorant is Σ |coefficient| (reach + v)^exponents. At v = 0 its derivatives bound the
-    magnitudes of those of the polynomials at all points with |u_i| ≤ reach_i. Its coefficients are
-    rounded, by some 100 roundings and without cancellation.
-
-    Args:
-        polynomials: Polynomials of d inputs u, an array of shape V, real or complex.
-        reach: Half-widths, shape (d,), ≥ 0; they may exceed 1.
-
-    Returns:
-        The coefficients of degree 0, 1, 2 and 3 in v, shape (monomials, *V) each; a coefficient is
-        the derivative divided by the factorials of its exponents.
-    """
-    magnitudes = replace(polynomials, parts=tuple(np.abs(part) for part in polynomials.parts))
-    parts = magnitudes.shifted_parts(reach)
-    missing = range(len(parts), 4)
-    return parts[:4] + [magnitudes.homogeneous_part(degree) for degree in missing]
 
 
 def largest_growth(eigenvalue: TaylorModel, reach: Array) -> Array:
@@ -306,90 +329,3 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
         impulse=undamped[0],
         load=load,
     )
-
-
-def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> RemainderBounds:
-    """Bound what quadratic Taylor models of a modal model's outputs leave out in a box.
-
-    They may be expanded about any point of the box [lower, upper]. The bounds follow by majorants:
-    derivatives by the inputs of C exp(λ t) over exp(λ₀ t) are at most those of Σ_p t^p C ρ^p / p!
-    with majorants of C and of ρ = λ − λ₀, that is, with polynomials whose coefficients are positive
-    and whose derivatives are at least as large.
-
-    Args:
-        model: The modal model with T time nodes, m outputs and d inputs.
-        lower: Lower ends of the box in unit coordinates, shape (d,).
-        upper: Upper ends, shape (d,).
-
-    Returns:
-        `third`, bounds of the third derivatives by u_i, u_j, u_k, shape (T, m, d, d, d), symmetric
-        in the last three axes; and `rounding`, bounds of the rounding of an output and of its
-        slopes by the inputs, with what the tables of loads truncate, shape (T, m, 1 + d).
-    """
-    d = len(lower)
-    n = model.count
-    m = len(model.flow.outputs)
-    time = model.flow.time
-    reach = np.maximum(np.abs(lower), np.abs(upper))
-    growth = largest_growth(model.eigenvalue, reach)
-    eigenvalue = majorant_parts(model.eigenvalue, reach)  # by degree, (monomials, n)
-    rho = [part[..., np.newaxis] for part in eigenvalue]
-    cubic = np.zeros((len(time), count(d, 3), m))
-    rounding = np.zeros((len(time), 1 + d, m))  # of values, then of slopes
-    relative_rounding = _relative_rounding(model, eigenvalue[0][0])
-    for part in response_parts(model, growth):
-        # What the tables of a load miss of R, R′ and R″. Values, slopes and Hessians of the outputs
-        # are made of these: C R; C_i R + C λ_i R′; and so on. Third derivatives, for which alone R‴
-        # is needed, are bounded and not computed.
-        table_errors: Array = np.zeros((4, len(time), n))
-        if part.load is not None:
-            table_errors[:3] = part.load.errors(part.waves, growth)
-        term = majorant_parts(part.coefficient, reach)  # of C ρ^p / p!, (monomials, n, m)
-        for p in range(4):
-            waves = 2 * part.waves[p]
-            cubic += np.tensordot(waves, term[3], (1, 1))
-            quadratic = TaylorModel(tuple(term[:3]), np.zeros((n, m)), d)
-            # A quadratic model with errors in its value, slopes and Hessian is off by these
-            # errors times 1, |x_i| and |x_i x_j|, and its slopes by those of slopes and Hessian
-            # times 1 and |x_j|. The first two degrees of the majorant bound both.
-            largest = np.concatenate(majorant_parts(quadratic, upper - lower)[:2])
-            errors = relative_rounding * waves + 2 * table_errors[p]
-            rounding += np.tensordot(errors, largest, (1, 1))
-            term = [
-                product_part(term, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
-                for k in range(4)
-            ]
-        if part.load is None:
-            # The free response comes first. At t = 0 the sum over its modes is an initial
-            # state, of which most cancels, and is bounded as one polynomial.
-            at_start = np.full(n, 2.0) @ part.coefficient.real
-            cubic[time == 0] = majorant_parts(at_start, reach)[3]
-
-    # The third derivative of u^e at 0 is e!, and all other derivatives are zero there. Rounding of
-    # majorants and of their sums is far below 1e-9 of them.
-    factorials = np.array([1, 1, 2, 6])
-    of_exponents = factorials[exponents(d, 3)].prod(axis=1)
-    third = (1 + 1e-9) * (cubic * of_exponents[:, np.newaxis]).swapaxes(1, 2)
-    places = product_places(d, 1, 2)[:, product_places(d, 1, 1)]  # of u_i u_j u_k, (d, d, d)
-    return RemainderBounds(
-        third=np.ascontiguousarray(third[..., places]),
-        rounding=np.ascontiguousarray((1 + 1e-9) * rounding.swapaxes(1, 2)),
-    )
-
-
-def _relative_rounding(model: ModalModel, rate: Array) -> Array:
-    """Bound the relative rounding error of each mode's response at each time node, shape (T, n).
-
-    It is ε times the number of operations on polynomials, waves and their sums; the rounding of λ
-    enters exp(λ t) and the response to a load times |λ| t, since |∂w/∂λ| ≤ t w with the bounds w
-    of `response_parts`. What the tables of a load miss is not contained; see `LoadTables.errors`.
-
-    Args:
-        model: The modal model of n modes with T time nodes.
-        rate: Bounds of |λ|, shape (n,), in 1/s.
-    """
-    n_terms, d = model.eigenvalue.exponents.shape
-    of_polynomial = n_terms + model.degree + 2
-    phase = rate * model.flow.time[:, np.newaxis]
-    operations = of_polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
-    return np.finfo(float).eps * operations
