@@ -23,11 +23,12 @@ from alphacut.rve.image.bounds import (
 )
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import Element, element_of
-from alphacut.rve.image.fields.energy import SideSolution, solve_side
+from alphacut.rve.image.fields.energy import solve_side
 from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.grid import device_array
 from alphacut.rve.image.fields.kernels import call_kernels
+from alphacut.rve.image.fields.split import SideSolution, solve_beside_pores
 from alphacut.rve.image.phases import ModuliImages
 from alphacut.rve.result.moduli import ISOTROPIC, require_average
 
@@ -194,7 +195,7 @@ class GridModel(Generic[Bounds]):
         Args:
             moduli: Bulk modulus (of the plane K + G/3) and shear modulus of each pixel or voxel in
                 Pa, shape (2, y, x) or (2, z, y, x); or its conductivity, shape (1, …). They are
-                finite. Pores, with a modulus of 0, are allowed for dual fields alone.
+                finite. A pore has a modulus of 0, or both for displacements.
             dual: Whether to solve for stresses or fluxes, whose energy bounds the inverse of the
                 stiffness or conductivity from above; else for displacements or temperatures, whose
                 energy bounds it from above.
@@ -213,11 +214,14 @@ class GridModel(Generic[Bounds]):
         solver = replace(self.solver, watch=watch or self.solver.watch)
         first_guess = None
         # Fields beside pores are of another kind than those without.
-        beside_pores = dual and not moduli.all()
+        beside_pores = not moduli.all()
         if start is not None and start.beside_pores == beside_pores:
             first_guess = start.fields
         if beside_pores:
             fine = self._divided(moduli)
+            if not dual:
+                element = self._element(dual=False)
+                return solve_beside_pores(element, list(fine), solver=solver, start=first_guess)
             if self.conduction:
                 return solve_fluxes(fine[0], self.sides, solver=solver, start=first_guess)
             return solve_stresses(fine, self.sides, solver=solver)

@@ -186,15 +186,16 @@ class ModuliImages:
         """Return the moduli that fields of one side of the bounds are computed with.
 
         Stiffer phases make a stiffer cell. So the lower bound holds with a rigid phase that is too
-        soft, and the upper one with a pore that is a little too stiff. For stresses rigid phases
-        take 1e4 times the largest finite modulus; more would multiply the iterations. For
-        displacements pores take 1e-6 of the smallest one; less would add some iterations.
+        soft, and the upper one with a modulus that is a little too large. For stresses rigid phases
+        take 1e4 times the largest finite modulus; more would multiply the iterations. Pores keep
+        the modulus 0; of displacements a phase with one modulus of 0 alone takes 1e-6 of the
+        smallest one of the others.
 
         The same holds for fluxes, temperatures, and phases of infinite conductivity.
 
         Args:
             dual: True for stresses and fluxes, which take the lower moduli and prove the lower
-                bound; pores keep the modulus 0. False for displacements and temperatures, which
+                bound. False for displacements and temperatures, which
                 take the upper moduli and prove the upper bound.
 
         Returns:
@@ -216,6 +217,8 @@ class ModuliImages:
             clipped[k] = np.minimum(values, 1e4 * finite.max())
             if not dual:
                 clipped[k] = np.maximum(clipped[k], 1e-6 * finite.min())
+        if not dual:
+            clipped[:, ~moduli.any(axis=0)] = 0.0
         return clipped
 
     def equals(self, images: ModuliImages) -> bool:

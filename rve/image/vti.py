@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -14,8 +15,9 @@ from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import require
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.rve.image.fields.element import Element, element_of
-from alphacut.rve.image.fields.energy import SideSolution, modes_of
+from alphacut.rve.image.fields.energy import modes_of
 from alphacut.rve.image.fields.grid import on_host
+from alphacut.rve.image.fields.split import SideSolution
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.study import GreyImage, ImagePhase, image_study
 
@@ -117,13 +119,16 @@ def _pixel_means(element: Element, side: SideSolution | None, division: int) -> 
     """
     if side is None:
         return None
-    fields = side.fields
+    packed = side.fields
+    fields = packed
+    if side.split is not None:
+        fields = side.split.on_grid(packed)
     n_loads = fields.shape[0]
     fine_grid = fields.shape[2:]
     # Each axis of the fine grid becomes two: of pixels, and of the cells in a pixel.
     pairs = [size for length in fine_grid for size in (length // division, division)]
     axes_in_pixel = tuple(range(3, 3 + 2 * len(fine_grid), 2))
-    if side.beside_pores:  # these fields are the means over cells
+    if side.beside_pores and side.split is None:  # these fields are the means over cells
         return np.asarray(fields.reshape(n_loads, -1, *pairs).mean(axis=axes_in_pixel))
     uniform_modes = element.mean_modes(np.eye(n_loads))
     # The modes are coefficients of orthonormal polynomials, and those of a uniform field belong to
@@ -131,7 +136,10 @@ def _pixel_means(element: Element, side: SideSolution | None, division: int) -> 
     # modes, by the pseudo-inverse, give the mean of the field over the cell.
     to_means = np.linalg.pinv(element.of_voigt)
     means = np.empty((n_loads, len(to_means), *fine_grid))
-    for found in modes_of(element, fields, uniform_modes):
+    groups = [modes_of(element, fields, uniform_modes)]
+    if side.split is not None:  # cells at split nodes have other unknowns than those of the grid
+        groups.append(side.split.modes(packed, uniform_modes))
+    for found in chain(*groups):
         of_cells = np.tensordot(to_means, on_host(found.modes), axes=1)
         for component, load in np.ndindex(of_cells.shape[:2]):
             grid = means[load, component]

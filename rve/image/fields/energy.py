@@ -84,6 +84,8 @@ class Energies:
         # By Gershgorin's circles the diagonal matrix of the row sums of D⁻¹ error D⁻¹ is above any
         # symmetric matrix whose entries are that small. D makes loads of any size count alike.
         scale = np.sqrt(np.maximum(np.diagonal(value), np.finfo(float).tiny))
+        # Where a load has hardly any energy, errors shared with others count for it, not for them.
+        scale = np.maximum(scale, 2.0**30 * self.mode_errors.sum(axis=0))
         return np.asarray(value + np.diag(SAFETY * (error / scale).sum(axis=1) * scale))
 
 
@@ -162,14 +164,34 @@ def energies(
         Σ coefficient · error² over modes, shape (parts, fields); and `summed`, a bound of the
         relative rounding of products and sums.
     """
-    xp = namespace(fields)
-    count = fields.shape[0]
+    slabs_of_modes = modes_of(element, fields, mean_modes)
     cells = math.prod(fields.shape[2:])
-    value = np.zeros((len(element.parts), count, count))
-    squared_errors = np.zeros((len(element.parts), count))
+    return energies_of(element, slabs_of_modes, coefficients, fields=len(fields), cells=cells)
+
+
+def energies_of(
+    element: Element,
+    slabs_of_modes: Iterator[SlabModes],
+    coefficients: Sequence[Fields],
+    *,
+    fields: int,
+    cells: int,
+) -> Energies:
+    """Return mean energy products of all pairs of fields from their modes; see `energies`.
+
+    Args:
+        element: Element of the fields.
+        slabs_of_modes: Modes of groups of cells.
+        coefficients: Coefficients of the squares of each part in each cell of the grid.
+        fields: Number of fields.
+        cells: Number of cells that means are over.
+    """
+    xp = namespace(coefficients[0])
+    value = np.zeros((len(element.parts), fields, fields))
+    squared_errors = np.zeros((len(element.parts), fields))
     additions = 0
     max_cells = 0
-    for slab, modes, amplification, local in modes_of(element, fields, mean_modes):
+    for slab, modes, amplification, local in slabs_of_modes:
         # `modes_of` gives the factors of this bound of the errors of modes.
         errors = xp.tensordot(amplification, local, axes=1) + UNIT * xp.abs(modes)
         for k, (rows, coefficient) in enumerate(zip(element.parts, coefficients, strict=True)):
@@ -340,23 +362,6 @@ class FieldSolution:
 
     fields: Fields
     energy: Energies
-
-
-@dataclass(frozen=True, eq=False)
-class SideSolution:
-    """Solution of one side of the bounds.
-
-    Args:
-        fields: Unknowns for each load, shape (loads, unknowns, *grid). Those of elements are of
-            unit loads, of strains and stresses in Voigt order.
-        bound: What they prove of the stiffness or conductivity, from above or from below in the
-            Loewner order.
-        beside_pores: Whether the fields are those of a method for pores, for the lower bound.
-    """
-
-    fields: Fields
-    bound: Array
-    beside_pores: bool = False
 
 
 def solve_side(

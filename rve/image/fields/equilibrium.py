@@ -31,7 +31,6 @@ from alphacut.rve.image.fields.energy import (
     SAFETY,
     UNIT,
     Energies,
-    SideSolution,
     bound_of_trials,
     solved_loads,
 )
@@ -47,6 +46,7 @@ from alphacut.rve.image.fields.macro_element import (
 )
 from alphacut.rve.image.fields.nodes import NodeCopies, corner_groups
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
+from alphacut.rve.image.fields.split import SideSolution
 
 STEPS = 2
 """Steps of conjugate gradients towards the best stress: tuned; two come within .5 % of it."""

@@ -22,12 +22,12 @@ from alphacut.rve.image.fields.energy import (
     SAFETY,
     UNIT,
     Energies,
-    SideSolution,
     bound_of_trials,
 )
 from alphacut.rve.image.fields.forest import Forest, sweep_fluxes, unit_of
 from alphacut.rve.image.fields.grid import Fields
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
+from alphacut.rve.image.fields.split import SideSolution
 
 
 def solve_fluxes(

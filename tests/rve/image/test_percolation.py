@@ -11,6 +11,8 @@ from alphacut.rve.image.fields import fluxes as of_fluxes
 from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
 from alphacut.rve.image.fields.forest import Forest, sweep_fluxes
+from alphacut.rve.image.fields.nodes import NodeCopies
+from alphacut.rve.image.phases import ModuliImages
 from tests.rve.image.test_bounds import TIGHT
 from tests.rve.image.test_conduction import finite_volumes
 
@@ -191,3 +193,51 @@ def test_lower_bounds_of_porous_volumes_rise_with_the_grid_below_the_upper_ones(
     assert np.linalg.eigvalsh(coarse.upper - fine.upper)[0] > -margin
     gaps = [np.trace(x.upper - x.lower) / np.trace(x.upper) for x in (coarse, fine)]
     assert gaps[1] < gaps[0] / 1.3
+
+
+@pytest.mark.parametrize("soft", [0.0, 1e-4])
+def test_squares_that_touch_at_corners_are_apart_beside_void_alone(soft):
+    """A checkerboard of 1 and k conducts √k (Keller 1964), and nothing where k is 0."""
+    board = np.kron([[1.0, soft], [soft, 1.0]], np.ones((8, 8)))
+    low, high = solve_conduction(board, solver=TIGHT).bounds.mean
+    assert low <= np.sqrt(soft) <= high
+    if not soft:
+        assert high < 1e-9
+    cubes = np.where(np.indices((4, 4, 4)).sum(0) % 2, 1.0, soft)
+    low, high = solve_conduction(refined(cubes, 2), solver=TIGHT).bounds.mean
+    assert low <= high
+    assert high < 1e-9 or soft
+
+
+def test_nodes_are_split_beside_void_and_not_beside_a_soft_phase(rng):
+    """A phase of any modulus above 0 conducts through the node: what splits it would be below."""
+    solid = np.indices((4, 4)).sum(0) % 2 == 1
+    split = NodeCopies.of_mask(solid)
+    whole = NodeCopies.of_mask(np.ones_like(solid))
+    assert len(split.places) == 2 * solid.size
+    assert np.array_equal(whole.places, np.arange(solid.size))
+    images = ModuliImages(np.where(solid, 1.0, 0.0)[None], np.where(solid, 1.0, 1e-9)[None])
+    assert not images.moduli_of_fields(dual=True)[0][~solid].any()
+    assert images.moduli_of_fields(dual=False)[0][~solid].all()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_islands_thin_cells_and_single_pores_have_ordered_bounds(dimension, rng):
+    shape = (6, 5, 4)[:dimension]
+    island = np.zeros(shape, int)
+    island[tuple(slice(1, 3) for _ in shape)] = 1
+    one_pore = np.ones(shape, int)
+    one_pore[(2,) * dimension] = 0
+    thin = (rng.random((1, *shape[1:])) < 0.7).astype(int)
+    thin.ravel()[0] = 1
+    touching = np.zeros(shape, int)
+    touching[(slice(0, 2),) * dimension] = touching[(slice(2, 4),) * dimension] = 1
+    for phase in (island, one_pore, thin, touching):
+        bounds = solve_image(*moduli(phase, (1.0,))).bounds
+        assert np.linalg.eigvalsh(bounds.lower)[0] > -1e-12
+        assert np.linalg.eigvalsh(bounds.upper - bounds.lower)[0] > -1e-12
+        if phase is island or phase is touching:
+            assert not bounds.lower.any()
+            assert abs(bounds.upper).max() < 1e-5
+        if phase is one_pore:
+            assert bounds.has_lower
