@@ -26,7 +26,7 @@ from alphacut.rve.image.fields.energy import (
     energies_of,
     solved_loads,
 )
-from alphacut.rve.image.fields.grid import SLAB_CELLS, Operator
+from alphacut.rve.image.fields.grid import SLAB_CELLS, Fields, Operator
 from alphacut.rve.image.fields.nodes import NodeCopies
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
