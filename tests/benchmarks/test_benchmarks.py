@@ -37,6 +37,16 @@ def test_a_random_problem_said_otherwise_gives_no_contradiction(kind):
     assert not {name: lines for name, lines in found.items() if lines}
 
 
+@pytest.mark.slow
+def test_bounds_of_random_cells_hold_at_the_edges_of_what_is_allowed(rng, capsys):
+    pytest.importorskip("alphacut.rve.fenicsx")
+    pytest.importorskip("gmsh")
+    from benchmarks.rve import extreme_cells
+
+    wrong = extreme_cells.run(20, int(rng.integers(2**32)), None)
+    assert wrong == 0, capsys.readouterr().out
+
+
 def test_options_agree_in_e_or_say_why_there_is_none(monkeypatch, capsys):
     pytest.importorskip("alphacut.rve.fenicsx")
     from benchmarks.rve import solvers
