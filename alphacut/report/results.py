@@ -536,6 +536,9 @@ def natures(parts: Parts) -> Iterator[str]:
         yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
     if parts.encloses:
         yield enclosing_box_words(parts.encloses)
+    learned = parts.update
+    if learned is not None and learned.narrowed and min(learned.narrowed.values()) > 0.99:
+        yield "The measured modes teach nothing: no input has a narrower range than before"
     if suite is not None:
         yield "A mean is that of one structure's peaks; its bounds are means of the records' bounds"
     # Envelopes whose own bounds are not guaranteed were compared with wider ones that are.

@@ -18,6 +18,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError, require
+from alphacut.frame.identification.contraction import contracted
 from alphacut.frame.identification.enclosure import enclosure
 from alphacut.frame.identification.learned import LearnedInputs, Predictions
 from alphacut.frame.identification.modes import Chain, MeasuredMode, ModeCut, eigenvalue_ranges
@@ -87,7 +88,11 @@ def identify(
         high = np.minimum(prior_high, high)
         box = None
         if (low <= high).all():
-            box = enclosure(evidence.chain, low, high, evidence.modes(level))
+            modes = evidence.modes(level)
+            box = enclosure(evidence.chain, low, high, modes)
+            # Linear programs narrow little without shapes, whereas ranges of frequencies are exact.
+            if box is not None and not any(mode.shape for mode in modes):
+                box = contracted(evidence.chain, box[0], box[1], modes)
         if box is None:
             empty = level
             break
