@@ -54,7 +54,8 @@ def test_the_peak_is_that_of_the_response_spectrum(rng):
     for period in (0.1, 0.5):
         found = filtered_record(ground, period, 0.05, substeps=20, duration=2.0)
         peak = np.abs(found.record.samples).max()
-        assert peak == pytest.approx(response_spectrum(ground, period), rel=5e-3)
+        expected = response_spectrum(ground, period, readings=2000)  # 40 miss up to a percent
+        assert peak == pytest.approx(expected, rel=2e-3)
 
 
 def test_the_error_falls_with_the_cube_of_the_step(rng):
