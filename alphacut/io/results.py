@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -88,8 +88,8 @@ def write_arrays(data: xarray.Dataset, path: Path) -> None:
     empty = {name: dict(x.sizes) for name, x in data.variables.items() if x.size == 0}
     if empty:
         data = data.drop_vars(empty).assign_attrs({EMPTY: json.dumps(empty)})
-    texts = {}
-    others = {}
+    texts: dict[str, Any] = {}
+    others: dict[str, Any] = {}
     for name, value in data.attrs.items():
         is_list = not isinstance(value, str) and np.asarray(value).dtype.kind == "U"
         (texts if is_list else others)[name] = value
