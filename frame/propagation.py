@@ -307,9 +307,9 @@ def require_envelope(
     first_steps.values(problem.flow.boxes.probes)
     if isinstance(flow, YieldingFlow):
         if problem.method.name == "proof":
-            from alphacut.frame.methods.yielding_proof import provable_storey
+            from alphacut.frame.methods.yielding_proof import provable_frame
 
-            provable_storey(flow, problem.flow.boxes)
+            provable_frame(flow, problem.flow.boxes)
     elif problem.method.name in ("proof", "dual"):
         proof = cast("Proof | DualProof", problem.method)
         with refusing():

@@ -1,10 +1,12 @@
-"""Guaranteed envelope of one yielding storey, by branch and bound over up to three inputs.
+"""Guaranteed envelope of a frame with one yielding storey, by branch and bound over three inputs.
 
-`frame.bounds.yielding_element` has the inequality that the bounds over a sub-box rest on.
+The theory, "A yielding storey" in docs/theory/proofs.md, has the inequality that the bounds over a
+sub-box rest on.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 
@@ -13,6 +15,7 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
 from alphacut.base.progress_bar import Progress
+from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
 from alphacut.frame.bounds.yielding_box import MAX_ERROR, YieldingStorey
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -29,34 +32,76 @@ MIN_WIDTH = 2.0**-14
 """Width of a sub-box, as a fraction of that of the whole, at which further ones do not help."""
 MAX_INPUTS = 3
 """Most inputs with a width: the number of sub-boxes grows as a power of theirs."""
+ROOM = 0.5
+"""Fraction of the wanted gap that may be spent on events that are left out (tuned)."""
+ROOM_BEFORE = 0.7
+"""Fraction of the distance of what follows below the peak that may be spent so (tuned)."""
+SHOWN_RANGES = 3
+"""Number of open sub-boxes that a message names."""
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """A limit of an output's peak, as the question that a proof answers.
+
+    Args:
+        output: Name of the output.
+        value: Limit of its magnitude, of its largest value, or of that of its negative, in SI
+            units.
+        side: None of magnitudes, True of largest values, False of smallest ones, whose negatives
+            are limited.
+    """
+
+    output: str
+    value: float
+    side: bool | None = None
+
+    def peak(self, both: Array) -> Array:
+        """Return the peak that counts of largest values of (−output, output), shape (…, 2)."""
+        if self.side is None:
+            return np.asarray(both.max(axis=-1))
+        return both[..., int(self.side)]
+
+
+class OpenError(UnprovedError):
+    """Parts of the box are not bounded; what is known of the others is in the message."""
 
 
 def prove_yielding(
-    flow: UnitFlow, name: str, gap: Array, *, budget: float, progress: Progress | None = None
+    flow: UnitFlow,
+    name: str,
+    gap: Array,
+    *,
+    budget: float,
+    thresholds: Sequence[Threshold] = (),
+    progress: Progress | None = None,
 ) -> Envelope:
-    """Return the guaranteed envelope and peaks of one storey that yields.
+    """Return the guaranteed envelope and peaks of a frame with one storey that yields.
 
     Args:
         flow: The response over the boxes of the inputs.
         name: Name of the method.
         gap: Wanted distance of guaranteed and attained peak of each output, in its unit, (m,).
         budget: Most sub-boxes on a level.
+        thresholds: Limits of peaks. With them the effort goes to the question whether they hold,
+            and not to the gaps.
         progress: Called with the completed fraction.
 
     Raises:
-        UnprovedError: There is more than one storey; more than three inputs have a width; or the
-            bounds are not finite within the budget. The message says which input to narrow.
+        UnprovedError: More or less than one storey yields; more than three inputs have a width; or
+            the bounds are not finite within the budget. The message says what is known, where it
+            is open, and which input to narrow.
         RefusedError: A trajectory does not exist.
         FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
     """
     yielding_flow = flow.flow
     assert isinstance(yielding_flow, YieldingFlow)
     boxes = flow.boxes
-    storey = provable_storey(yielding_flow, boxes)
+    frame = provable_frame(yielding_flow, boxes)
     influence = _influence(yielding_flow, boxes)
     levels: list[_Search] = []
     for row, tick in boxes.inside_out(progress):
-        search = _Search(storey, influence, boxes.lower[row], boxes.upper[row], gap)
+        search = _Search(frame, influence, boxes.lower[row], boxes.upper[row], gap, thresholds)
         if levels:  # a wider box contains what the narrower one attains
             search.take_over(levels[-1])
         search.run(budget, tick)
@@ -65,16 +110,23 @@ def prove_yielding(
     return _envelope(flow, name, levels[::-1], influence)
 
 
-def provable_storey(flow: YieldingFlow, boxes: Boxes) -> YieldingStorey:
-    """Return the storey whose peaks can be proved.
+def provable_frame(flow: YieldingFlow, boxes: Boxes) -> InterpolatedFrame | YieldingStorey:
+    """Return the frame whose peaks can be proved, with the way to bound it over a box.
+
+    A frame of one storey is bounded by a march of polynomials (`yielding_element`), others by
+    interpolated motions (`interpolated_box`).
 
     Raises:
-        UnprovedError: There is more than one storey, or it is such that nothing is proved of it; or
-            more than three inputs have a width, and the message says which one moves the response
-            least.
+        UnprovedError: More or less than one storey yields, or the frame is such that nothing is
+            proved of it; or more than three inputs have a width, and the message says which one
+            moves the response least.
     """
     active = np.flatnonzero(boxes.upper[0] > boxes.lower[0])
-    storey = YieldingStorey(flow, active)
+    frame: InterpolatedFrame | YieldingStorey
+    if flow.system.floors == 1:
+        frame = YieldingStorey(flow, active)
+    else:
+        frame = InterpolatedFrame(flow, active)
     if len(active) > MAX_INPUTS:
         influence = _influence(flow, boxes)
         weakest = boxes.names[active[influence[active].argmin()]]
@@ -82,7 +134,10 @@ def provable_storey(flow: YieldingFlow, boxes: Boxes) -> YieldingStorey:
             f"{MAX_INPUTS} inputs of a storey that yields can be proved, not {len(active)}",
             f"take {weakest} as a crisp number: it moves the response least",
         )
-    return storey
+    if isinstance(frame, InterpolatedFrame):
+        for point in _probes(boxes.lower[0], boxes.upper[0]):
+            frame.require_provable(point)
+    return frame
 
 
 def _influence(flow: YieldingFlow, boxes: Boxes) -> Array:
@@ -106,21 +161,28 @@ class _SubBox:
 
     `low` and `high` are its ends in SI units, shape (d,). `upper` has the largest values of
     (−output, output) at time nodes and over the steps before them, shape (2, T, m, 2), and `peaks`
-    the same over all times, shape (m, 2). `error` bounds the error in the energy norm, in m/s.
+    the same over all times, shape (m, 2). `error` is above 1 where an error of the motion makes the
+    bounds at time nodes wide.
     """
 
     low: Array
     high: Array
     upper: Array
     peaks: Array
-    error: float
+    error: float = 0.0
+
+    @property
+    def least(self) -> Array:
+        """Lower bounds of the largest values of (−output, output) over time, shape (m, 2)."""
+        # An output is at least minus the bound of its negative at each node.
+        return np.asarray((-self.upper[0, :, :, ::-1]).max(axis=0))
 
 
 class _Search:
     """Branch and bound of the peaks on one level.
 
-    A sub-box is closed when its peaks exceed the attained ones by no more than the tolerance and
-    its error is small, else it is bisected along the input that moves the response most over it.
+    A sub-box is closed when it says all that is asked (`is_closed`), else it is bisected along the
+    input that moves the response most over it.
 
     Attributes:
         upper: Guaranteed bounds over closed sub-boxes, at nodes and over steps, (2, T, m, 2).
@@ -133,29 +195,40 @@ class _Search:
         least_peak: Smallest peak magnitude of a trajectory, shape (m,).
         least_peak_at: Its inputs, shape (m, d).
         count: Number of sub-boxes.
+        open: Sub-boxes that were left when the effort ended.
+        finite_peaks: Guaranteed bounds of peaks over sub-boxes that have them, shape (m, 2).
     """
 
     def __init__(
-        self, storey: YieldingStorey, influence: Array, low: Array, high: Array, gap: Array
+        self,
+        frame: InterpolatedFrame | YieldingStorey,
+        influence: Array,
+        low: Array,
+        high: Array,
+        gap: Array,
+        thresholds: Sequence[Threshold],
     ) -> None:
         """Begin with the trajectories at corners and centre of the box of a level.
 
         Args:
-            storey: The storey.
+            frame: The frame.
             influence: By how much each input moves the response, shape (d,).
             low: Lower ends of the box, in SI units, shape (d,).
             high: Upper ends.
             gap: Wanted gap of the peak of each output, in its unit, shape (m,).
+            thresholds: Limits of peaks, if they are what is asked.
         """
         self.gap = np.maximum(gap, 1e-300)
-        self.storey = storey
+        self.frame = frame
         self.influence = influence
         self.low = low
         self.high = high
         self.width = np.where(high > low, high - low, 1.0)
-        m = len(storey.flow.outputs)
+        outputs = list(map(str, frame.flow.outputs))
+        self.thresholds = [(outputs.index(x.output), x) for x in thresholds]
+        m = len(outputs)
         d = len(low)
-        shape = (len(storey.flow.time), m, 2)
+        shape = (len(frame.flow.time), m, 2)
         self.upper = np.full((2, *shape), -np.inf)
         self.peaks = np.full((m, 2), -np.inf)
         self.min_peak = np.full(m, np.inf)
@@ -165,8 +238,12 @@ class _Search:
         self.peak_at = np.zeros((m, d))
         self.least_peak = np.full(m, np.inf)
         self.least_peak_at = np.zeros((m, d))
+        # smallest and largest peak of trajectories that each threshold compares
+        self.seen = np.tile([np.inf, -np.inf], (len(self.thresholds), 1))
         self.count = 0
         self.trajectories = 0
+        self.open: list[_SubBox] = []
+        self.finite_peaks = np.full((m, 2), -np.inf)
         self._attain(_probes(low, high))
 
     def take_over(self, narrower: _Search) -> None:
@@ -180,6 +257,8 @@ class _Search:
         lower = narrower.least_peak < self.least_peak
         self.least_peak[lower] = narrower.least_peak[lower]
         self.least_peak_at[lower] = narrower.least_peak_at[lower]
+        self.seen[:, 0] = np.minimum(self.seen[:, 0], narrower.seen[:, 0])
+        self.seen[:, 1] = np.maximum(self.seen[:, 1], narrower.seen[:, 1])
 
     def run(self, budget: float, progress: Progress) -> None:
         """Bound sub-boxes until all are closed, or the budget is spent; see the class.
@@ -189,19 +268,22 @@ class _Search:
             progress: Called with the completed fraction.
 
         Raises:
-            UnprovedError: A quantity that must be positive may not be so over a sub-box.
+            UnprovedError: A quantity that must be positive may not be so over any sub-box.
         """
+        self.room = self._room()
+        # Sub-boxes that have no bounds come first, the widest ones before others, and then those
+        # that are farthest from an answer.
         heap: list[tuple[float, int, _SubBox]] = []
         self._add(heap, self._bounded(self.low, self.high, None))
         while heap and self.count < budget:
             _, _, box = heappop(heap)
-            if self._score(box) <= 1:  # as attained values have risen since
+            if self.is_closed(box):  # as attained values have risen since
                 self._close(box)
                 continue
             axis = int((self.influence * (box.high - box.low) / self.width).argmax())
             middle = (box.low[axis] + box.high[axis]) / 2
             if box.high[axis] - box.low[axis] < MIN_WIDTH * self.width[axis]:
-                self._close(box)
+                self.open.append(box)
                 break
             for is_above in (False, True):
                 low = box.low.copy()
@@ -212,8 +294,16 @@ class _Search:
                     high[axis] = middle
                 self._add(heap, self._bounded(low, high, box))
             progress(self.count / budget)
-        for _, _, box in heap:
-            self._close(box)
+        self.open += [box for _, _, box in heap]
+
+    def is_closed(self, box: _SubBox) -> bool:
+        """Return whether a sub-box says all that is asked.
+
+        A threshold is answered by a sub-box whose bounds keep it or exceed it everywhere, and on
+        the whole level by two trajectories, one that keeps and one that exceeds it. Without
+        thresholds the peaks must be within the wanted gap of the attained ones.
+        """
+        return self._score(box) <= 1
 
     def test(self, boxes: Boxes, level: int) -> None:
         """Compare the bounds with trajectories at points that no sub-box has used.
@@ -221,6 +311,8 @@ class _Search:
         Raises:
             FailedError: An attained value exceeds a guaranteed bound: the proof is wrong.
         """
+        for box in self.open:
+            self._close(box)
         self._attain(boxes.to_physical(independent_points(boxes, level)))
         excess = self.attained - self.upper[0]
         peaks = np.maximum(self.peaks.max(axis=1), 0.0)
@@ -229,45 +321,116 @@ class _Search:
             what = f"a response lies outside the proved bounds by {worst:.3g}"
             raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
+    @property
+    def closed_fraction(self) -> float:
+        """Fraction of the box that is closed."""
+        active = self.high > self.low
+        total = np.prod((self.high - self.low)[active])
+        left = sum(float(np.prod((x.high - x.low)[active])) for x in self.open)
+        return float(1 - left / total)
+
+    def open_ranges(self, names: Sequence[str]) -> str:
+        """Name the ranges of inputs that are open, in SI units; empty if there are none."""
+        active = np.flatnonzero(self.high > self.low)
+        if not self.open:
+            return ""
+        low = np.min([x.low for x in self.open], axis=0)
+        high = np.max([x.high for x in self.open], axis=0)
+        shown = [(x.low, x.high) for x in self.open]
+        if len(shown) > SHOWN_RANGES:
+            shown = [(low, high)]
+        texts = []
+        for begin, end in shown:
+            ranges = [f"{names[i]} in [{begin[i]:.5g}, {end[i]:.5g}]" for i in active]
+            texts.append(" and ".join(ranges))
+        within = "within " if len(self.open) > SHOWN_RANGES else ""
+        return within + "; ".join(texts)
+
+    def _room(self) -> Array | None:
+        """Return how large S may become by events that are left out, (E,), or None if unknown.
+
+        Before the time of a peak it is a fraction of the wanted gap, or of the distance to the
+        threshold; behind it a fraction of the distance of what follows below the peak.
+        """
+        if isinstance(self.frame, YieldingStorey):
+            return None
+        history = self.frame.bounds(*_centre(self.low, self.high)).history
+        if history is None:
+            return None
+        later = np.maximum.accumulate(history.peaks[::-1], axis=0)[::-1]
+        allowed = np.maximum(ROOM * self.gap, ROOM * ROOM_BEFORE * (later[0] - later))
+        if self.thresholds:
+            allowed = np.full_like(later, np.inf)
+            for column, threshold in self.thresholds:
+                beyond = np.abs(threshold.value - later[:, column])
+                allowed[:, column] = np.minimum(allowed[:, column], ROOM * beyond)
+        # Outputs on which S has no influence of its own, such as dissipated energy, do not count.
+        by_norm = np.where(history.by_norm > 0, history.by_norm, 1e-300)
+        room = (allowed / by_norm).min(axis=1)
+        edges = self.frame.loads[0].edges
+        return np.asarray(np.interp(edges[:-1], history.begin, room))
+
     def _bounded(self, low: Array, high: Array, parent: _SubBox | None) -> _SubBox:
         """Return a sub-box with its bounds, which are at most those of its parent."""
-        found = self.storey.bounds(low, high)
-        upper = np.stack([found.upper, found.steps])
-        peaks = found.peaks
         self.count += 1
+        upper, peaks, error = self._bounds_over(low, high)
         if parent is not None:
             upper = np.minimum(upper, parent.upper)
             peaks = np.minimum(peaks, parent.peaks)
-        return _SubBox(low, high, upper, peaks, found.error)
+        return _SubBox(low, high, upper, peaks, error)
+
+    def _bounds_over(self, low: Array, high: Array) -> tuple[Array, Array, float]:
+        """Return `upper`, `peaks` and `error` of a sub-box, see there."""
+        if isinstance(self.frame, YieldingStorey):
+            marched = self.frame.bounds(low, high)
+            # A large error makes bounds at time nodes wide, even where no peak lies.
+            error = marched.error / (0.1 * MAX_ERROR * self.frame.yield_velocity)
+            return np.stack([marched.upper, marched.steps]), marched.peaks, error
+        try:
+            found = self.frame.bounds(low, high, self.room)
+        except UnprovedError:  # what must be positive may be so on narrower boxes
+            found = self.frame.infinite
+        return np.stack([found.upper, found.steps]), found.peaks, 0.0
 
     def _add(self, heap: list[tuple[float, int, _SubBox]], box: _SubBox) -> None:
-        """Close a sub-box if its bounds suffice, and else add it to the heap, the widest first."""
-        if self._score(box) > 1:
+        """Close a sub-box if its bounds suffice, and else add it to the heap."""
+        if not self.is_closed(box):
             self._attain(_probes(box.low, box.high))
-        score = self._score(box)
-        if score <= 1:
+        if self.is_closed(box):
             self._close(box)
         else:
-            heappush(heap, (-score, self.count, box))
+            heappush(heap, (-self._score(box), self.count, box))
 
     def _score(self, box: _SubBox) -> float:
-        """Return the largest gap of a peak over the wanted one; above 1 also for wide errors."""
-        gap = (box.peaks.max(axis=1) - self.peak) / self.gap
-        # A large error makes bounds at time nodes wide, even where no peak lies.
-        wide = box.error / (0.1 * MAX_ERROR * self.storey.yield_velocity)
-        return float(max(gap.max(initial=0.0), wide))
+        """Return how far a sub-box is from an answer: above 1 where it is open."""
+        if not np.isfinite(box.peaks).all():
+            return np.inf
+        if not self.thresholds:
+            gaps = (box.peaks.max(axis=1) - self.peak) / self.gap
+            return float(max(gaps.max(initial=0.0), box.error))
+        score = 0.0
+        for (column, threshold), (least, most) in zip(self.thresholds, self.seen, strict=True):
+            limit = threshold.value
+            is_answered = least <= limit < most
+            keeps = threshold.peak(box.peaks[column]) <= limit
+            exceeds = threshold.peak(box.least[column]) > limit
+            if not (is_answered or keeps or exceeds):
+                score = max(score, 1 + float(threshold.peak(box.peaks[column]) - limit))
+        return score
 
     def _close(self, box: _SubBox) -> None:
         """Add the bounds of a sub-box to those of the level."""
         self.upper = np.maximum(self.upper, box.upper)
         self.peaks = np.maximum(self.peaks, box.peaks)
+        if np.isfinite(box.peaks).all():
+            self.finite_peaks = np.maximum(self.finite_peaks, box.peaks)
         # A magnitude is at least the distance of the bounds at a node from zero.
         least = np.maximum(-box.upper[0], 0.0).max(axis=(0, 2))
         self.min_peak = np.minimum(self.min_peak, least)
 
     def _attain(self, points: Array) -> None:
         """Raise attained values by the trajectories at points in SI units, shape (points, d)."""
-        values, peaks = self.storey.flow.values_and_peaks(points)
+        values, peaks = self.frame.flow.values_and_peaks(points)
         self.trajectories += len(points)
         # A trajectory is exact but for rounding, which the balance of its energy bounds.
         rounding = MAX_IMBALANCE * np.abs(values).max(axis=1)[:, np.newaxis, :, np.newaxis]
@@ -286,6 +449,23 @@ class _Search:
             is_better = better_than(found, kept)
             kept[is_better] = found[is_better]
             kept_at[is_better] = points[chosen[is_better]]
+        for (column, threshold), seen in zip(self.thresholds, self.seen, strict=True):
+            reached = peaks[:, column] * (1 - MAX_IMBALANCE)
+            kept_at_most = peaks[:, column] * (1 + MAX_IMBALANCE)
+            if threshold.side is not None:
+                # At nodes alone; what lies between may be larger, so that nothing is known to keep
+                # the limit.
+                reached = signed[:, :, column, int(threshold.side)].max(axis=1)
+                kept_at_most = np.full(len(points), np.inf)
+            seen[0] = min(seen[0], kept_at_most.min())
+            seen[1] = max(seen[1], reached.max())
+
+
+def _centre(low: Array, high: Array) -> tuple[Array, Array]:
+    """Return a box so narrow that it has one order of events, at the midpoint of a box."""
+    middle = (low + high) / 2
+    width = 1e-7 * (high - low)
+    return middle - width, middle + width
 
 
 def _probes(low: Array, high: Array) -> Array:
@@ -306,8 +486,7 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
     peaks = np.minimum.accumulate(peaks, axis=0)
     strongest = flow.boxes.names[int(influence.argmax())]
     if not np.isfinite(upper).all() or not np.isfinite(peaks).all():
-        what = f"{levels[0].count} sub-boxes do not bound all orders of events"
-        raise UnprovedError(what, f"narrow {strongest}, which moves the response most")
+        raise OpenError(_what_is_known(flow, levels[0]), f"narrow {strongest} first")
     attained = np.stack([x.attained for x in levels])
     at = np.stack([x.attained_at for x in levels])
     reached = np.stack([x.peak for x in levels])
@@ -335,7 +514,13 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
     )
     counts = sum(x.count for x in levels)
     notes = [f"{counts} sub-boxes prove peaks within {gap:.2g} of attained ones"]
-    if gap > YIELDING_GAP:
+    if levels[0].thresholds:
+        notes = [f"{counts} sub-boxes; peaks are not sought closer than their limits ask"]
+    closed = levels[0].closed_fraction
+    if levels[0].open:
+        ranges = levels[0].open_ranges(flow.boxes.names)
+        notes.append(f"{100 * closed:.3g} % of the box is closed; open is {ranges}")
+    if gap > YIELDING_GAP and not levels[0].thresholds:
         notes.append(f"narrow {strongest} first, which moves the response most")
     return flow.envelope(
         upper,
@@ -351,7 +536,24 @@ def _envelope(flow: UnitFlow, name: str, levels: list[_Search], influence: Array
         facts={
             "gap_of_peaks": gap,
             "boxes": float(counts),
+            "closed_fraction": closed,
             "motions_tested": sum(x.trajectories for x in levels),
         },
         notes=tuple(notes),
     )
+
+
+def _what_is_known(flow: UnitFlow, search: _Search) -> str:
+    """Say what is proved of the part of a box that is closed, and which one is open."""
+    found = [x for x in search.open if np.isfinite(x.peaks).all()]
+    unknown = [x for x in search.open if not np.isfinite(x.peaks).all()]
+    search.open = unknown
+    what = f"{search.count} sub-boxes do not bound all orders of events"
+    ranges = search.open_ranges(flow.boxes.names)
+    bounded = search.closed_fraction
+    if not np.isfinite(search.finite_peaks).all():
+        return f"{what}; open is {ranges}"
+    peaks = np.maximum.reduce([search.finite_peaks, *[x.peaks for x in found]]).max(axis=1)
+    texts = [f"{name} ≤ {peak:.5g}" for name, peak in zip(flow.flow.outputs, peaks, strict=True)]
+    of_box = f"over {100 * bounded:.3g} % of the box {', '.join(texts)} in SI units"
+    return f"{what}; guaranteed {of_box}; open is {ranges}"

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope, peaks
+from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
+from alphacut.frame.methods.yielding_proof import Threshold, prove_yielding
 from alphacut.fuzzy import Interval, Nature, Triangular
+from tests.frame.bounds.test_interpolated_box import isolated_building
 from tests.frame.bounds.test_yielding_box import random_storey
 
 SHORT = {"duration": 2.5, "step": 0.05, "progress": False}
@@ -69,3 +72,22 @@ def test_what_stays_at_zero_is_bounded_beside_what_moves(rng):
     assert found.nature is Nature.GUARANTEED
     drift, residual, _ = (peak.proved[0] for peak in peaks(found).values())
     assert residual < 1e-5 * drift
+
+
+def test_limits_of_an_isolated_building_are_answered_without_closing_gaps(rng):
+    frame = isolated_building(rng, 1, outputs=("q1",))
+    k = frame.parameters["k1"]
+    fy = frame.parameters["fy1"]
+    supports = {"k1": Interval(0.98 * k, 1.02 * k), "fy1": Interval(0.99 * fy, 1.01 * fy)}
+    names = tuple(supports)
+    flow = UnitFlow(YieldingFlow(frame, names, 1.5, 0.05), boxes(supports, [0.0]))
+    points = rng.uniform([0.98 * k, 0.99 * fy], [1.02 * k, 1.01 * fy], (100, 2))
+    values, reached = flow.flow.values_and_peaks(points)
+    largest = reached.max()
+    gap = 0.01 * flow.peak
+    kept = Threshold("q1", 1.5 * largest)
+    found = prove_yielding(flow, "proof", gap, budget=60, thresholds=[kept])
+    assert found.facts["closed_fraction"] == 1
+    assert (found.lower[0] <= values).all()
+    assert (values <= found.upper[0]).all()
+    assert largest <= peaks(found)["q1"].proved[0] <= 1.5 * largest
