@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         spectrum_checks,
     )
     from alphacut.frame.analyses.spectrum_response import SpectrumResponse, spectrum_response
+    from alphacut.frame.analyses.static_bounds import StaticBounds, static_bounds
     from alphacut.frame.analyses.suites import SuitePeaks, over_records
     from alphacut.frame.analyses.tolerances import Tolerances, tolerances
     from alphacut.frame.calculus.unproved import UnprovedError
@@ -75,14 +76,14 @@ __all__ = [
     "Limit", "LinearFlow", "MatrixStructure", "MeasuredMode", "Midpoint", "Output", "Parameter",
     "Peak", "Prediction", "Predictions", "Probability", "Proof", "RefutedError", "RotatedSpectra",
     "Sampled", "ScaledPeaks", "ScaledSuite", "Sensitivity", "SpectrumAccuracy", "SpectrumChecks",
-    "SpectrumResponse", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
+    "SpectrumResponse", "StaticBounds", "StoreyFrame", "SuitePeaks", "TargetSpectrum", "Tolerances",
     "UnprovedError", "affine_terms", "asce7_multi_period", "asce7_two_period", "damping_from_loss",
     "decide", "drift_sensitivity", "envelope", "eurocode8_spectrum", "floor_spectrum", "fragility",
     "identify", "incremental", "learned_envelope", "measured_mode", "over_angles", "over_records",
     "peaks", "pendulum", "probability", "read_matrix", "read_modes", "read_record", "read_spectrum",
     "read_suite", "read_unknowns", "record_spectrum", "require_envelope", "response_spectrum",
     "rotated_spectra", "scale_suite", "sensitivity", "spectral_acceleration", "spectrum_accuracy",
-    "spectrum_checks", "spectrum_response", "tolerances",
+    "spectrum_checks", "spectrum_response", "static_bounds", "tolerances",
 ]  # fmt: skip
 AT_FIRST_USE = {
     "INTEGRATORS": "dynamics.integrators",
@@ -125,6 +126,7 @@ AT_FIRST_USE = {
     "SpectrumAccuracy": "analyses.spectrum_accuracy",
     "SpectrumChecks": "analyses.spectrum_checks",
     "SpectrumResponse": "analyses.spectrum_response",
+    "StaticBounds": "analyses.static_bounds",
     "StoreyFrame": "structures.storey",
     "SuitePeaks": "analyses.suites",
     "TargetSpectrum": "spectra.target",
@@ -165,6 +167,7 @@ AT_FIRST_USE = {
     "spectrum_accuracy": "analyses.spectrum_accuracy",
     "spectrum_checks": "analyses.spectrum_checks",
     "spectrum_response": "analyses.spectrum_response",
+    "static_bounds": "analyses.static_bounds",
     "tolerances": "analyses.tolerances",
 }
 """Module of each exported name, which is imported at its first use: all of them take .1 s."""

@@ -145,6 +145,18 @@ ANALYSES: dict[str, Analysis] = {
         },
         stage="response_spectrum",
     ),
+    "static": Analysis(
+        "alphacut.frame:StaticBounds",
+        {
+            "static": Picture(
+                "alphacut.figures.answers:draw_static",
+                "Outputs at rest: guaranteed bounds by α, the nominal value, attained values as"
+                " dots",
+            )
+        },
+        "alphacut.frame.analyses.static_bounds:Static",
+        stage="static",
+    ),
 }
 """Analyses by the keys of their answers, in the order of the page."""
 

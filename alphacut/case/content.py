@@ -168,6 +168,11 @@ class Content(CellContent):
             self._require_no_questions_to_records()
         else:
             self._require_records_alone(self.records)
+        moves = not {"envelope", "response_spectrum"}.isdisjoint(self.stages)
+        if moves and "matrices" in self.structure_sections:
+            allowed = "pairs [factor, file]; stage static alone needs none"
+            mass = getattr(self.structure_sections["matrices"], "mass", ())
+            require(len(mass) > 0, "matrices.mass", None, allowed)
         if "envelope" in self.stages and self.envelope is not None:
             self._require_response(self.envelope, self._one_structure())
         for stage in self.stages:

@@ -298,7 +298,9 @@ class MatricesSection(StructureSection):
     affine: bool = False
     """whether matrices of exports are known to be affine in their parameters: then two exports for
     one parameter are enough, and none tells whether it is so"""
-    mass: Annotated[Terms, NotEmpty] = Field(description="pairs [factor, file] of M, or exports")
+    mass: Terms = Field(
+        default=(), description="pairs [factor, file] of M, or exports; none for stage static alone"
+    )
     stiffness: Annotated[Terms, NotEmpty]
     """pairs [factor, file] of K; or tables { file = FILE, NAME = VALUE } of exports for several
     values of the parameters, of which K is a sum of terms with one parameter each"""
@@ -417,7 +419,7 @@ class MatricesSection(StructureSection):
         if unnamed := [x for x in names if x not in self.unknowns and x not in held]:
             shown = ", ".join(unnamed[:6])
             yield f"{len(unnamed)} unknowns of the files are not named, and so are held: {shown}"
-        for key, other in (("mass", "stiffness"), ("stiffness", "mass")):
+        for key, other in (("mass", "stiffness"), ("stiffness", "mass")) if self.mass else ():
             of_key = self._names_of_files.get(key, ())
             of_other = self._names_of_files.get(other, ())
             if missing := [x for x in self.unknowns if x in of_other and x not in of_key]:

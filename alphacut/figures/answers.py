@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from textwrap import fill
 
@@ -26,6 +27,7 @@ from alphacut.frame import (
     ScaledSuite,
     SpectrumAccuracy,
     SpectrumResponse,
+    StaticBounds,
     Tolerances,
 )
 from alphacut.frame.analyses.decision import LimitDecision, degree_text
@@ -455,4 +457,37 @@ def draw_accuracy(answer: SpectrumAccuracy) -> Figure:
     axes.set_ylim(-0.6, rows[0] + 0.6)
     axes.set_yticks(rows, list(answer.outputs))
     axes.set_xlabel("combined peak over the peak under the record, less 1 [%]")
+    return figure
+
+
+def draw_static(answer: StaticBounds) -> Figure:
+    """Draw the bounds of outputs at rest, a panel for each unit and a row for each output.
+
+    Nominal displacements of the floors of a frame are joined by a line, the deflected shape, with
+    the ground floor below.
+    """
+    by_unit: dict[str, list[int]] = {}
+    for j, unit in enumerate(answer.units):
+        by_unit.setdefault(unit, []).append(j)
+    figure, panels = plt.subplots(
+        1, len(by_unit), squeeze=False, figsize=(WIDTH, 1.0 + 0.36 * len(answer.outputs))
+    )
+    for axes, (unit, outputs) in zip(panels[0], by_unit.items(), strict=True):
+        names = [answer.outputs[j] for j in outputs]
+        rows = np.arange(len(outputs), dtype=float)[::-1]
+        is_shape = all(re.fullmatch(r"q\d+", name) for name in names)
+        if is_shape:
+            rows = rows[::-1]
+        for level, shade in enumerate(style.colours(answer.alpha)):
+            ends = answer.bounds[level, outputs]
+            axes.barh(rows, ends[:, 1] - ends[:, 0], 0.6, ends[:, 0], color=shade)
+        for end in answer.attained[0, outputs].T:
+            axes.plot(end, rows, ".", color=INK, ms=4)
+        line = "-" if is_shape else "none"
+        axes.plot(answer.nominal[outputs], rows, "|", ls=line, color=INK, lw=0.8, ms=9)
+        axes.margins(x=0.05)
+        axes.axvline(0.0, color=GREY, lw=0.8)
+        axes.set_yticks(rows, names)
+        style.prefix_axis(axes, "at rest", unit, across=True)
+    style.alpha_legend(panels[0, -1], answer.alpha)
     return figure

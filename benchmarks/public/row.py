@@ -43,11 +43,15 @@ class Row:
     def agrees(self) -> bool:
         """Whether the published number may be what is found here.
 
-        It may lie within the bounds here. A published range or bound has to hold all of them.
+        It may lie within the bounds here. A published range or bound has to hold all of them, but
+        for half a unit of the last decimal of a range.
         """
         lower, upper = self.here if isinstance(self.here, tuple) else (self.here, self.here)
         if of := RANGE.fullmatch(self.published):
-            return float(of["lower"]) <= lower and upper <= float(of["upper"])
+            ends = Decimal(of["lower"]), Decimal(of["upper"])
+            places = [min(int(x.as_tuple().exponent), 0) for x in ends]
+            half = [math.ldexp(10.0**place, -1) if place else 0.0 for place in places]
+            return float(ends[0]) - half[0] <= lower and upper <= float(ends[1]) + half[1]
         if self.published.startswith("≤ "):
             return upper <= float(self.published.removeprefix("≤ "))
         number = Decimal(self.published)

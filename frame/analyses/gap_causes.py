@@ -43,7 +43,7 @@ def influence_of_inputs(model: StructureModel, band: Envelope, output: str) -> I
     Raises:
         RefusedError: A response at the centre of the box does not exist.
     """
-    cuts = boxes(band.inputs, band.alpha[:1])
+    cuts = boxes(band.inputs, [float(band.alpha[0])])
     radius = (cuts.upper[0] - cuts.lower[0]) / 2
     centre = (cuts.upper[0] + cuts.lower[0]) / 2
     small = np.diag(0.01 * radius)

@@ -341,7 +341,8 @@ def evaluate(
         C [q; v].
 
     Raises:
-        RefusedError: Damping is given by ratios, and the stiffness is not positive definite.
+        RefusedError: Damping is given by ratios, and the stiffness is not positive definite; or the
+            structure has no mass.
         numpy.linalg.LinAlgError: The mass, or the stiffness of the massless unknowns, is singular.
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
@@ -350,6 +351,8 @@ def evaluate(
     # All parameters are jets of the same type, and only the named ones have derivatives.
     p = variables(values, list(names) + list(fixed), names if derivatives else ())
     full = system.assembly(p)
+    allowed = "masses of a structure that moves; static_bounds takes one at rest"
+    require(len(full.massive) > 0, "mass", None, allowed)
 
     damping = full.dashpots
     # Rayleigh damping a M + b K is of the springs alone: weights on the storeys (P-Delta) reduce

@@ -52,7 +52,8 @@ class MatrixStructure(LinearSystem):
     Args:
         parameters: All parameters with their nominal values, in SI units.
         mass: Pairs (factor, symmetric array (n, n)), in kg; an array may be sparse, as those that
-            `scipy.io.mmread` reads.
+            `scipy.io.mmread` reads. Empty of a structure that is asked at rest alone
+            (`static_bounds`), whose forces may act on any unknown.
         stiffness: The same, in N/m.
         observed: Rows by output name (an `Output` gives its unit), each (n,) acting on
             displacements, (2n,) on displacements and velocities, or (3n,) on these and absolute
@@ -126,7 +127,7 @@ class MatrixStructure(LinearSystem):
         require_sequence("ratios", self.ratios, "a list of damping ratios")
         for name, value in self.parameters.items():
             checked_number(f"parameter {name}", value)
-        for name in ("mass", "stiffness", "observed"):
+        for name in ("stiffness", "observed"):
             require(len(getattr(self, name)) > 0, name, value=None, allowed="one entry at least")
         require_names("name of a parameter", self.parameters)
         require_names("name of an output", self.observed)
@@ -229,12 +230,16 @@ class MatrixStructure(LinearSystem):
             require(factor == 1, key, value, "accelerations as they are", "scale the row")
 
     def _require_forces_on_masses(self) -> None:
-        """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude."""
+        """Raise RefusedError if a force acts on an unknown without mass, or has no amplitude.
+
+        Without any mass the structure is asked at rest alone, where each unknown may be loaded.
+        """
         for force in self.loads:
             self._require_factor("a force", force.amplitude)
             missing = self.massless[np.flatnonzero(np.asarray(force.at)[self.massless])]
             value = f"on unknowns {missing}"
-            require(not len(missing), "force", value, allowed="on unknowns that have mass")
+            is_possible = not len(missing) or not self.mass
+            require(is_possible, "force", value, allowed="on unknowns that have mass")
 
     def _require_ratios(self) -> None:
         """Check the damping ratios of the modes.
@@ -264,7 +269,7 @@ class MatrixStructure(LinearSystem):
     @property
     def size(self) -> int:
         """Number of unknowns n."""
-        return len(self.mass[0][1])
+        return int(np.shape((self.mass or self.stiffness)[0][1])[0])
 
     @property
     def entry_roundings(self) -> int:
@@ -274,7 +279,10 @@ class MatrixStructure(LinearSystem):
     @cached_property
     def massive(self) -> Ints:
         """Indices of the unknowns that have mass, in rising order."""
-        return np.flatnonzero(np.any([array.any(1) for _, array in self.mass], axis=0))
+        has_mass = np.zeros(self.size, bool)
+        for _, array in self.mass:
+            has_mass |= array.any(axis=1)
+        return np.flatnonzero(has_mass)
 
     @cached_property
     def massless(self) -> Ints:
@@ -308,6 +316,8 @@ class MatrixStructure(LinearSystem):
         massive = self.massive
         massless = self.massless
         of_massive = mass[np.ix_(massive, massive)]
+        if not self.mass:
+            return
         is_definite = len(massive) > 0 and np.linalg.eigvalsh(of_massive).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
         cure = "all rows and columns of unknowns that move have mass, coupled by a positive matrix"
@@ -449,7 +459,7 @@ class MatrixStructure(LinearSystem):
         Raises:
             RefusedError: The term is no such pair, the factor gives no number, or the array is not
                 square with n rows, not finite, or not symmetric to 1e-9 of its largest entry. n is
-                the number of rows of the first mass array.
+                the number of rows of the first array.
         """
         is_pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         value = type(term).__name__
@@ -467,7 +477,8 @@ class MatrixStructure(LinearSystem):
         except ValueError:  # as NumPy refuses rows of different lengths
             raise RefusedError(key, "of uneven rows", "a square array", cure) from None
         require(array.ndim == 2, key, f"of shape {array.shape}", "a square array", cure)
-        size = np.shape(self.mass[0][1])[0]  # the first mass has been checked before all others
+        # the first array of all has been checked before the others
+        size = np.shape((self.mass or self.stiffness)[0][1])[0]
         is_square = array.shape == (size, size)
         require(is_square, key, f"of shape {array.shape}", f"({size}, {size})", cure)
         require_numbers(kind, array)

@@ -190,3 +190,29 @@ def test_peaks_are_bounded_over_time_and_not_at_nodes_alone():
     assert max(-low, high) == pytest.approx(peaks(found)["q1"].upper[0], 1e-4)
     assert low < found.lower.min() - 1e-5
     assert high > found.upper.max() + 1e-5
+
+
+def test_a_frame_at_rest_is_a_stage_with_verdicts(tmp_path, capfd):
+    case = """title = "One storey under a push"
+stages = ["static"]
+[frame]
+masses = ["20 t", "20 t"]
+stiffness = ["5 MN/m ± 10 %", "4 MN/m"]
+damping_ratio = "0 %"
+outputs = ["q2", "base_shear"]
+[[force]]
+history = "step, static"
+amplitude = { 2 = "[8, 10, 12] kN" }
+[static]
+fuzzy = ["k1", "F2"]
+alpha = [0, 1]
+limits = ["q2 <= 6 mm", "q2 <= 5 mm", "base_shear <= 9 kN"]
+"""
+    path = tmp_path / "push.toml"
+    path.write_text(case, encoding="utf-8")
+    found = summary_of_run(path)["static"]
+    lower, upper = np.array(found["bounds"])[0, 0]
+    assert lower == pytest.approx(8e3 / 5.5e6 + 8e3 / 4e6, rel=1e-6)
+    assert upper == pytest.approx(12e3 / 4.5e6 + 12e3 / 4e6, rel=1e-6)
+    assert np.array(found["bounds"])[0, 1] == pytest.approx([8e3, 12e3], rel=1e-6)
+    assert np.array(found["attained"]) == pytest.approx(np.array(found["bounds"]), rel=1e-6)
