@@ -104,9 +104,9 @@ class AffineModel:
                 found[i] = not (is_load and row.any())
                 continue
             longest = int(np.abs(stiffness).sum(axis=0).argmax())
-            column: Array = np.asarray(stiffness[:, longest])
-            b: Array = column / np.linalg.norm(column)
-            size = b @ stiffness @ b
+            column = np.asarray(stiffness)[:, longest]
+            b = np.asarray(column / np.linalg.norm(column))
+            size = float(b @ stiffness @ b)
             is_rank_one = np.abs(stiffness - size * np.outer(b, b)).max() <= RANK_ONE * abs(size)
             is_along = np.abs(row - (row @ b) * b).max() <= RANK_ONE * np.abs(row).max()
             found[i] = is_rank_one and is_along and not is_load

@@ -88,11 +88,11 @@ def identify(
         high = np.minimum(prior_high, high)
         box = None
         if (low <= high).all():
-            modes = evidence.modes(level)
-            box = enclosure(evidence.chain, low, high, modes)
+            cuts = evidence.modes(level)
+            box = enclosure(evidence.chain, low, high, cuts)
             # Linear programs narrow little without shapes, whereas ranges of frequencies are exact.
-            if box is not None and not any(mode.shape for mode in modes):
-                box = contracted(evidence.chain, box[0], box[1], modes)
+            if box is not None and not any(mode.shape for mode in cuts):
+                box = contracted(evidence.chain, box[0], box[1], cuts)
         if box is None:
             empty = level
             break
