@@ -108,7 +108,7 @@ def _announced(compile_types: Callable[..., Any]) -> Callable[..., Any]:
     Numba does not call it where it takes compiled code from the cache.
     """
 
-    def compile_announced(*types: Any) -> Any:
+    def compile_announced(*types: object) -> object:
         for announce in tuple(before_compiling):
             announce()
         return compile_types(*types)

@@ -54,7 +54,7 @@ def section_of(key: str, question: type[Question]) -> type[AnalysisSection]:
         if x.default_factory is not MISSING:
             default = x.default_factory()
         if x.name != "limits":
-            kind = KINDS.get(x.name) or in_a_case(hints[x.name])
+            kind = KINDS.get(x.name) or _in_a_case(hints[x.name])
             keys[x.name] = (kind, Field(default, description=described[x.name]))
         elif default is not ...:
             keys[x.name] = (tuple[AnyLimit, ...], Field((), description=described[x.name]))
@@ -69,18 +69,18 @@ def section_of(key: str, question: type[Question]) -> type[AnalysisSection]:
     return made
 
 
-def in_a_case(hint: Any) -> Any:
+def _in_a_case(hint: Any) -> Any:
     """Return the type of a key from that of a field: quantities are read with their units."""
     if isinstance(hint, quantity.Quantity):
         return Quantity(**asdict(hint))
     arguments = get_args(hint)
     origin = get_origin(hint)
     if origin is Annotated:
-        return Annotated[tuple(map(in_a_case, arguments))]
+        return Annotated[tuple(map(_in_a_case, arguments))]
     if origin in (tuple, dict):
-        return origin[tuple(map(in_a_case, arguments))]
+        return origin[tuple(map(_in_a_case, arguments))]
     if origin in (Union, UnionType):
-        return reduce(or_, map(in_a_case, arguments))
+        return reduce(or_, map(_in_a_case, arguments))
     return hint
 
 

@@ -16,8 +16,7 @@ from pydantic import create_model
 from alphacut.base.entry_points import registered
 from alphacut.case.analyses import ANALYSES
 from alphacut.case.cell import CellContent
-from alphacut.case.generated import section_at
-from alphacut.case.types import FirstUse
+from alphacut.case.types import FirstUse, Section
 
 C = TypeVar("C", bound=CellContent)
 STRUCTURES = {
@@ -76,19 +75,26 @@ def _whole_case(
 
     """
 
-    def fields_of(places: Mapping[str, str]) -> dict[str, Any]:
+    def _fields_of(places: Mapping[str, str]) -> dict[str, Any]:
         """Return the types of the fields of sections, with their defaults, by name."""
         kinds: dict[str, Any] = dict.fromkeys(places, object)
         if built:
             for name, place in places.items():
-                kinds[name] = Annotated[object, FirstUse(partial(section_at, name, place))] | None
+                kinds[name] = Annotated[object, FirstUse(partial(_section_at, name, place))] | None
         return {name: (kind, None) for name, kind in kinds.items()}
 
     # Pydantic takes fields from the last base on: of the cell, of the structures, of the rest, and
     # at last those of analyses.
-    of_structures = create_model("Structures", __base__=CellContent, **fields_of(dict(structures)))
+    of_structures = create_model("Structures", __base__=CellContent, **_fields_of(dict(structures)))
     bases: Any = (content, of_structures)
-    further = fields_of(dict(analyses))
+    further = _fields_of(dict(analyses))
     whole: type[CellContent] = create_model(content.__name__, __base__=bases, **further)
     whole.__doc__ = content.__doc__
     return whole
+
+
+def _section_at(key: str, place: str) -> type[Section]:
+    """Return the section of a case with a key, from its place "module:Class"."""
+    from alphacut.case.generated import section_at  # imports the rooms, which a cell does without
+
+    return section_at(key, place)

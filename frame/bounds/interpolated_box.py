@@ -165,7 +165,7 @@ class InterpolatedFrame:
         ]
         if len(yielding) != 1:
             what = f"columns of one storey can be proved, and {len(yielding)} storeys may yield"
-            cure = "take hardening 1 for storeys that stay elastic, or quasi-monte-carlo"
+            cure = "take hardening 1 for storeys that stay elastic"
             raise UnprovedError(what, cure)
         has_tangent = system.rayleigh_of == "tangent"
         if has_tangent and (nominal["rayleigh_stiffness"] or "rayleigh_stiffness" in names):

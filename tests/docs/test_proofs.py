@@ -22,7 +22,7 @@ def is_defined(name, text):
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0])
 def test_each_name_of_the_chapter_stands_in_its_file(row):
     files = [word for word in row if word.endswith(".py")]
-    folders = [ROOT if file.startswith("rve/") else ROOT / "frame" for file in files]
+    folders = [ROOT if re.match("rve/|frame/", file) else ROOT / "frame" for file in files]
     paths = [folder / file for folder, file in zip(folders, files, strict=True)]
     text = "".join(path.read_text(encoding="utf-8") for path in paths)
     words = [word for word in row if not word.endswith(".py")]

@@ -138,7 +138,7 @@ class MixtureModel(SeriesModel):
 
 
 def test_a_new_model_takes_its_class_and_one_entry(tmp_path, monkeypatch):
-    entry = ModelEntry("mixture", "", "", frozenset({"cylinders"}), needs_isotropy=True)
+    entry = ModelEntry("mixture", "", frozenset({"cylinders"}), needs_isotropy=True)
     monkeypatch.setattr(
         ModelEntry, "load", lambda x, load=ModelEntry.load: MixtureModel if x is entry else load(x)
     )

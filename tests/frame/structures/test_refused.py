@@ -70,7 +70,7 @@ MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        ({"mass": []}, "mass"),
+        ({"stiffness": []}, "stiffness"),
         ({"mass": [EYE]}, "term of mass"),
         ({"mass": [("M", EYE)]}, "factor of mass"),
         ({"mass": [(lambda p: "x", EYE)]}, "factor of mass"),
