@@ -241,8 +241,8 @@ def _next_event(
         spent: How far it has been moved by events that were left out before, in m.
 
     Returns:
-        Its time, `NEVER` if there is none; its side; the time at which the excess ends by itself,
-        `NEVER` if it exceeds the room; and by how much the slider would be moved.
+        Its time, `NEVER` if there is none; its side; the time at which the excess ends by itself or
+        the search does, `NEVER` if it exceeds the room; and by how much the slider would be moved.
     """
     series = np.empty((MAX_TERMS, len(state)))
     load = np.zeros((4, loads.powers.shape[1]))
@@ -305,7 +305,8 @@ def _next_event(
             for k in range(terms):
                 y[i] += series[k, i]
         t += h
-    return first, side, NEVER, size
+    # What passes at the end of the search, and stays within the room, counts as ended there.
+    return first, side, until if passes else NEVER, size
 
 
 @compiled
@@ -458,7 +459,8 @@ def march(
                         longest, search_until, room, spent,
                     )  # fmt: skip
             f = event_time.argmin()
-            if event_time[f] == NEVER:
+            if event_time[f] >= loads.edges[last]:  # none that counts before the end
+                event_time[:] = NEVER
                 break
             chosen = (event_time < event_time[f] + window) & (side == side[f])
             can_skip = True

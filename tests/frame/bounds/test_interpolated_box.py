@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.polynomial.chebyshev import chebvander
 
 from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
+from alphacut.frame.bounds.interpolated_defects import defects, interpolate
+from alphacut.frame.calculus.interpolation import chebyshev_matrix
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
 
@@ -77,3 +80,70 @@ def test_motions_of_an_isolated_building_stay_inside_close_bounds(names, changes
 def test_what_is_not_proved_is_refused(changes, words, rng):
     with pytest.raises(UnprovedError, match=words):
         compared(isolated_building(rng, 1, **changes), ("k1",), 0.01, rng)
+
+
+def norms_and_bounds(frame, radius, inputs):
+    """S of the difference to exact motions at time nodes over k1 in [−1, 1], and bounds; (s, T)."""
+    flow = YieldingFlow(
+        replace(frame, outputs=("q1", "q2", "v1", "v2", "shear1")), ("k1",), 2, 0.05
+    )
+    box = InterpolatedFrame(flow, np.arange(1))
+    k = frame.parameters["k1"] * (1 + radius * inputs)
+    properties, model = box._model(*frame.parameters["k1"] * (1 + radius * np.array([[-1], [1]])))
+    elements, count = box._motions(properties, model, None)
+    part = slice(0, count)
+    missed = defects(interpolate(model, elements, part, with_rates=False), elements.event[part])
+    bounds = (missed.growth[:, np.newaxis] + missed.violation).cumsum(axis=0)
+    coarse, fine = (chebvander(inputs, n) @ chebyshev_matrix(n) for n in (model.degree, model.fine))
+    mass = np.array(frame.masses)
+    a, force = frame.hardening[0], model.force[0]
+    found = np.zeros((2, len(k), len(flow.time)))
+    for s, exact in enumerate(flow.values(k[:, np.newaxis])):
+        weights = coarse[s]
+        damping = model.damping @ fine[s]
+        begin, length = elements.begin[part] @ weights, elements.length[part] @ weights
+        for node, t in enumerate(flow.time[1:-1], 1):
+            e = np.searchsorted(begin, t, side="right") - 1
+            powers = ((t - begin[e]) / length[e]) ** np.arange(elements.terms[e])
+            state = powers @ (elements.series[e, : len(powers)] @ weights)
+            loads = box.loads[0]
+            i = np.searchsorted(loads.edges, t + 1e-9, side="right") - 1
+            cubic = np.polynomial.Polynomial(loads.powers[i, 0])
+            q = state[:2] - cubic(t - loads.edges[i])
+            v = (state[2:] - damping @ q) / mass - cubic.deriv()(t - loads.edges[i])
+            slider = elements.phase[e] * force
+            if not elements.phase[e]:
+                slider = (1 - a) * k[s] * q[0] - elements.constant[e] @ weights
+            true = exact[node, 4] - a * k[s] * exact[node, 0]
+            off = np.append(q, v) - exact[node, :4]
+            stiffness = np.array([a * k[s], frame.stiffness[1]])
+            squared = mass @ off[2:] ** 2 + stiffness @ np.diff(off[:2], prepend=0) ** 2
+            squared += (np.clip(slider, -force, force) - true) ** 2 / ((1 - a) * k[s])
+            found[:, s, node] = np.sqrt(squared), bounds[e, min(int((inputs[s] + 1) * 4), 7)]
+    energy = mass @ np.abs(exact[:, 2:4]).max(axis=0) ** 2
+    return *found, np.sqrt(energy)
+
+
+def test_the_difference_to_exact_motions_is_below_its_bound(rng):
+    inputs = np.append(rng.uniform(-1, 1, 6), [-1, 1])
+    for radius in (0.01, 0.02, 0.02, 0.05):
+        frame = isolated_building(rng, 1)
+        elastic = replace(frame, yield_force=[1e9] * 2)
+        for which, width in ((frame, radius), (elastic, 0.3)):
+            norm, bound, scale = norms_and_bounds(which, width, inputs)
+            assert (norm <= bound + 1e-8 * scale).all()
+
+
+def test_an_event_behind_the_end_of_only_some_motions_does_not_count(rng):
+    # Free motions reach the yield drift at their first peak, or do not, just behind the end.
+    still = Accelerogram(0.05, np.zeros(30))
+    frame = isolated_building(rng, 1, outputs=("q1",), ground=still, v0=[0.5] * 2)
+    frame = replace(frame, yield_force=[1e9] * 2)
+    k = np.array([frame.stiffness[0]])
+    motion = np.abs(YieldingFlow(frame, ("k1",), 1.0, 0.01).values(k[np.newaxis])[0, :, 0])
+    peak = int(motion.argmax())
+    frame = replace(frame, yield_force=[float(k[0] * motion[peak]), 1e9])
+    flow = YieldingFlow(frame, ("k1",), 0.01 * round(0.8 * peak), 0.01)
+    box = InterpolatedFrame(flow, np.arange(1))
+    found = box.bounds(0.99 * k, 1.01 * k, np.full(len(box.loads[0].powers), 1e-9))
+    assert found.error < 1e-3 * np.sqrt(k[0]) * motion[peak]
