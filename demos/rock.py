@@ -86,8 +86,9 @@ for filling, of_segmentation in results.items():
         print(f"{filling}, {name}: porosity {1 - quartz[name].mean():.3f}, {ranges} GPa")
 
 # %% [markdown]
-# Empty pores reach through the volume, and this program then has no lower bound but 0. A published
-# modulus by finite elements of displacements is such a bound from above too.
+# Empty pores reach through the volume. Stresses in equilibrium that load no pore bound the moduli
+# from below there as well. A published modulus by finite elements of displacements is a bound from
+# above.
 #
 # ## The union, and the classical bounds
 #
