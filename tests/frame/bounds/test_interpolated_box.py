@@ -90,9 +90,15 @@ def norms_and_bounds(frame, radius, inputs):
     box = InterpolatedFrame(flow, np.arange(1))
     k = frame.parameters["k1"] * (1 + radius * inputs)
     properties, model = box._model(*frame.parameters["k1"] * (1 + radius * np.array([[-1], [1]])))
-    elements, count = box._motions(properties, model, None)
+    marched = box._motions(properties, model, None)
+    if marched is None:  # the box is too wide for one order of events
+        return np.zeros(1), np.zeros(1), 1.0
+    elements, count = marched
     part = slice(0, count)
-    missed = defects(interpolate(model, elements, part, with_rates=False), elements.event[part])
+    interpolant = interpolate(model, elements, part, with_rates=False)
+    if interpolant is None:  # or for the times of its elements
+        return np.zeros(1), np.zeros(1), 1.0
+    missed = defects(interpolant, elements.event[part])
     bounds = (missed.growth[:, np.newaxis] + missed.violation).cumsum(axis=0)
     coarse, fine = (chebvander(inputs, n) @ chebyshev_matrix(n) for n in (model.degree, model.fine))
     mass = np.array(frame.masses)
