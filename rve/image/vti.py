@@ -85,7 +85,7 @@ def image_fields(
 
     Returns:
         Means over each pixel or voxel of the strain under each unit mean strain, and of the stress
-        under each unit mean stress, shape (loads, components, *grid) in Voigt's order. The strain
+        under each unit mean stress, shape (loads, components, ...grid) in Voigt's order. The strain
         is None beside rigid phases, the stress 0 where nothing carries its mean. And the phases,
         shape (y, x) or (z, y, x).
 
@@ -107,7 +107,7 @@ def image_fields(
 
 
 def _pixel_means(element: Element, side: SideSolution | None, division: int) -> Array | None:
-    """Return the means of a field over each pixel or voxel, shape (loads, components, *grid).
+    """Return the means of a field over each pixel or voxel, shape (loads, components, ...grid).
 
     Loads and components are in Voigt's order; the grid is (y, x) or (z, y, x).
 
