@@ -53,9 +53,12 @@ class Box:
         return np.asarray((self.low + self.high) / 2)
 
     @cached_property
-    def structure(self) -> ClassicalStructure:
-        """The structure over the whole box, if it has classical modes."""
-        return over_box(self.system, self.names, self.low, self.high)
+    def structure(self) -> ClassicalStructure | None:
+        """The structure over the whole box; None if its undamped modes are coupled."""
+        try:
+            return over_box(self.system, self.names, self.low, self.high)
+        except CoupledModesError:
+            return None
 
     def inputs(self, unit: Array) -> Array:
         """Return the inputs (…, n) in SI units for unit coordinates (…, d); never outside."""
@@ -91,9 +94,8 @@ class Box:
                 inputs, of the input whose bisection is most likely to help, or None.
         """
         try:
-            try:
-                structure = self.structure
-            except CoupledModesError:
+            structure = self.structure
+            if structure is None:
                 return self._damped_level(nodes, outputs, model_tolerance)
             structure = replace(
                 structure,

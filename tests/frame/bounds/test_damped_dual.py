@@ -1,10 +1,13 @@
 """The dual bound of structures whose dashpots couple the modes, with many inputs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from alphacut.frame import (
     Accelerogram,
+    Auto,
     DualProof,
     Force,
     History,
@@ -13,7 +16,7 @@ from alphacut.frame import (
     UnprovedError,
     envelope,
 )
-from alphacut.frame.boxes import Boxes
+from alphacut.frame.boxes import Boxes, UnitFlow, boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modes.damped_models import damped_models
@@ -119,6 +122,14 @@ def test_oscillators_and_feedthrough_add_up_to_the_response(moved, rng):
         exact = motion.outputs(flow.time).values
         assert (np.abs(total - exact) <= found.models.coupling + 1e-4 * size).all()
         assert (np.abs(total - exact) <= 0.02 * size).all()
+
+
+@pytest.mark.parametrize(("first", "dampers"), [("proof", {}), ("dual", {"dampers": (0.0,) * 3})])
+def test_branch_and_bound_comes_first_up_to_six_inputs_with_dashpots_alone(first, dampers, rng):
+    system = replace(frame(3, rng, **MOVED["record"]), damping_ratio=0.03, **dampers)
+    inputs = box_around(system, ("k1", "k2", "k3", "m1", "m2", "m3"), 0.02)
+    flow = UnitFlow(LinearFlow(system, tuple(inputs), 2.0, 0.02, Exact()), boxes(inputs, [0.0]))
+    assert Auto()._proofs(flow, [])[0].name == first
 
 
 def duhamel(sigma, load, time):
