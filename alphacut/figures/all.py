@@ -11,11 +11,13 @@ from pkgutil import resolve_name
 from matplotlib.figure import Figure
 
 from alphacut.case.analyses import ANALYSES
-from alphacut.figures import answers, envelope, material, structure
+from alphacut.figures import answers, material, structure
+from alphacut.figures.register import FIGURES
 from alphacut.figures.style import figure_style, save
 from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.storey import yields
 from alphacut.io.provenance import NESTED, version_of
+from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 from alphacut.stages.suite import scaled_suite
 from alphacut.stages.summary import Parts, Results
@@ -24,42 +26,91 @@ from alphacut.stages.summary import Parts, Results
 def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
     """Yield the name of each figure that the results allow, and the figure, drawn when it is taken.
 
-    Names are "modulus", "image", "update-inputs", "structure", "spectra", those of the pictures of
-    each answer, and of a study "envelope-STUDY-OUTPUT" for each drawn output, "profile-STUDY" and
-    "loops-STUDY". Figures of the paper have "figNUMBER-" before the name.
+    Names are those of `FIGURES` and of the pictures of each answer. "-STUDY" follows in figures of
+    a study, "-STUDY-OUTPUT" in those of an output; figures of the paper have "figNUMBER-" before.
 
     Args:
         results: Results of a run; stages that are missing have no figures.
     """
-    if results.modulus is not None:
-        stated = getattr(results.content.structure_section, "modulus", None)
-        yield "modulus", material.fuzzy_modulus(results.modulus, stated)
-    if results.image is not None:
-        yield "image", material.image(results.image.arrays)
-    if results.learned is not None and not results.learned.is_refuted:
-        yield "update-inputs", answers.identified_inputs(results.learned)
-    model = None if results.structure is None else results.structure.model
-    if isinstance(model, StoreyFrame):
-        yield "structure", structure.sketch(model)
-    if results.suite is not None and results.content.records and results.structure:
-        scaled = scaled_suite(results.content.records, results.structure)
-        if scaled is not None:
-            yield "spectra", answers.draw_spectra(scaled)
     for key, answer in results.answers.items():
         for name, picture in ANALYSES[key].pictures.items():
             figure = resolve_name(picture.draw)(answer)
             if figure is not None:
                 yield name, figure
-    units = Parts.of(results).shown_units
-    for task in results.tasks:
-        yield from envelope.drawings(task, results)
-        peaks = results.envelopes[task.name].numbers.peak
-        profile = structure.profiles(peaks, units)
-        if profile is not None:
-            yield f"profile-{task.name}", profile
-        if yields(model):
-            times = {"duration": task.duration, "step": task.section.step}
-            yield f"loops-{task.name}", structure.loops(model, peaks, **times)
+    for name, registered in FIGURES.items():
+        if not registered.draw:
+            continue
+        draw = resolve_name(registered.draw)
+        drawn: dict[str, tuple[object, ...]] = {}  # arguments by the name of the figure
+        if registered.of == "run":
+            drawn[name] = ()
+        for task in results.tasks:
+            if registered.of == "study":
+                drawn[f"{name}-{task.name}"] = (task,)
+            if registered.of == "output":
+                for output in drawn_outputs(results, task):
+                    number = f"fig{task.figures[output]}-" if output in task.figures else ""
+                    drawn[f"{number}{name}-{task.name}-{output}"] = (task, output)
+        for full_name, arguments in drawn.items():
+            figure = draw(results, *arguments)
+            if figure is not None:
+                yield full_name, figure
+
+
+def drawn_outputs(results: Results, task: EnvelopeTask) -> list[str]:
+    """Return the outputs of a study that the case wants drawn; all if it names none."""
+    outputs = results.envelopes[task.name].arrays["output"].values
+    return list(task.figures) or [str(name) for name in outputs]
+
+
+def modulus(results: Results) -> Figure | None:
+    """Draw the fuzzy modulus, with the one that the case states."""
+    if results.modulus is None:
+        return None
+    stated = getattr(results.content.structure_section, "modulus", None)
+    return material.fuzzy_modulus(results.modulus, stated)
+
+
+def image(results: Results) -> Figure | None:
+    """Draw the phases of an image or volume, and the α-cuts of its modulus."""
+    return None if results.image is None else material.image(results.image.arrays)
+
+
+def inputs_learned(results: Results) -> Figure | None:
+    """Draw the inputs before and after a measurement that did not refute all of them."""
+    learned = results.learned
+    if learned is None or learned.is_refuted:
+        return None
+    return answers.identified_inputs(learned)
+
+
+def sketch(results: Results) -> Figure | None:
+    """Draw the model of a storey frame."""
+    model = None if results.structure is None else results.structure.model
+    return structure.sketch(model) if isinstance(model, StoreyFrame) else None
+
+
+def spectra(results: Results) -> Figure | None:
+    """Draw the spectra of records that were scaled to a target."""
+    if results.suite is None or not results.content.records or not results.structure:
+        return None
+    scaled = scaled_suite(results.content.records, results.structure)
+    return None if scaled is None else answers.draw_spectra(scaled)
+
+
+def profiles(results: Results, task: EnvelopeTask) -> Figure | None:
+    """Draw the peaks of a study over the height."""
+    peaks = results.envelopes[task.name].numbers.peak
+    return structure.profiles(peaks, Parts.of(results).shown_units)
+
+
+def loops(results: Results, task: EnvelopeTask) -> Figure | None:
+    """Draw the loops of the storeys that yield, in a study."""
+    model = None if results.structure is None else results.structure.model
+    if not isinstance(model, StoreyFrame) or not yields(model):
+        return None
+    peaks = results.envelopes[task.name].numbers.peak
+    return structure.loops(model, peaks, duration=task.duration, step=task.section.step)
 
 
 def draw_figures(results: Results, store: StageStore) -> list[str]:

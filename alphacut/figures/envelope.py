@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from textwrap import fill
 
 import matplotlib.pyplot as plt
@@ -22,36 +21,24 @@ from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.summary import Parts, Results
 
 
-def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Figure]]:
-    """Yield the name and the figure of each drawn output of a study.
+def envelope_of(results: Results, task: EnvelopeTask, name: str) -> Figure:
+    """Draw the envelope of an output in a study of a run.
 
     Args:
-        task: The study. Its `figures` name the outputs to be drawn, each with the number of the
-            figure in the paper; if empty, all outputs are drawn.
         results: Results of the run, with the envelope of this study.
-
-    Yields:
-        The name "envelope-STUDY-OUTPUT", with "figNUMBER-" before it if there is a number, and the
-        figure, drawn when it is taken.
+        task: The study.
+        name: Name of the output.
     """
     structure = results.structure
     assert structure is not None  # of which the envelope is
-    dataset = results.envelopes[task.name].arrays
     parts = Parts.of(results)
-    peaks = parts.envelopes[task.name].peak
-    outputs = [str(name) for name in dataset["output"].values]
-    for name in task.figures or outputs:
-        number = ""
-        if name in task.figures:
-            number = f"fig{task.figures[name]}-"
-        figure = envelope(
-            dataset,
-            Output(name, structure.unit(name)),
-            task,
-            parts.shown_units[name],
-            peak=peaks.get(name),
-        )
-        yield f"{number}envelope-{task.name}-{name}", figure
+    return envelope(
+        results.envelopes[task.name].arrays,
+        Output(name, structure.unit(name)),
+        task,
+        parts.shown_units[name],
+        peak=parts.envelopes[task.name].peak.get(name),
+    )
 
 
 def envelope(

@@ -19,6 +19,7 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError
 from alphacut.base.number_text import ShownUnit, Table
 from alphacut.case.analyses import ANALYSES
+from alphacut.figures.register import FIGURES, caption
 from alphacut.frame import Sensitivity
 from alphacut.frame.analyses.answer import enclosing_box_words, table_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
@@ -51,7 +52,7 @@ def render_page(folder: ResultsFolder) -> str:
     """
     summary = Summary.read(folder)
     summary.require_run_of(folder)
-    words = named_words()
+    terms = tomllib.loads(Path(__file__).with_name("terms.toml").read_text(encoding="utf-8"))
     periods = ""
     storeys = None
     if (frame := summary.structure) is not None:
@@ -73,11 +74,11 @@ def render_page(folder: ResultsFolder) -> str:
         key_tables=results.key_tables(summary),
         key_sentences=results.key_sentences(summary),
         tables=tables(summary),
-        figures=Figures(summary, folder, words["figures"]),
+        figures=Figures(summary, folder),
         periods=periods,
         storeys=storeys,
         sensitivity=Sensitivity(summary.shares),
-        terms=words["terms"] | {str(x).capitalize(): x.sentence for x in Nature},
+        terms=terms | {str(x).capitalize(): x.sentence for x in Nature},
         versions=Table(("program", "version"), list(summary.versions.items())),
         guaranteed_of=results.guaranteed_of,
         fractions_text=results.fractions_text,
@@ -124,14 +125,6 @@ def render_template(template: str, **content: object) -> str:
     # Titles and names may have characters that a terminal would execute when the page is printed
     # there, and that HTML does not allow: all of the control characters but tab and line feed.
     return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", " ", page)
-
-
-def named_words() -> dict[str, dict[str, str]]:
-    """Return the captions of figures by their names, and the meanings of terms."""
-    words = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
-    for analysis in ANALYSES.values():
-        words["figures"] |= {name: x.caption for name, x in analysis.pictures.items()}
-    return words
 
 
 def plot(
@@ -193,16 +186,12 @@ class Figures:
     Args:
         summary: The run, whose figures these are.
         folder: Folder of its results.
-        captions: Captions by the names of figures.
     """
 
-    def __init__(
-        self, summary: Summary, folder: ResultsFolder, captions: Mapping[str, str]
-    ) -> None:
+    def __init__(self, summary: Summary, folder: ResultsFolder) -> None:
         pictures = [name for name in summary.figures if name.endswith(".png")]
         self.paths = {PurePosixPath(path).stem: path for path in pictures}
         self.folder = folder
-        self.captions = captions
 
     def take(self, name: str) -> Picture | None:
         """Return a figure by its name, and forget it, so that `others` leaves it out.
@@ -222,41 +211,15 @@ class Figures:
         except RefusedError as error:
             say(f"warning: a figure is left out: {error}")
             return None
-        return Picture(caption(name, self.captions), base64.b64encode(content).decode())
+        return Picture(caption(name), base64.b64encode(content).decode())
+
+    def of(self, section: str, study: str = "") -> Iterator[Picture | None]:
+        """Yield the figures of a section of the page; those of a study, if one is named."""
+        for name, registered in FIGURES.items():
+            if registered.section == section:
+                yield self.take(f"{name}-{study}" if study else name)
 
     def others(self) -> Iterator[Picture | None]:
         """Yield the figures that are left."""
         for name in list(self.paths):
             yield self.take(name)
-
-
-def caption(name: str, captions: Mapping[str, str]) -> str:
-    """Return the caption of a figure from its name.
-
-    Args:
-        name: Name of the file without its ending. "figNUMBER-" before it gives the number in the
-            paper, with which the caption begins. "envelope-STUDY-OUTPUT" is the envelope of an
-            output, "profile-STUDY" and "loops-STUDY" are figures of a study.
-        captions: Captions of other figures by name, written with hyphens. A figure without an entry
-            has its name as its caption, with blanks for the hyphens.
-    """
-    number = ""
-    rest = name
-    # Files are named by `alphacut.figures`: what they show is read off their names.
-    if match := re.fullmatch(r"fig(\d+)-(.+)", name):
-        number = f"Fig. {match[1]}: "
-        rest = match[2]
-    if match := re.fullmatch(r"envelope-(.+)-([^-]+)", rest):
-        study, output = match.groups()
-        text = f"Envelope of {output}"
-        if study != "all":  # the name of the study that [envelope] alone makes
-            text += f", study {study}"
-    elif match := re.fullmatch(r"(profile|loops)-(.+)", rest):
-        # "profile" and "loops" have captions of their own, whatever the study.
-        text = captions[match[1]]
-        if match[2] != "all":
-            text += f", study {match[2]}"
-    else:
-        known = captions.get(rest.replace("_", "-"), rest.replace("-", " "))
-        text = captions.get(rest, known)
-    return number + text

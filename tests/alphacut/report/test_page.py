@@ -9,7 +9,8 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from html import unescape
+from html import escape, unescape
+from pathlib import PurePosixPath
 
 import numpy as np
 import pandas as pd
@@ -17,10 +18,11 @@ import pytest
 
 from alphacut import main
 from alphacut.base.number_text import Table, range_text
+from alphacut.figures.register import FIGURES, caption
 from alphacut.frame import Limit, Peak, SuitePeaks, decide
 from alphacut.fuzzy import Nature
 from alphacut.io.results import ResultsFolder
-from alphacut.report.page import caption, named_words, render_page, render_template
+from alphacut.report.page import render_page, render_template
 from alphacut.report.results import answers, comparison, drivers, peak_table, run_text
 from alphacut.report.tables import frames, latex, shown, write_csv, write_tables
 from alphacut.stages.envelope import EnvelopeResult
@@ -52,13 +54,23 @@ def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(two_flo
 
 
 def test_every_figure_has_a_caption(two_floors):
-    named = named_words()["figures"]
-    stems = {name.rpartition(".")[0] for name in summary_of(two_floors)["figures"]}
-    stems = {stem.removeprefix("figures/") for stem in stems}
+    stems = {PurePosixPath(name).stem for name in summary_of(two_floors)["figures"]}
     assert stems
-    assert all(stem in named or stem.startswith("envelope-all-") for stem in stems)
-    assert caption("decision", named) == "Fuzzy peak of each limited output over its limit"
-    assert caption("fig28-envelope-E-5s-q1", named) == "Fig. 28: Envelope of q1, study E-5s"
+    # A figure that is not registered has its name as its caption.
+    assert all(caption(stem) != stem.replace("-", " ") for stem in stems)
+    assert caption("decision") == "Fuzzy peak of each limited output over its limit"
+    assert caption("fig28-envelope-E-5s-q1") == "Fig. 28: Envelope of q1, study E-5s"
+
+
+def test_figures_stand_in_the_sections_of_the_page_that_their_entries_name(two_floors, page):
+    stems = {PurePosixPath(name).stem for name in summary_of(two_floors)["figures"]}
+    *sections, others = page.split("<h2>")
+    for name, figure in FIGURES.items():
+        full = {"run": name, "study": f"{name}-all"}.get(figure.of)
+        if figure.section and full in stems:
+            text = escape(figure.caption)
+            assert text not in others
+            assert sum(text in section for section in sections) == 1
 
 
 def test_texts_of_the_case_are_no_markup(page):
