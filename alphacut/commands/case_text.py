@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from alphacut.io.quantity import QUANTITIES
 from alphacut.rve.cell.cell import VoigtPhase
 from alphacut.stages.cell import GPA
 from alphacut.stages.foreseen import foreseen_structure
+
+if TYPE_CHECKING:
+    from alphacut.rve.image.fields.forest import Percolation
 
 UNUSUAL = ", unusual"
 """Mark of the kind of a quantity that structures and their materials seldom have."""
@@ -74,6 +78,26 @@ def doubts_before_refusal(content: Content, rows: Sequence[Row]) -> list[str]:
         return list(doubts(content, rows, structure_of_envelope(content)))
     except (RefusedError, FailedError):
         return list(doubts(content, rows, None))
+
+
+def percolation_text(found: Percolation) -> str:
+    """Return lines on what the phases of an image outside its pores connect, and how closely.
+
+    By `./enter python -m benchmarks.rve.porous` the bounds of E of noise with pores are 0.4 to 0.6
+    over the thickness of the walls in voxels apart, as a fraction of the upper bound; in the plane
+    less.
+    """
+    axes = dict(zip("zyx"[-len(found.axes) :], found.axes, strict=True))
+    joined = ", ".join(axis for axis in sorted(axes) if axes[axis])
+    apart = ", ".join(axis for axis in sorted(axes) if not axes[axis])
+    text = f"solid: connected along {joined or 'no axis'}"
+    if found.isolated > 0:
+        text += f"; {found.isolated:.2%} of it loose, which carries nothing"
+    cells = "pixels" if len(axes) == 2 else "voxels"
+    text += f"; walls {found.thickness:.1f} {cells} thick in the mean\n"
+    if apart:
+        return f"{text}bounds: none from below along {apart}, nor of the mean E\n"
+    return f"{text}bounds of E: some {100 * min(0.45 / found.thickness, 1):.0f} % apart\n"
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

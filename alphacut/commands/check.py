@@ -35,6 +35,7 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     from alphacut.commands.case_text import (
         doubts,
         doubts_before_refusal,
+        percolation_text,
         rows_of,
         structure_of_envelope,
     )
@@ -58,6 +59,8 @@ def check(options: argparse.Namespace, out: TextIO) -> int:
     if study is not None:
         phases = (f"{name} {fraction:.2%}" for name, fraction in study.fractions.items())
         text += f"image: {study.extent}\nphases: {', '.join(phases)}\n"
+        if study.percolation is not None:
+            text += percolation_text(study.percolation)
     document: dict[str, object] = {"case": options.case, "stages": list(content.stages)}
     document |= {"period_s": None, "modes": None}
     if structure is not None and structure.linear is not None:

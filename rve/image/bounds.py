@@ -174,8 +174,8 @@ class StiffnessBounds(LoewnerBounds):
     """Bounds lower ≤ C ≤ upper of a stiffness, as quadratic forms of the mean strain.
 
     The bounds are in Pa and in Voigt order: of the plane, shape (3, 3), with 2 ε12; of space, shape
-    (6, 6), with the shears 23, 13, 12 and 2 ε. Beside pores that percolate the lower one is 0,
-    beside rigid phases the upper one has an infinite diagonal.
+    (6, 6), with the shears 23, 13, 12 and 2 ε. The lower one is 0 for strains that no connected
+    solid resists, the upper one has an infinite diagonal beside rigid phases.
 
     A modulus that is the value of the form at a strain, or a sum of such values, is bounded by
     those of the ends, and with it whatever rises in each of such moduli: in the plane C11 + C12,
@@ -200,8 +200,8 @@ class StiffnessBounds(LoewnerBounds):
     def shear(self, average: str = AXES) -> Enclosure:
         """Return bounds in Pa of the shear modulus of an isotropic average of the stiffness.
 
-        The lower bound is 0 where pores percolate, and the upper one is infinite beside rigid
-        phases.
+        The lower bound is 0 where the solid does not percolate in all directions, and the upper one
+        is infinite beside rigid phases.
 
         Args:
             average: In the plane, "axes" for C33, the modulus along the axes, or "isotropic" for
@@ -232,7 +232,7 @@ class StiffnessBounds(LoewnerBounds):
                 Hill's.
 
         Returns:
-            Lower and upper bound. Without a lower bound of the stiffness (percolating pores) the
+            Lower and upper bound. Without a positive lower bound of the stiffness (no solid percolates) the
             lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
             upper one is infinite, and in the plane, where G may then exceed any multiple of K, the
             lower one is −∞ as well.
@@ -323,9 +323,9 @@ class StiffnessBounds(LoewnerBounds):
     def _compliance(self) -> tuple[Array, Array]:
         """Lower and upper bound, in the Loewner order, of the inverse of the stiffness.
 
-        Both compliances have the shape of the stiffness, (3, 3) or (6, 6), in 1/Pa. Where pores
-        percolate there is no upper bound, and all its entries are infinite; beside rigid phases the
-        lower one is zero.
+        Both compliances have the shape of the stiffness, (3, 3) or (6, 6), in 1/Pa. Where
+        the solid does not percolate in all directions there is no upper bound, and all its entries
+        are infinite; beside rigid phases the lower one is zero.
         """
         low = np.zeros_like(self.upper)
         high = np.full_like(self.lower, np.inf)
@@ -364,7 +364,8 @@ class StiffnessBounds(LoewnerBounds):
             modulus: 0 for the bulk modulus K, 1 for the shear modulus G.
 
         Returns:
-            Lower and upper bound; 0 where pores percolate, infinite beside rigid phases.
+            Lower and upper bound; 0 where the solid does not percolate in all directions, infinite
+            beside rigid phases.
         """
         # Voigt's modulus rises with the stiffness, Reuss's falls with the compliance.
         min_compliance, max_compliance = self._compliance

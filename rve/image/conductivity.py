@@ -31,6 +31,9 @@ from alphacut.rve.image.study import (
     image_study,
 )
 
+MARGIN = 1e-15
+"""Relative margin for the rounding of a product and a quotient of doubles."""
+
 
 @dataclass(frozen=True)
 class Conductor:
@@ -62,10 +65,14 @@ class FuzzyImageConductivity(FuzzyImage):
         bounds: Bounds of the tensor at each level.
         reference: Hashin–Shtrikman bounds of the mean for isotropic composites of the nominal
             phases; None beside insulators or perfect conductors.
+        straight: Lower and upper bound of φ k₀, the conductivity of as much of the one conducting
+            phase in straight channels, shape (A, 2), the upper one with the least k₀ of the level
+            and the lower one with the greatest; None unless all other phases are insulators.
     """
 
     bounds: Sequence[ConductivityBounds]
     reference: Enclosure | None
+    straight: Array | None
 
     @property
     def conductivity(self) -> FuzzyNumber:
@@ -93,6 +100,24 @@ class FuzzyImageConductivity(FuzzyImage):
     def named_bounds(self) -> dict[str, Array]:
         """Bounds of the mean "k" and of the components by name, shape (A, 2) each."""
         return {"k": self.mean, **self.components}
+
+    @property
+    def tortuosity(self) -> dict[str, Array]:
+        """Bounds of the tortuosity factor τ = φ k₀/k along the axes, as "tau_x", shape (A, 2) each.
+
+        φ is the fraction of the one phase that conducts, k₀ its conductivity, and k that of the
+        image along the axis. The upper bound is infinite where nothing is known to percolate.
+        RefusedError unless all phases but one are insulators.
+        """
+        allowed = "insulators, of conductivity 0, beside one phase that conducts"
+        require(self.straight is not None, "conductivities", "of several conductors", allowed)
+        found = {}
+        for axis in "xyz"[: len(self.lengths)]:
+            # k rises with k₀ in proportion: each bound of k belongs to one end of k₀.
+            with np.errstate(divide="ignore"):
+                ends = self.straight / self.components[f"k_{axis}{axis}"][:, ::-1]
+            found[f"tau_{axis}"] = ends * [1 - MARGIN, 1 + MARGIN]
+        return found
 
     def _variables(self) -> dict[str, Any]:
         """Return the bounds of the tensor as variables of the dataset."""
@@ -164,10 +189,15 @@ def fuzzy_image_conductivity(
     if (nominal > 0).all() and (nominal < RIGID).all():
         fractions = np.array(list(study.fractions.values()))
         reference = hashin_shtrikman(nominal, fractions=fractions, dimension=study.dimension)
+    conducting = [k for k, x in enumerate(phases) if widest_cut(x.conductivity).upper > 0]
+    straight = None
+    if len(conducting) == 1:
+        straight = np.array([_straight(study, conducting[0], level) for level in alpha])
     return FuzzyImageConductivity(
         alpha=np.array(alpha, float),
         bounds=bounds,
         reference=reference,
+        straight=straight,
         fractions=study.fractions,
         division=model.division,
         seconds=perf_counter() - start,
@@ -175,6 +205,15 @@ def fuzzy_image_conductivity(
         is_open=first != last,
         lengths=image.lengths,
     )
+
+
+def _straight(study: ImageStudy[Conductor], number: int, level: float) -> tuple[float, float]:
+    """Return the bounds of φ k₀ of a phase at an α-level; see `FuzzyImageConductivity`."""
+    first, last = study.phase_ranges(level)
+    least = np.mean((first == number) & (last == number))
+    greatest = np.mean((first <= number) & (last >= number))
+    low, high = study.phases[number].conductivity.cut(level)
+    return float(least * high), float(greatest * low)
 
 
 def hashin_shtrikman(conductivities: Array, *, fractions: Array, dimension: int) -> Enclosure:

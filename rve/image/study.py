@@ -37,6 +37,7 @@ from alphacut.fuzzy.sets.numbers import checked_levels, fuzzy_number
 from alphacut.rve.cell.cell import Phase
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.rve.image.fields.forest import Percolation
 from alphacut.rve.image.files import read_grid
 from alphacut.rve.image.losses import energy_fractions, loss_of_young, mean_loss
 from alphacut.rve.image.memory import needed_memory, require_memory
@@ -252,6 +253,12 @@ class ImageStudy(Generic[Phases]):
         gigabytes = needed_memory(shape, usual_division(nominal)) / 1e9
         axes = "pixels (y, x)" if len(shape) == 2 else "voxels (z, y, x)"
         return f"{sizes} {axes}, about {gigabytes:.1f} GB of memory"
+
+    @property
+    def percolation(self) -> Percolation | None:
+        """What the phases outside pores connect at nominal values; None without pores."""
+        is_solid = (self.images(None, None).lower > 0).all(axis=0)
+        return None if is_solid.all() else Percolation.of_mask(is_solid)
 
     def require_solid(self, alpha: Sequence[float]) -> None:
         """Check that at each level some phase is neither a pore nor rigid by its lower end.
@@ -580,7 +587,8 @@ class FuzzyImageStiffness(FuzzyImage):
     def modulus(self) -> FuzzyNumber:
         """Fuzzy Young's modulus of the average in Pa; between two levels the wider α-cut holds.
 
-        RefusedError where a bound is infinite, beside pores that percolate or rigid phases.
+        RefusedError where a bound is infinite: beside rigid phases, and in the plane where the
+        solid does not percolate in all directions.
         """
         return fuzzy_number(self.alpha, self.young)
 
@@ -706,8 +714,8 @@ def solve_study(
 
     Raises:
         RefusedError: The levels do not rise within [0, 1], a value is not allowed, all phases are
-            pores or rigid at a level, only some have loss factors, all have them beside pores that
-            percolate or a rigid phase, or the image does not fit into memory.
+            pores or rigid at a level, only some have loss factors, all have them where the
+            solid does not percolate in all directions or a phase is rigid, or the image does not fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
@@ -800,13 +808,13 @@ def _require_losses(phases: Sequence[ImagePhase], bounds: StiffnessBounds) -> No
         bounds: Bounds of the stiffness at nominal moduli, for which loss factors are computed.
 
     Raises:
-        RefusedError: Some phases have a loss factor and others none, or all have one and pores
-            percolate or a phase is rigid.
+        RefusedError: Some phases have a loss factor and others none, or all have one and the
+            solid does not percolate in all directions or a phase is rigid.
     """
     count = sum(phase.loss is not None for phase in phases)
     require(count in (0, len(phases)), "loss", f"of {count} phases", "each, 0 for none")
     cure = "pores in one material leave its loss factor; else take a small modulus for pores"
-    allowed = "none beside pores that percolate or a rigid phase"
+    allowed = "none beside a rigid phase, or pores that part the solid in some direction"
     require(count == 0 or bounds.has_both, "loss", "there", allowed, cure)
 
 
@@ -855,7 +863,7 @@ def _reference_bounds(study: ImageStudy[ImagePhase]) -> ReferenceBounds:
 def _require_positive(widest: ImageCut) -> None:
     """Refuse bounds of E that do not tell that it is positive, where both bounds exist.
 
-    Without a lower or an upper bound (percolating pores, rigid phases) there are no better ones,
+    Without a lower or an upper bound (a solid in pieces, rigid phases) there are no better ones,
     and nothing is refused.
 
     Args:

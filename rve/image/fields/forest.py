@@ -7,7 +7,7 @@ corner alone carries no flux and no force.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -72,6 +72,39 @@ class Forest:
             found.append((np.full(len(below), axis), below, above[below], periods))
         axes, below, above, periods = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return axes, below, above, periods
+
+
+class Percolation(NamedTuple):
+    """What the voxels outside pores connect.
+
+    Args:
+        axes: Whether they lead from a side of the grid to the opposite one, and on through all
+            periodic images, along each axis of the grid.
+        isolated: Fraction of them that belongs to pieces which meet none of their own images, and
+            so carry nothing.
+        thickness: Mean thickness of their walls in voxels: twice their number over that of their
+            faces at pores; infinite without pores.
+    """
+
+    axes: tuple[bool, ...]
+    isolated: float
+    thickness: float
+
+    @classmethod
+    def of_mask(cls, is_solid: Mask) -> Self:
+        """Return that of the voxels where a mask of shape (y, x) or (z, y, x) is true."""
+        forest = Forest.of_mask(is_solid)
+        _, below, _, periods = forest.windings()
+        # A flux along an axis needs a path that comes back displaced along it, whatever else.
+        axes = tuple(bool(along) for along in (periods != 0).any(axis=0))
+        carrying = np.isin(forest.labels, np.unique(forest.labels[below]))
+        count = len(forest.order)
+        isolated = 1 - np.count_nonzero(carrying) / count if count else 0.0
+        faces = sum(
+            np.count_nonzero(is_solid != np.roll(is_solid, 1, axis))
+            for axis in range(is_solid.ndim)
+        )
+        return cls(axes, isolated, 2 * count / faces if faces else np.inf)
 
 
 @compiled

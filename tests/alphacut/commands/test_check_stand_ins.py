@@ -50,6 +50,28 @@ def test_a_weight_that_is_left_out_is_warned_of_by_the_cells_modulus(tmp_path, c
     assert "P-Delta" not in text  # with 20 GPa the coefficient would be 0.12
 
 
+def test_what_the_solid_of_a_porous_image_connects_is_said(tmp_path, capfd):
+    y, x = np.mgrid[:12, :12]
+    text = """title = "Pores"
+stages = ["modulus"]
+[cell]
+image = "image.npy"
+pixel = "1 µm"
+labels = [0, 1]
+modulus = ["0 GPa", "20 GPa"]
+poisson = 0.3
+"""
+    case = written(tmp_path, text)
+    np.save(tmp_path / "image.npy", 1.0 * ((x > 5) | (y > 5)))
+    _, out = checked(case, tmp_path, capfd)
+    assert "connected along x, y; walls 9.0 pixels" in out
+    assert "bounds of E: some 5 % apart" in out
+    np.save(tmp_path / "image.npy", 1.0 * ((x > 5) & (y > 5)))
+    _, out = checked(case, tmp_path, capfd)
+    assert "no axis; 100.00% of it loose" in out
+    assert "none from below along x, y, nor of the mean E" in out
+
+
 def test_of_an_unknown_modulus_nothing_is_judged_that_depends_on_it(tmp_path, capfd):
     y, x = np.mgrid[:24, :24]
     np.save(tmp_path / "image.npy", np.where((x - 12) ** 2 + (y - 12) ** 2 < 49, 150.0, 50.0))

@@ -5,14 +5,16 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from alphacut.base.errors import FailedError
-from alphacut.rve import solve_conduction, solve_image
+from alphacut.fuzzy import Triangular
+from alphacut.rve import GreyImage, fuzzy_image_conductivity, solve_conduction, solve_image
 from alphacut.rve.image.fields import equilibrium
 from alphacut.rve.image.fields import fluxes as of_fluxes
 from alphacut.rve.image.fields.equilibrium import solve_stresses
 from alphacut.rve.image.fields.fluxes import solve_fluxes
-from alphacut.rve.image.fields.forest import Forest, sweep_fluxes
+from alphacut.rve.image.fields.forest import Forest, Percolation, sweep_fluxes
 from alphacut.rve.image.fields.nodes import NodeCopies
 from alphacut.rve.image.phases import ModuliImages
+from tests.refused import refuses
 from tests.rve.image.test_bounds import TIGHT
 from tests.rve.image.test_conduction import finite_volumes
 
@@ -53,6 +55,54 @@ def test_lower_bounds_beside_insulators_are_exact(image, exact, rng):
     assert found.lower == pytest.approx(np.diag(exact), rel=1e-9, abs=1e-12)
     assert (np.diag(found.lower) <= np.array(exact) * (1 + 1e-15)).all()
     assert (np.diag(found.lower)[np.array(exact) == 0] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("image", "axes", "isolated", "thickness"),
+    [
+        (LAYER, (False, True, True), 0, 4),
+        (CHANNEL, (True, False, False), 0, 2 * 6 / 10),
+        (BAND, (True, True), 0, 4 * 8 / 16),  # its path leads on along both axes at once
+        (np.indices((4, 4)).sum(0) % 2 == 0, (False, False), 1, 1 / 2),
+        (np.pad(np.ones((1, 2), bool), ((1, 2), (2, 3))), (False, False), 1, 4 / 6),
+        (np.arange(8)[:, np.newaxis] % 4 < [1, 1], (False, True), 0, 1),
+        (np.array([[1, 1, 1, 1], [0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]) > 0, (False, True), 1 / 5, 10 / 12),
+    ],
+    ids=["layer", "channel", "band", "board", "island", "layers", "beside"],
+)  # fmt: skip
+def test_what_solids_connect(image, axes, isolated, thickness):
+    found = Percolation.of_mask(image)
+    assert found.axes == axes
+    assert found.isolated == pytest.approx(isolated)
+    assert found.thickness == pytest.approx(thickness)
+
+
+def test_a_solid_without_pores_connects_all():
+    assert Percolation.of_mask(np.ones((2, 3), bool)) == ((True, True), 0.0, np.inf)
+
+
+def test_a_layer_has_no_tortuosity_along_it_and_infinite_across():
+    volume = GreyImage(np.where(LAYER, 2.0, 1.0), (1e-6,) * 3)
+    found = fuzzy_image_conductivity(
+        volume, [0.0, Triangular(2, 3, 5)], labels=[1, 2], alpha=(0, 1)
+    )
+    assert found.tortuosity["tau_x"] == pytest.approx(np.ones((2, 2)), rel=1e-9)
+    assert (found.tortuosity["tau_z"][:, 1] == np.inf).all()
+    assert (found.tortuosity["tau_z"][:, 0] > 1e9).all()  # the solver leaves k below 1e-9
+    several = fuzzy_image_conductivity(volume, [0.1, 3.0], labels=[1, 2], alpha=(1,))
+    with refuses("conductivities"):
+        _ = several.tortuosity
+
+
+def test_an_open_threshold_leaves_tortuosity_and_fraction_open():
+    """A channel whose wall is grey: as wide as 3 or 4 of 8 pixels, it is straight either way."""
+    grey = np.tile([0.0, 0, 9, 9, 9, 5, 0, 0], (8, 1))
+    image = GreyImage(grey, (1e-6, 1e-6))
+    found = fuzzy_image_conductivity(
+        image, [0.0, 7.0], thresholds=[Triangular(2, 6, 8)], alpha=(0, 1)
+    )
+    assert found.tortuosity["tau_y"][0] == pytest.approx([3 / 4, 4 / 3], rel=1e-9)
+    assert found.tortuosity["tau_y"][1] == pytest.approx([1, 1], rel=1e-9)
 
 
 def test_a_cross_of_insulators_is_bounded_from_both_sides():
