@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, radians
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo
@@ -267,8 +267,13 @@ def _read_recordings(value: object, info: ValidationInfo) -> tuple[Recording, ..
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
     allowed += f"; 1 to {MAX_RECORDS} files"
     require(0 < len(paths) <= MAX_RECORDS, "", value, allowed)
-    unit = info.data.get("unit")
-    return read_recordings(paths, channel=channel, step=info.data.get("step"), unit=unit or "")
+    return read_recordings(
+        paths,
+        channel=channel,
+        step=info.data.get("step"),
+        unit=info.data.get("unit") or "",
+        override=info.data.get("override", []),
+    )
 
 
 def _step_of_record(step: float) -> float:
@@ -359,6 +364,9 @@ class RecordsSection(Section):
     """time between the numbers of a file of one column"""
     unit: Annotated[str, text(_parse_unit)] | None = None
     """unit of files that have none: columns without a head, waveforms"""
+    override: list[Literal["unit", "step"]] = Field(
+        default=[], description="what files state wrongly: that of the case is taken, and said"
+    )
     files: Annotated[OneOrMany[Files], NotEmpty]
     """files or patterns, as `records/*.AT2`; FILE#CHANNEL of several. A record of two or three
     components is a list, as ["x.AT2", "y.AT2"]: two horizontal ones, then the vertical one"""

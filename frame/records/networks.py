@@ -18,7 +18,9 @@ from itertools import takewhile
 from typing import ClassVar, NamedTuple
 
 from alphacut.base.arrays import Array
+from alphacut.base.stated import settled
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated import TextStatements
 from alphacut.frame.records.stated_peak import StatedPeak, peaks_in_text
 from alphacut.frame.records.stated_timing import StatedTiming, require_timing
 from alphacut.frame.records.text_file import (
@@ -107,24 +109,19 @@ def read_peer(file: TextFile, unit: str) -> Recording:
     head = _PeerHead.of(file)
     cure = "DT is in seconds: write 20 ms as DT= .0200 SEC"
     require_step(file.location(head.line), head.step, cure)
-    line = head.line
-    own_unit = unit
-    for pattern in (
-        r"\bunits\s*(?:of|are|is|=|:)?\s*\(?\s*([^\s,;()]+)",
-        r"\bacceleration\b.*\bin\s+\(?(g(?:'s|s)?)\b",
-    ):
-        # The words "UNITS OF" are looked for in all lines of the head before "ACCELERATION … IN": a
-        # title may contain the latter.
-        matches = [re.search(pattern, text, re.I) for text in file.lines[: head.line + 1]]
-        stating = [(row, match) for row, match in enumerate(matches) if match]
-        if stating:
-            line, match = stating[0]
-            own_unit = match[1].rstrip(".")
-            break
-    if word := re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
+    found = TextStatements.of(file, range(head.line + 1))
+    if found.quantities and not found.units:
+        what, line = found.quantities[0]
         allowed = f"accelerations in {ACCELERATION_UNITS}"
-        cure = f"this is a {word[1].lower()}: take the file .AT2 of the acceleration"
-        raise file.refusal(line, f"in units of {own_unit}", allowed, cure)
+        cure = f"this is {what}: take the file .AT2 of the acceleration"
+        raise file.refusal(line, file.lines[line].strip(), allowed, cure)
+    place = file.location(head.line)
+    own_unit = settled(place, "unit", found.units)
+    text = own_unit.text if own_unit else unit
+    text = text.strip("()[] ")
+    line = head.line
+    if own_unit:
+        line = int(own_unit.place.removeprefix("line ")) - 1 - file.skipped
     samples = file.numbers(head.line + 1, len(file.lines), count=head.count)
     if head.count:
         file.require_count(samples, head.count, head.line)
@@ -135,11 +132,11 @@ def read_peer(file: TextFile, unit: str) -> Recording:
     return recording_in_si(
         file.location(line),
         "PEER AT2",
-        own_unit,
+        text,
         head.step,
         samples,
         component,
-        stated=peaks_in_text(file.lines[: head.line + 1], own_unit),
+        stated=peaks_in_text(file.lines[: head.line + 1], text),
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from pkgutil import resolve_name
@@ -14,6 +15,7 @@ import numpy as np
 from alphacut.base.entry_points import registered
 from alphacut.base.errors import RefusedError, require
 from alphacut.base.extras import extra_named
+from alphacut.base.stated import Stated, settled
 from alphacut.frame.records.cosmos import is_cosmos, read_cosmos
 from alphacut.frame.records.geonet import is_geonet, read_geonet
 from alphacut.frame.records.networks import FORMATS, RecordFormat
@@ -26,7 +28,11 @@ from alphacut.frame.records.units import acceleration_factor
 
 
 def read_recording(
-    path: Path, channel: str = "", step: float | None = None, unit: str = ""
+    path: Path,
+    channel: str = "",
+    step: float | None = None,
+    unit: str = "",
+    override: Collection[str] = (),
 ) -> Recording:
     """Read a recording of the ground's acceleration, or one channel of several, from a file.
 
@@ -36,8 +42,9 @@ def read_recording(
     Args:
         path: The file.
         channel: Name of the channel; empty where there is only one.
-        step: Time between samples in s, for files that do not state it; other files ignore it.
-        unit: Unit of the samples, as "g", for files that state none; other files ignore it.
+        step: Time between samples in s, for files that do not state it.
+        unit: Unit of the samples, as "g", for files that state none.
+        override: "step" or "unit", where the file states a wrong one: that of the user is taken.
 
     Returns:
         The recording: two or more finite samples in m/s², its step in s, and what the file says of
@@ -49,7 +56,8 @@ def read_recording(
     """
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged numbers, which are refused
-            recording = _read_by_marks(path, channel, step, unit=unit)
+            recording = _read_by_marks(path, channel, step, unit=unit, override=override)
+            recording = _agreed(path.name, recording, step, unit, override=override)
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
@@ -61,7 +69,40 @@ def read_recording(
     return recording
 
 
-def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -> Recording:
+def _agreed(
+    name: str, recording: Recording, step: float | None, unit: str, *, override: Collection[str]
+) -> Recording:
+    """Return a recording with step and unit of which file and user agree, or the user overrides.
+
+    Args:
+        name: Name of the file, for the message.
+        recording: The recording, in the step and the unit of the file.
+        step: Step that the user says, in s; None if nothing.
+        unit: Unit that the user says; empty if nothing.
+        override: Keys of which the user says that the file is wrong.
+
+    Raises:
+        RefusedError: They disagree.
+    """
+    own = Stated(recording.step, f"{recording.step:.6g} s")
+    said = Stated(step, f"{step:.6g} s") if step is not None else None
+    taken_step = settled(name, "step", [own], said, override=override) or own
+    own = Stated(acceleration_factor(recording.unit) or 1.0, recording.unit)
+    said = Stated(acceleration_factor(unit) or 1.0, unit) if unit else None
+    taken_unit = settled(name, "unit", [own], said, override=override) or own
+    remarks = tuple(filter(None, (taken_step.remark, taken_unit.remark)))
+    return replace(
+        recording,
+        step=taken_step.value,
+        unit=taken_unit.text,
+        samples=recording.samples * (taken_unit.value / own.value),
+        remarks=recording.remarks + remarks,
+    )
+
+
+def _read_by_marks(
+    path: Path, channel: str, step: float | None, *, unit: str, override: Collection[str]
+) -> Recording:
     """Read a recording from a file of the format whose marks its content has.
 
     Marks that are sure go first: those of universal files (UFF) and of miniSEED and SAC, which are
@@ -76,6 +117,7 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         step: Time between samples in s, for a table without times; None if the user states none.
             Other formats ignore it.
         unit: Unit of the samples, for files that state none; empty if the user states none.
+        override: "step" or "unit", where the user says that the file is wrong.
 
     Returns:
         The recording, with samples in m/s². They may be too few or not finite.
@@ -106,12 +148,12 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
         is_named = path.suffix.lower() in (".at2", ".v1", ".v2", ".v2a", ".smc")
         begins_with_number = re.match(rb"\s*[-+]?\.?[0-9]", content) is not None
         value = "without the head that files of this name begin with"
-        cure = 'load it anew; numbers alone have records.step = "0.005 s" and records.unit = "g"'
+        cure = "load it anew; numbers alone take records.step and records.unit"
         # A file of these names that is numbers alone has lost its head, and with it unit and step.
         # Who states the unit knows that; beside times the step is not needed.
         lost_head = is_named and begins_with_number and not (unit or channel)
         require(not lost_head, path.name, value, allowed, cure)
-        return read_table(file, step, unit, channel)
+        return read_table(file, step, unit, channel, override)
     for place in registered("alphacut.records").values():
         further: RecordFormat = resolve_name(place)
         if further.has_marked(file):
@@ -119,7 +161,7 @@ def _read_by_marks(path: Path, channel: str, step: float | None, *, unit: str) -
     if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
         cure = "this is a page of the web, perhaps of a login: load the record itself anew"
         raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)
-    cure = 'numbers alone are read with records.step = "0.005 s", records.unit = "g"'
+    cure = "" if is_described else "numbers alone are read with records.step and records.unit"
     if any(re.search(r"\bspectr(?:a|um)\b", line, re.IGNORECASE) for line in file.lines[:3]):
         cure = "this seems to be a file of spectra: take the record of the acceleration over time"
     raise RefusedError(path.name, "of no format that is read", allowed, cure)
@@ -175,7 +217,7 @@ def _read_waveform(
         raise RefusedError(name, reason, "miniSEED or SAC that obspy reads") from None
     names = [(str(trace.stats.channel).lower(),) for trace in traces]
     trace = traces[choose_channel(f"{name} without gaps", channel, names)]
-    require(bool(unit), name, "without a unit", 'records.unit = "m/s^2"')
+    require(bool(unit), name, "without a unit", "records.unit, as the network gives it")
     return recording_in_si(
         name,
         file_format,

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from glob import glob
-from math import isclose
 from pathlib import Path
 from typing import get_args
 
 from alphacut.base.errors import RefusedError, checked_number, path_of, require, require_choice
+from alphacut.base.stated import require_overrides
 from alphacut.frame.records.history import Accelerogram
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
@@ -30,6 +30,7 @@ def read_record(
     step: float | None = None,
     unit: str = "",
     baseline: Baseline = "none",
+    override: Sequence[str] = (),
 ) -> Accelerogram:
     """Read a record of the ground's acceleration from a file as networks publish them.
 
@@ -44,6 +45,7 @@ def read_record(
         unit: Unit of a file that states none, as "g", "gal" or "cm/s^2".
         baseline: What is subtracted from the samples: "none", their "mean", or their straight line
             of least squares ("linear").
+        override: "unit" or "step", where the file states a wrong one and that given here counts.
 
     Returns:
         Samples in m/s². `name` is the file's without ending; `remarks` are clauses on what is
@@ -51,15 +53,18 @@ def read_record(
 
     Raises:
         RefusedError: An argument is of another type or is unknown; or the file cannot be read, is
-            of another format, or does not fit its own head: the message names the line.
+            of another format, states another unit or step than is given here, or does not fit its
+            own head: the message names the line.
 
     Example:
         >>> ground = read_record("cases/suite/record-2001.AT2")
         >>> ground.name, len(ground.samples), ground.step
         ('record-2001', 501, 0.02)
     """
-    _require_arguments(channel, step, unit=unit, baseline=baseline)
-    (recording,) = read_recordings([path_of("path", path)], channel=channel, step=step, unit=unit)
+    _require_arguments(channel, step, unit=unit, baseline=baseline, override=override)
+    (recording,) = read_recordings(
+        [path_of("path", path)], channel=channel, step=step, unit=unit, override=override
+    )
     return recording.accelerogram(baseline)
 
 
@@ -70,6 +75,7 @@ def read_suite(
     step: float | None = None,
     unit: str = "",
     baseline: Baseline = "none",
+    override: Sequence[str] = (),
 ) -> tuple[Accelerogram, ...]:
     """Read a suite of ground motion records from all files that some patterns match.
 
@@ -82,6 +88,7 @@ def read_suite(
         unit: Unit of files that state none, as "g", "gal" or "cm/s^2".
         baseline: What is subtracted from each record: "none", its "mean", or its straight line of
             least squares ("linear").
+        override: "unit" or "step", where files state a wrong one and that given here counts.
 
     Returns:
         One record for each file, with samples in m/s²: in the order of `files`, and those of one
@@ -97,7 +104,7 @@ def read_suite(
         >>> len(suite), suite[0].name
         (11, 'record-2001')
     """
-    _require_arguments(channel, step, unit=unit, baseline=baseline)
+    _require_arguments(channel, step, unit=unit, baseline=baseline, override=override)
     paths: list[Path] = []
     patterns: Sequence[object] = [files]
     if isinstance(files, Sequence) and not isinstance(files, str):
@@ -111,7 +118,9 @@ def read_suite(
             paths.append(path)
         else:
             paths += [Path(name) for name in sorted(glob(str(pattern)))]
-    recordings = read_recordings(paths, channel=channel, step=step, unit=unit, shown=files)
+    recordings = read_recordings(
+        paths, channel=channel, step=step, unit=unit, override=override, shown=files
+    )
     require_distinct("files", [recording.name for recording in recordings])
     return tuple(recording.accelerogram(baseline) for recording in recordings)
 
@@ -122,6 +131,7 @@ def read_recordings(
     channel: str = "",
     step: float | None = None,
     unit: str = "",
+    override: Sequence[str] = (),
     shown: object = None,
 ) -> tuple[Recording, ...]:
     """Read one channel of each file, in the order of the files.
@@ -132,13 +142,13 @@ def read_recordings(
             "HNE"; empty where each has only one.
         step: Time between samples, in s, of files that do not state it.
         unit: Unit of files that state none, as "g".
+        override: "unit" or "step", where files state a wrong one and that given here counts.
         shown: The files as the caller gave them, for the message that there is none.
 
     Returns:
         Recordings with samples in m/s². The name of each is that of its file without ending, and of
         the channel if one was named, joined by "_"; other characters than letters, digits, "_", "+"
-        and "-" become "_". Remarks tell where a file states another step or unit
-        than the arguments do; the file's is taken.
+        and "-" become "_".
 
     Raises:
         RefusedError: There is no file, or there are more than 500; or some cannot be read: the
@@ -152,17 +162,16 @@ def read_recordings(
     errors: list[RefusedError] = []
     for path in paths:
         try:
-            recording = read_recording(path, channel, step, unit)
+            recording = read_recording(path, channel, step, unit, override)
         except RefusedError as error:
             errors.append(error)
             continue
-        remarks = recording.remarks + tuple(_contradictions(recording, step, unit))
         # Names of results are those of files and variables as well, and have their alphabet.
         name = path.stem
         if channel:
             name += f"_{channel}"
         name = re.sub(r"[^A-Za-z0-9_+-]+", "_", name)
-        recordings.append(replace(recording, name=name, remarks=remarks))
+        recordings.append(replace(recording, name=name))
     if len(errors) == 1:
         raise errors[0]
     if errors:  # the others are named in the cure, which is never cut off
@@ -179,13 +188,15 @@ def require_distinct(key: str, names: Sequence[str]) -> None:
     require(not repeated, key, repeated, allowed="each file once, by its name")
 
 
-def _require_arguments(channel: str, step: float | None, *, unit: str, baseline: str) -> None:
+def _require_arguments(
+    channel: str, step: float | None, *, unit: str, baseline: str, override: Sequence[str]
+) -> None:
     """Check the arguments that all readers of records have.
 
     Raises:
         RefusedError: `channel` is no text; `step` is neither None nor from 4e-5 s to below 0.5 s;
-            `unit` is neither empty nor a unit of acceleration; or `baseline` is not "none", "mean"
-            or "linear".
+            `unit` is neither empty nor a unit of acceleration; `baseline` is not "none", "mean" or
+            "linear"; or `override` has other words than "unit" and "step".
     """
     require(isinstance(channel, str), "channel", repr(channel), 'a name in quotes, as "2"')
     if step is not None:
@@ -194,11 +205,4 @@ def _require_arguments(channel: str, step: float | None, *, unit: str, baseline:
     is_known = isinstance(unit, str) and (not unit or acceleration_factor(unit) is not None)
     require(is_known, "unit", repr(unit), allowed=f"a unit of {ACCELERATION_UNITS}")
     require_choice("baseline", baseline, get_args(Baseline))
-
-
-def _contradictions(recording: Recording, step: float | None, unit: str) -> Iterator[str]:
-    """Yield a clause on a step and on a unit that the file states otherwise than the caller."""
-    if step and not isclose(step, recording.step, rel_tol=1e-6):
-        yield f"its own step, {recording.step:g} s, is taken, not {step:g} s"
-    if unit and acceleration_factor(unit) != acceleration_factor(recording.unit):
-        yield f"its own unit, {recording.unit}, is taken, not {unit}"
+    require_overrides(override, ("unit", "step"))

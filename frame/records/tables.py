@@ -1,14 +1,14 @@
 """Records and forces in tables: times and values, with units in a head or without a head.
 
-Without a head the user states the unit, and of numbers without times the step as well: one number
-a line, or several that follow one another. Of several components a channel chooses the column.
+What the head and other lines do not state, the user says: the unit, and of numbers without times
+the step. Of several components a channel chooses the column.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
@@ -20,11 +20,12 @@ import numpy as np
 from alphacut.base.arrays import Array
 from alphacut.base.csv_columns import NUMBER
 from alphacut.base.errors import RefusedError, cure_of, require
+from alphacut.base.stated import Stated, settled
 from alphacut.frame.records.recording import Recording
+from alphacut.frame.records.stated import TextStatements, named_quantity, require_count
 from alphacut.frame.records.stated_peak import peaks_in_text
 from alphacut.frame.records.text_file import (
     MAX_STEP,
-    MIN_STEP,
     TextFile,
     choose_channel,
     read_bytes,
@@ -45,6 +46,9 @@ EXPECTED_HEAD = "time [s],acceleration [m/s^2], [g] or [gal]"
 # published records with three decimals and steps of 0.005 s or 0.01 s stay below it, and a missing
 # or repeated sample misses its place by a whole step.
 MAX_UNEVENNESS = 0.05
+# Numbers that touch: the second begins with its sign.
+_TOUCHING = r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eEdD][-+]\d\d)?(?:[-+](?:\d*\.\d*)(?:[eEdD][-+]\d\d)?)+"
+_COMMENT = r"\s*(?:[#%!]|//)"
 
 
 @dataclass(frozen=True)
@@ -59,17 +63,13 @@ class _Column:
         """Return name and unit of a column from its cell in the head of a table.
 
         A unit stands in brackets, "Accel. [g]" or "acc (g)", and may then be anything; or it is the
-        last word, "acc, g" or "acc g", and then must be a unit of acceleration, time or force.
-        Blanks and quotes around the cell are left out.
-
-        Returns:
-            The column: its `name` in small letters, and its `unit` as it is written; the unit is
-            empty if the cell states none.
+        last word, "acc, g", "acc g" or "acc_g", and then must be a unit of acceleration, time or
+        force. Blanks and quotes around the cell are left out.
         """
         text = cell.strip(' "')
         if match := re.fullmatch(r"(.*?)[\s,]*[\[(]\s*([^\])]*?)\s*[\])]?", text):
             return cls(match[1].lower(), match[2])
-        match = re.fullmatch(r"(.*?)[\s,]+(\S+)", text)
+        match = re.fullmatch(r"(.*?)[\s,_]+(\S+?)", text)
         # Without brackets the last word is a unit only if it is known: "ground acceleration" has
         # none.
         if match and (acceleration_factor(match[2]) or seconds_of(match[2]) or match[2] in NEWTONS):
@@ -78,203 +78,215 @@ class _Column:
 
     @property
     def is_time(self) -> bool:
-        """Whether the head names times."""
-        return re.match(r"\W*(?:time|t)(?![a-z])", self.name) is not None
+        """Whether the head has times: by their name, or by their unit of time beside no period."""
+        if re.match(r"\W*(?:time|t)(?![a-z])", self.name):
+            return True
+        return seconds_of(self.unit) > 0 and not self.is_abscissa_of_spectrum
 
     @property
-    def is_acceleration(self) -> bool:
-        """Whether the head names accelerations."""
-        pattern = r"(?:\b|_)(?:a|acc(?:el\w*)?|ag)(?:\b|_)"
-        return re.search(pattern, self.name) is not None
+    def is_abscissa_of_spectrum(self) -> bool:
+        """Whether the head has periods or frequencies."""
+        return re.match(r"\W*(?:freq|period|f\b)", self.name) is not None
+
+    @property
+    def is_count(self) -> bool:
+        """Whether the head counts samples."""
+        pattern = r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\W*"
+        return re.fullmatch(pattern, self.name) is not None and not self.unit
 
 
 @dataclass(frozen=True)
 class _Table:
-    """A table of numbers below a head.
+    """A table of numbers and the text around it.
 
     Args:
         file: The file; its lines are counted from 0.
-        start: First line that is neither empty nor a comment.
-        head: Last line above the numbers; empty without one. Of a line of names above a line of
-            units it has both, as "time [s],acc [g]".
-        above: All lines above the numbers, comments among them without their mark.
+        texts: Lines that are no rows: all above the first row, and comments below.
+        heads: Those of them that name the columns and their units; none if no line does.
+        columns: Name and unit of each column, both empty without such lines.
         rows: Cells of each row, by its line.
     """
 
     file: TextFile
-    start: int
-    head: str
-    above: tuple[str, ...]
+    texts: tuple[int, ...]
+    heads: tuple[int, ...]
+    columns: list[_Column]
     rows: dict[int, list[str]]
 
     @classmethod
     def of(cls, file: TextFile) -> _Table:
-        """Return the table of numbers in a file.
+        """Return the table of numbers in a file; without a row that begins with a number, none.
 
-        Empty lines and lines that begin with "#" are passed over. The first other line that begins
-        with a number is the first row, and all below are rows as well; lines above are heads. Cells
-        are separated by commas, semicolons, tabs or blanks, unless the commas of all rows are
-        decimal commas: these are then written as points. Cells are not checked; a file without such
-        a line gives a table without rows.
-
-        Returns:
-            The table: `start`, the index of the first line passed neither as empty nor as a
-            comment, 0 without one; `head`, the last line above the rows that is no comment, or
-            empty, and if it has units alone, joined with the line of names before, as "time [s],acc
-            [g]"; `above`, all lines above the rows, comments among them without their "#"; and
-            `rows`, the cells of each row by the index of its line.
+        The first line that begins with a number and is no comment is the first row, and all below
+        are rows as well, but comments. Cells are not checked.
         """
-        lines = {k: x for k, x in enumerate(file.lines) if x.strip() and not x.startswith("#")}
-        first = len(file.lines)
-        for line, text in lines.items():
-            if re.match(r'[\s"]*[-+−]?[.,]?\d', text):
-                first = line
-                break
-        texts = {line: text for line, text in lines.items() if line >= first}
-        has_decimal_commas = _have_decimal_commas(list(texts.values()))
-        rows = {}
-        for line, text in texts.items():
-            # A cell may be a lone comma where quoted numbers stand between commas: "0,01","0,2".
-            if has_decimal_commas:
-                cells = re.findall(r'[^;\s"]+', text)
-                rows[line] = [cell.replace(",", ".") for cell in cells if cell != ","]
-            else:
-                rows[line] = re.findall(r'[^,;\s"]+', text)
-        heads = [text for line, text in lines.items() if line < first]
-        head = _with_units(heads) if heads else ""
-        above = tuple(x.lstrip("# \t") for x in file.lines[:first] if x.strip("# \t"))
-        return cls(file, min(lines, default=0), head, above, rows)
+        lines = [k for k, text in enumerate(file.lines) if text.strip()]
+        plain = [k for k in lines if not re.match(_COMMENT, file.lines[k])]
+        is_row = re.compile(r'[\s"]*[-+−]?[.,]?\d').match
+        first = next((k for k in plain if is_row(file.lines[k])), len(file.lines))
+        rows = {k: file.lines[k] for k in plain if k >= first}
+        texts = tuple(k for k in lines if k not in rows)
+        # Where a line gives the format of numbers that touch, their columns are fixed.
+        layouts = [re.search(r"\b\d*[EFG](\d+)\.\d+\b", file.lines[k], re.I) for k in texts]
+        layout = next(filter(None, layouts), None)
+        divide = _divider(list(rows.values()))
+        cells = {k: divide(text) for k, text in rows.items()}
+        if layout and any(re.fullmatch(_TOUCHING, x) for row in cells.values() for x in row):
+            width = int(layout[1])
+            for k, text in rows.items():
+                words = [text[i : i + width] for i in range(0, len(text.rstrip()), width)]
+                cells[k] = [word.strip() for word in words]
+        n_columns = len(cells[first]) if cells else 0
+        above = [k for k in plain if k < first][-2:]
+        heads: list[int] = above
+        columns = _columns_of([file.lines[k] for k in above], n_columns)
+        if not above:  # a comment names the columns if it begins with the time
+            heads = [k for k in lines if k < first][-1:]
+            texts_above = [re.sub(_COMMENT, "", file.lines[k]) for k in heads]
+            columns = _columns_of(texts_above, n_columns)
+            if not columns or not columns[0].is_time:
+                columns = []
+        has_units_line = len(heads) == 2 and _are_units(file.lines[heads[1]], n_columns)
+        heads = heads if has_units_line else heads[-1:]
+        if not columns:
+            return cls(file, texts, (), [_Column()] * n_columns, cells)
+        return cls(file, texts, tuple(heads), columns, cells)
+
+    @property
+    def start(self) -> int:
+        """The line that messages on the head name: the first that is no comment."""
+        plain = [k for k in self.texts if not re.match(_COMMENT, self.file.lines[k])]
+        return min([*plain, *list(self.rows)[:1]], default=0)
 
     @property
     def width(self) -> int:
         """Numbers in the first row; 0 without rows."""
-        return len(next(iter(self.rows.values()), []))
-
-    @property
-    def columns(self) -> list[_Column]:
-        """Heads of the columns, as many as numbers in the first row.
-
-        The last line above the numbers is divided at commas as a CSV file, then at commas,
-        semicolons and tabs, then at blanks. The first division into the right number of cells
-        counts; if none is, the columns have no names and no units.
-        """
-        words = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", self.head)
-        for cells in (next(csv.reader([self.head])), re.split("[,;\t]", self.head), words):
-            if self.head and len(cells) == self.width:
-                return [_Column.of(cell) for cell in cells]
-        return [_Column()] * self.width
-
-    @property
-    def column_heads(self) -> list[str]:
-        """Lines above the numbers that tell what the columns are.
-
-        They are those that begin with a time, and the last one.
-        """
-        named = [line for line in self.above[:-1] if _Column.of(line).is_time]
-        return named + list(self.above[-1:])
+        return len(self.columns)
 
     @property
     def has_times(self) -> bool:
-        """Whether the first column has times.
+        """Whether the first column has times, or counts samples.
 
-        It does if the last line above the numbers begins with "time" or "t", or if the numbers in
-        the column never fall from row to row.
+        Its head says so; without a head it does if its numbers never fall from row to row.
         """
-        if _Column.of(self.head).is_time:
-            return True
+        if self.heads:
+            return self.columns[0].is_time or self.columns[0].is_count
         # Accelerations swing about zero, so that a column of them falls somewhere.
         first = [cells[0] for cells in self.rows.values()]
         return _are_numbers(first) and bool((np.diff(np.array(first, float)) >= 0).all())
 
     def refusal(self, cure: str) -> RefusedError:
         """Return the error that the head of the table is not understood; `cure` says what to do."""
-        value = self.head[:80] or f"{self.width} columns without a head"
+        value = " ".join(self.file.lines[k] for k in self.heads)[:80]
+        value = value or f"{self.width} columns without a head"
         return self.file.refusal(self.start, value, EXPECTED_HEAD, cure)
 
-    def numbers(self, *, rows: Sequence[int] = ()) -> Array:
-        """Return the numbers of all rows, or of some, shape (rows, columns).
-
-        Args:
-            rows: Indices of the lines of the file whose rows are wanted, in this order, each of
-                which must be the line of a row. If it is empty, all rows are meant; a table without
-                rows gives shape (0,).
+    def numbers(self, rows: Sequence[int]) -> Array:
+        """Return the numbers of rows, by their lines, shape (rows, columns).
 
         Raises:
             RefusedError: A cell is no finite number, or a row has another count of cells than the
                 first row of the table.
         """
-        lines = rows or list(self.rows)
-        for line in lines:
+        for line in rows:
             if len(self.rows[line]) != self.width or not _are_numbers(self.rows[line]):
                 raise _wrong_row(self, line)
-        return np.array([[float(cell) for cell in self.rows[line]] for line in lines])
+        return np.array([[float(cell) for cell in self.rows[line]] for line in rows])
 
-    def series(self) -> Array:
-        """Return the numbers of all rows one after another, shape (numbers,).
+    def series(self, first: int = 0) -> Array:
+        """Return the numbers of all rows from one on, one after another, shape (numbers,).
 
-        This is for a series that was written in several columns, row by row. The table has at least
-        one row. The last row alone may have fewer numbers than the others.
+        The last row alone may have fewer numbers than the others.
 
         Raises:
             RefusedError: A cell is no finite number; a row has another count of cells than the
                 first; or the columns seem to be several components, since numbers change less from
                 row to row within a column than along the rows, on average.
         """
-        *full, last = self.rows
-        numbers = self.numbers(rows=full)
-        last_cells = self.rows[last]
-        if len(last_cells) > self.width or not _are_numbers(last_cells):
-            raise _wrong_row(self, last)
-        if self.width > 1 and len(full) > 1:
+        *full, last = list(self.rows)[first:]
+        width = len(self.rows[(full or [last])[0]])
+        for line in [*full, last]:
+            count = len(self.rows[line])
+            is_short = line == last and count < width
+            if not _are_numbers(self.rows[line]) or (count != width and not is_short):
+                raise _wrong_row(self, line, expected=width)
+        series = np.array([float(cell) for line in [*full, last] for cell in self.rows[line]])
+        if width > 1 and len(full) > 1:
             # Neighbours in time differ little. In one series these are neighbours in a row, and
             # numbers one below another are as many samples apart as there are columns.
+            numbers = series[: len(full) * width].reshape(-1, width)
             change_along_rows = np.abs(np.diff(numbers.ravel())).mean()
-            change_along_columns = np.abs(np.diff(numbers, axis=0)).mean()
-            if change_along_columns < change_along_rows:
-                value = f"{self.width} columns, each smoother than the rows"
-                allowed = "one series, whose numbers follow one another"
+            if np.abs(np.diff(numbers, axis=0)).mean() < change_along_rows:
+                value = f"{width} columns, each smoother than the rows"
                 name = self.file.name
                 cure = f"choose one of several components: {name}#1, #2 …; else one number a line"
+                allowed = "one series, whose numbers follow one another"
                 raise self.file.refusal(self.start, value, allowed, cure)
-        return np.append(numbers.ravel(), [float(cell) for cell in last_cells])
-
-    def resolution(self) -> float:
-        """Return the unit of the last digit of the times, such as 0.001 for 1.023.
-
-        The times are the first column, one at least, all of them numbers. The result is in their
-        unit.
-        """
-        # Programs write times with a fixed number of decimals, or with a fixed number of digits.
-        # As zeros at the end may be missing, the cell with most of them tells this number. Of both
-        # units the coarser one is taken, and with a fixed number of digits that of the largest
-        # time.
-        times = [Decimal(cells[0]) for cells in self.rows.values()]
-        finest = min(int(time.as_tuple().exponent) for time in times)
-        digits = max(len(time.as_tuple().digits) for time in times)
-        # `adjusted` is the exponent of the first digit of a decimal number.
-        last_of_largest = max(times).adjusted() + 1 - digits
-        return float(10.0 ** max(finest, last_of_largest))
+        return series
 
 
-def _with_units(heads: Sequence[str]) -> str:
-    """Return the last line above the numbers, joined with the one before if it has units alone.
+def _divider(rows: Sequence[str]) -> Callable[[str], list[str]]:
+    """Return the function that divides a row into its cells, decimal commas written as points.
+
+    Cells stand between semicolons, tabs, quotes, commas or blanks, whichever of them comes first in
+    this order. A comma beside one of the others is a decimal comma. A comma alone parts two whole
+    numbers, unless one of the first is written as no whole number is, as -0 or 01.
+    """
+    text = "\n".join(rows)
+    number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
+    is_parted = re.search(rf'[;\t]|","|^\s*{number}[ ]+{number}[ ]*$', text, re.MULTILINE)
+    is_alone = re.search(r"^\s*(?:-0|[-+]?0\d),\d", text, re.MULTILINE) is not None
+    is_alone = is_alone and all(row.count(",") == 1 for row in rows)
+    if "," not in text or (not is_parted and not is_alone) or re.search(r"\d\.\d", text):
+        marks = r'[^;\s"]+' if re.search(r"[;\t]", text) else r'[^,;\s"]+'
+        return lambda row: re.findall(marks, row)
+
+    def with_points(row: str) -> list[str]:
+        cells = [cell.replace(",", ".") for cell in re.findall(r'[^;\s"]+', row)]
+        return [cell for cell in cells if cell != "."]
+
+    return with_points
+
+
+def _cells_of_head(text: str, count: int) -> list[str]:
+    """Return the cells of a line of heads, empty unless it can be divided into so many.
+
+    It is divided at commas as a CSV file, then at commas, semicolons and tabs, then at blanks.
+    """
+    words = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", text)
+    for cells in (next(csv.reader([text])), re.split("[,;\t]", text), words):
+        if text and len(cells) == count:
+            return cells
+    return []
+
+
+def _are_units(text: str, count: int) -> bool:
+    """Return whether a line has known units alone, as many as there are columns."""
+    units = [cell.strip(' "[]()') for cell in _cells_of_head(text, count)]
+    return bool(units) and all(
+        acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units
+    )
+
+
+def _columns_of(lines: Sequence[str], count: int) -> list[_Column]:
+    """Return name and unit of each column from the last lines above the numbers, at most two.
 
     Loggers write the names of columns in one line and their units, with or without brackets, in the
-    next: "time,acc" and "s,g" become "time [s],acc [g]". The last line is returned as it is if
-    there is one line alone, if a cell of it is no known unit, or if both lines have different
-    numbers of cells.
-
-    Args:
-        heads: The lines above the numbers, one or more, of which the last two count. Commas,
-            semicolons and tabs separate their cells.
+    next: "time,acc" and "s,g". The result is empty where the last line has another number of cells
+    than there are columns, or is a title of two words.
     """
-    cells = [re.split("[,;\t]", line) for line in heads[-2:]]
-    units = [cell.strip(' "[]()') for cell in cells[-1]]
-    names = cells[0]
-    known = [acceleration_factor(x) or seconds_of(x) or other_quantity(x) for x in units]
-    if len(heads) < 2 or len(names) != len(units) or not all(known):
-        return heads[-1]
-    return ",".join(f"{name.strip()} [{unit}]" for name, unit in zip(names, units, strict=True))
+    cells = _cells_of_head(lines[-1] if lines else "", count)
+    if not cells:
+        return []
+    if _are_units(lines[-1], count):
+        names = _cells_of_head(lines[0], count) if len(lines) > 1 else []
+        names = names or [""] * count
+        units = [cell.strip(' "[]()') for cell in cells]
+        return [_Column(n.strip(' "').lower(), u) for n, u in zip(names, units, strict=True)]
+    columns = [_Column.of(cell) for cell in cells]
+    is_known = columns[0].is_time or any(x.unit for x in columns) or count > 2
+    is_known = is_known or bool(re.search("[,;\t]", lines[-1])) or count == 1
+    return columns if is_known else []
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
@@ -282,105 +294,25 @@ def _are_numbers(cells: Sequence[str]) -> bool:
     return all(NUMBER.fullmatch(cell) and isfinite(float(cell)) for cell in cells)
 
 
-def _wrong_row(table: _Table, line: int) -> RefusedError:
+def _wrong_row(table: _Table, line: int, expected: int = 0) -> RefusedError:
     """Return, without raising it, the error about a row of a table that is not all numbers.
 
     Args:
         table: The table.
         line: Index of the line of the row, counted from 0.
-
-    Returns:
-        The error. If the time alone is no number, and the times around it tell it, its hint is that
-        time. Otherwise the hint is chosen by the text of the row, such as a clock time, an empty
-        cell or a unit; there may be none.
+        expected: Numbers that it should have; 0 for those of the first row.
     """
-    *_, last_row = table.rows
-    text_cure = "text stands among the numbers: write the number that belongs there"
-    if line == last_row:
-        text_cure = "text stands among the numbers: cut it off"
-    # The order counts, since the first pattern that is found gives the hint: those of clock times
-    # and dates stand before those of single characters that both contain.
     cures = {
-        r"\d:\d\d": "write seconds in place of clock times, or leave times out and say"
-        " records.step",
-        r"\d{4}-\d\d-\d\d|\d/\d+/\d": "write seconds in place of dates, or say records.step",
+        rf"(?:^|[\s,;]){_TOUCHING}": (
+            "numbers touch: part them, or write their format above, as (5E14.7)"
+        ),
         r"\d\.\d{3},\d|\d,\d{3}\.\d": "write numbers without separators of thousands",
-        r"(?i)nan|null|n/?a\b|inf|-{2}|#": "values are missing: fill the gap, or cut the record"
-        " there",
-        r"^\s*[,;]|,\s*,|;\s*;|[,;]\s*$": "cells are empty: fill the gap, or cut the record there",
-        r"\d\s*[a-zA-Z%]+\s*(?:[,;\t]|$)": "write numbers alone: units stand in the head, as in"
-        " time [s]",
-        r"[A-Za-z]{2}": text_cure,
-        r"\d,\d": "write decimal points if these are decimal commas",
-        r"[-+.eE]$": "the row ends within a number: load the file anew, or delete this row",
+        r"\d,\d": "if these are decimal commas, write points, or semicolons between columns",
     }
+    cure = "write the number that belongs there, or mark a comment by #"
     text = table.file.lines[line].strip()
-    allowed = "rows of numbers such as 1.25 or 1e-3"
-    first_row = next(iter(table.rows.values()))
-    if _are_numbers(first_row):
-        allowed = f"rows of {table.width} numbers such as 1.25 or 1e-3"
-    cure = cure_of(text, cures)
-    if likely := _likely_time(table, line):
-        cure = f"the time alone is no number: {likely:.9g} fits (spreadsheets make dates of some)"
-    return table.file.refusal(line, text, allowed, cure)
-
-
-def _likely_time(table: _Table, line: int) -> float:
-    """Return the time that fits into a row whose time alone is no number, or 0 if none is likely.
-
-    A time is likely if the two rows before this one and the one behind it are numbers, and the
-    times on both sides of this row are two steps apart.
-
-    Args:
-        table: The table. Its times are in the unit of their column.
-        line: Index of the line of the row, counted from 0.
-    """
-    lines = list(table.rows)
-    place = lines.index(line)
-    cells = table.rows[line]
-    samples = cells[1 - table.width :]
-    near = [table.rows[row] for row in lines[max(place - 2, 0) : place + 2] if row != line]
-    are_rows = all(len(row) == table.width and _are_numbers(row) for row in near)
-    if len(near) < 3 or table.width < 2 or not are_rows or not _are_numbers(samples):
-        return 0.0
-    if _are_numbers(cells[:1]) and len(cells) == table.width:
-        return 0.0
-    before_last, before, behind = (float(row[0]) for row in near)
-    step = before - before_last
-    if step <= 0 or abs(behind - before - 2 * step) > 2 * MAX_UNEVENNESS * step:
-        return 0.0
-    return before + step
-
-
-def _have_decimal_commas(rows: Sequence[str]) -> bool:
-    """Return whether the commas of all rows of a table are decimal commas.
-
-    Semicolons, tabs, blanks or quotes then separate the cells. A row such as 0,03097 may also be
-    two numbers, with the comma between them. The comma is a decimal comma if in some row the number
-    before it is not above that of the row before, since times or counts of samples rise.
-
-    Args:
-        rows: The texts of all rows. Those with words or dates, which are mistakes, do not count.
-
-    Returns:
-        False if there are no rows, no commas, or a row that is no list of numbers with decimal
-        commas.
-    """
-    words = r"[A-Za-z]{2}|\d[-/.]\d+[-/.]\d"
-    number = r'"?[-+]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][-+]?\d+)?"?'
-    further = rf'\s*[;\t]\s*{number}|\s+{number}|(?<="),(?="){number}'
-    pattern = rf"\s*{number}(?P<more>{further})*[;\s]*"
-    # Tables have thousands of rows, and in most of them the first one is none of such numbers.
-    if not all(re.fullmatch(pattern, row) or re.search(words, row) for row in rows):
-        return False
-    rows = [row for row in rows if not re.search(words, row)]
-    if not any("," in row for row in rows):
-        return False
-    matches = [re.fullmatch(pattern, row) for row in rows]
-    if any(match and match["more"] for match in matches):
-        return True
-    before_commas = [float(row.strip(' ";').partition(",")[0] or 0) for row in rows]
-    return bool((np.diff(before_commas) <= 0).any())
+    allowed = f"rows of {expected or table.width} numbers such as 1.25 or 1e-3"
+    return table.file.refusal(line, text, allowed, cure_of(text, cures, cure))
 
 
 @lru_cache(maxsize=1)  # whether a file is a table is asked before it is read as one
@@ -392,158 +324,128 @@ def _table_of(file: TextFile) -> _Table:
 def is_table(file: TextFile, *, is_described: bool = False) -> bool:
     """Return whether a file is a table of numbers, such as one in CSV.
 
-    It is one if the last line above the numbers begins with "time", "t", "date" or "timestamp".
-    Otherwise the last row must be numbers, and there must be one or two of them, or no line above
-    the numbers, or a description by the user. A file without numbers is none, unless it has such a
-    line.
+    It is one if its columns are named and the first has times, or if a line above the numbers
+    begins so. Otherwise the last row must be numbers, and there must be one or two of them, or no
+    line above the numbers, or a description by the user or by these lines.
 
     Args:
-        file: The file. Lines that begin with "#" do not count.
+        file: The file. Comments do not count.
         is_described: Whether the user says how to read the numbers: a channel, or step and unit.
     """
     table = _table_of(file)
-    if re.match(r"\W*(?:time|t|date|timestamp)\b", table.head, re.IGNORECASE):
+    plain = [file.lines[k] for k in table.texts if not re.match(_COMMENT, file.lines[k])]
+    is_headed = re.match(r"\W*(?:time|t|date|timestamp)\b", (plain or [""])[-1], re.I) is not None
+    if table.rows and (is_headed or (table.heads and table.columns[0].is_time)):
         return True
     last_row = list(table.rows.values())[-1:]
-    is_row = any(all(NUMBER.fullmatch(cell) for cell in cells) for cells in last_row)
-    return is_row and (is_described or not table.head or len(last_row[0]) < 3)
+    is_row = any(
+        all(NUMBER.fullmatch(x) or re.fullmatch(_TOUCHING, x) for x in cells) for cells in last_row
+    )
+    return is_row and (is_described or not plain or len(last_row[0]) < 3 or _is_stated(table))
+
+
+def _is_stated(table: _Table) -> bool:
+    """Return whether the lines of text tell a unit or a step."""
+    found = TextStatements.of(table.file, table.texts)
+    return bool(found.units or found.peak_units or found.steps)
 
 
 def read_table(
-    file: TextFile, step: float | None = None, unit: str = "", channel: str = ""
+    file: TextFile,
+    step: float | None = None,
+    unit: str = "",
+    channel: str = "",
+    override: Collection[str] = (),
 ) -> Recording:
     """Return the recording in a table: times and accelerations, or accelerations alone.
 
-    The times are the first column if the last line above the numbers begins with "time" or "t"; if
-    the numbers of the first column never fall; or if there are two columns and no `step`.
-    Accelerations without times are a column, or, if `step` and `unit` are given and `channel` is
-    not, all numbers row by row.
+    The times are the first column if its head has a name or a unit of times, or without a head if
+    its numbers never fall. Accelerations without times are a column, or, if step and unit are known
+    and neither names nor `channel` tell columns, all numbers row by row.
 
     Args:
         file: The file.
-        step: Step in s that the user states, for numbers without times; beside times it counts only
-            where these do not tell the step.
-        unit: Unit of acceleration that the user states, for a head without one. Times without a
-            unit are in s.
+        step: Step in s that the user says, for numbers without times; beside times it counts where
+            these do not tell the step.
+        unit: Unit of acceleration that the user says. Times without a unit are in s.
         channel: Column of the accelerations: its number, counted from 1 with the times, or its name
             in the head; empty where there is only one.
+        override: "unit" or "step", where the user says that the file states a wrong one.
 
     Returns:
         The recording, with samples in m/s².
 
     Raises:
         RefusedError: There are fewer than two rows; a row or the head is not understood; step or
-            unit is stated by neither the file nor the user; the times are uneven; the step is not
-            from 4e-5 s to below 0.5 s; the column is not one of accelerations; or the samples have
-            another peak than a line above them states.
+            unit is stated by neither the file nor the user, or by both otherwise; the times are
+            uneven; the step is not from 4e-5 s to below 0.5 s; the column is not one of
+            accelerations; or the samples have another peak than a line above them states.
     """
     table = _table_of(file)
     allowed = "a header with units, and rows of numbers below it"
     require(len(table.rows) > 1, file.name, f"{len(table.rows)} rows", allowed)
-    _require_cell_of_each_head(table)
-    has_times = table.has_times or (table.width == 2 and step is None)
-    is_series = table.width == 1 or (not has_times and bool(step and unit))
-    if not is_series or channel:
-        return _read_columns(table, step, unit, channel=channel, has_times=has_times)
-    _require_acceleration(table, table.column_heads)
-    if step is None or not unit:
-        raise table.refusal('say records.unit = "g" and records.step = "0.005 s"')
-    location = file.location(table.start)
-    stated = peaks_in_text(table.above, unit)
-    return recording_in_si(location, "numbers", unit, step, table.series(), stated=stated)
+    found = TextStatements.of(file, [k for k in table.texts if k not in table.heads])
+    said_step = Stated(step, f"{step:g} s") if step is not None else None
+    place = file.location(table.start)
 
-
-def _read_columns(
-    table: _Table, step: float | None, unit: str, *, channel: str, has_times: bool
-) -> Recording:
-    """Return the recording in one column of a table of two rows or more.
-
-    Args:
-        table: The table.
-        step: Step in s that the user states; None if it states none. Beside times it counts only
-            where these do not tell the step.
-        unit: Unit that the user states, or empty. The unit in the head of the column goes before
-            it, if there are more than two columns or the head begins with times.
-        channel: Number of the column, counted from 1 with the times, or its name in the head; empty
-            if there is only one beside the times.
-        has_times: Whether the first column has the times. Without a unit in their head they are in
-            s.
-
-    Returns:
-        The recording, with samples in m/s². Its channel is number and name of the column, as "2
-        ns"; empty for the second of two columns that was not named.
-
-    Raises:
-        RefusedError: A row or the head is not understood; there is no such column, or it is not one
-            of accelerations; step or unit is stated by neither the file nor the user; the times are
-            uneven; the step is not from 4e-5 s to below 0.5 s; or the samples have another peak
-            than a line above them states.
-    """
-    numbers = None
-    if table.head:  # without one, the last row of a series of numbers may be a short one
-        numbers = table.numbers()
-    index = 1
-    heads = table.column_heads
+    # A row "600 0.0100 656" above as many numbers as it says is a head of count and step.
+    first_row = next(iter(table.rows.values()))
+    n_behind = sum(map(len, table.rows.values())) - len(first_row)
+    is_head = len(first_row) > 1 and _are_numbers(first_row) and float(first_row[0]) == n_behind > 1
+    if is_head and 0 < float(first_row[1]) < MAX_STEP:
+        line = f"line {file.line_number(next(iter(table.rows)))}"
+        found.steps.append(Stated(float(first_row[1]), f"{first_row[1]} s", line))
+    else:
+        is_head = False
+        _require_cell_of_each_head(table)
+    has_times = not is_head and (table.has_times or (table.width == 2 and step is None))
+    known_step = None
+    if not has_times:
+        known_step = settled(place, "step", found.steps, said_step, override=override)
+    is_known = bool(known_step) and bool(unit or found.units or found.peak_units)
+    is_series = table.width == 1 or is_head or (not table.heads and not has_times and is_known)
+    index = 0
     name = ""
-    if channel or table.width > 2:
+    if not is_series or channel:
         index = _choose_column(table, channel, has_times=has_times)
-        chosen = table.columns[index]
-        heads = [f"{chosen.name} [{chosen.unit}]"]
-        name = f"{index + 1} {chosen.name}".strip()
-    _require_acceleration(table, heads)
-
-    # Of two columns without a head that begins with times only the case's unit counts.
-    # A head of another kind, "acc g" above two columns, may mean either column.
-    is_understood = table.width > 2 or table.columns[0].is_time
-    if is_understood and table.columns[index].unit:
-        unit = table.columns[index].unit
-    if cure := _cure_of_head(table, table.columns[index], unit=unit):
-        raise table.refusal(cure)
-    if numbers is None:
-        numbers = table.numbers()
-    remarks: list[str] = []
+        if table.width > 2 or channel:
+            name = f"{index + 1} {table.columns[index].name}".strip()
+    column = table.columns[index]
+    own_unit = _unit_of(table, column, found, unit=unit, override=override)
+    if known_step is None and not has_times:
+        raise table.refusal("say records.step, the time between the numbers, as in s or ms")
+    if own_unit is None:
+        raise table.refusal("say records.unit: no line states the unit, or write it into the head")
+    remarks = [own_unit.remark]
+    if is_series and not channel:
+        samples = table.series(int(is_head))
+    else:
+        samples = table.numbers(list(table.rows))[:, index]
     if has_times:
-        step, remarks = _step_and_remarks(table, stated_step=step)
-        if is_understood and not table.columns[0].unit:
-            remarks.append("its times have no unit, taken as s")
-    elif step is None:
-        raise table.refusal('say records.step = "0.005 s"')
-    if table.head and not is_understood:
-        what = f"its head, {table.head[:40]}, is not understood"
-        remarks.append(f"{what}: the case's unit is taken")
+        known_step, further = _step_of_times(table, found, said=said_step, override=override)
+        remarks += further
+    assert known_step is not None
+    remarks.append(known_step.remark)
+    require_count(place, found.counts, len(samples))
+    lines = [file.lines[k] for k in table.texts]
     return recording_in_si(
-        table.file.location(table.start),
-        "CSV",
-        unit,
-        step,
-        numbers[:, index],
+        place,
+        "numbers" if is_series else "CSV",
+        own_unit.text,
+        known_step.value,
+        samples,
         name,
-        tuple(remarks),
-        stated=peaks_in_text(table.above, unit),
+        tuple(filter(None, remarks)),
+        stated=() if "unit" in override else peaks_in_text(lines, own_unit.text),
     )
 
 
 def _require_cell_of_each_head(table: _Table) -> None:
-    """Raise an error if rows seem to have decimal commas between commas.
-
-    This is so if the head has two cells or more and begins with times, each row has a comma, and
-    the first row has more cells than the head, up to twice as many, and no words, such as units. A
-    table without rows passes.
-
-    Raises:
-        RefusedError: The rows are such rows.
-    """
-    heads = len(re.split("[,;\t]", table.head))
-    # The row 0,01,0,25 below the head time,acc has four cells. Its commas cannot be told apart.
-    has_commas = all("," in table.file.lines[line] for line in table.rows)
-    if has_commas and 1 < heads < table.width <= 2 * heads and _Column.of(table.head).is_time:
-        value = f"{table.width} numbers in a row below {heads} heads"
-        first_row = next(iter(table.rows))
-        if re.search("[A-DF-Za-df-z]", table.file.lines[first_row]):  # E may be an exponent
-            raise _wrong_row(table, first_row)
-        cure = "these seem to be decimal commas: write decimal points, or semicolons between the"
-        cure += " columns"
-        raise table.file.refusal(first_row, value, "a number in a row for each head", cure)
+    """Raise RefusedError if a head that begins with times has another count of cells than rows."""
+    plain = [table.file.lines[k] for k in table.texts]
+    cells = re.split("[,;\t]", (plain or [""])[-1])
+    if not table.heads and table.rows and len(cells) > 1 and _Column.of(cells[0]).is_time:
+        raise _wrong_row(table, next(iter(table.rows)), expected=len(cells))
 
 
 def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
@@ -561,10 +463,10 @@ def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
             several; or there are no times and no name, so that the numbers may as well be one
             series.
     """
-    if not channel and not has_times:
+    if not channel and not has_times and not table.heads:
         name = table.file.name
         cure = f"choose one of several components, {name}#1; one series, several numbers a line,"
-        cure += ' has records.step = "0.005 s" and records.unit = "g"'
+        cure += " takes records.step and records.unit"
         value = f"{table.width} columns without times"
         raise table.file.refusal(table.start, value, EXPECTED_HEAD, cure)
     first = 1 if has_times else 0
@@ -575,142 +477,130 @@ def _choose_column(table: _Table, channel: str, *, has_times: bool) -> int:
     return first + choose_channel(place, channel, names)
 
 
-def _require_acceleration(table: _Table, heads: Sequence[str]) -> None:
-    """Raise an error if a head names another quantity than an acceleration.
+def _unit_of(
+    table: _Table, column: _Column, found: TextStatements, *, unit: str, override: Collection[str]
+) -> Stated | None:
+    """Return the unit of a column of accelerations, as a factor to m/s²; None if nobody states it.
 
-    It does so by a word such as velocity, force or counts, unless the head also has a word for an
-    acceleration, or by a unit in brackets, such as [mm]. A head that names no quantity passes.
+    The unit in the head of the column goes before those in other lines, and these before those of
+    peaks; all of one kind must agree, with what the user says too.
 
     Args:
-        table: The table, for the message.
-        heads: Texts above the numbers of a column, such as "time [s],vel [cm/s]".
+        table: The table.
+        column: Name and unit of the column, both empty without a head.
+        found: What the other lines state.
+        unit: What the user says; may be empty.
+        override: "unit", where the user says that the file states a wrong one.
 
     Raises:
-        RefusedError: Such a word or unit is found; the message names the first one.
+        RefusedError: The column, or the file where no unit of accelerations is stated, is of
+            another quantity; a unit is not known, or two disagree; or a factor stands beside it.
     """
-    words_of_quantities = {
-        "a displacement": r"disp(?:l\w*)?|deflection|drift|position",
-        "a velocity": r"vel(?:oc\w*)?|speed",
-        "a force": r"forces?|loads?|thrust|(?:base )?shear",
-        "a strain": r"strains?",
-        "a stress": r"stress(?:es)?|pressure",
-        "an angle": r"rotation|angle|tilt",
-        "a number of counts": r"counts?",
-        "a voltage": r"voltage|volts?",
-    }
-    quantity = ""
-    for head in heads:
-        for name, words in words_of_quantities.items():
-            is_named = re.search(rf"(?:\b|_)(?:{words})(?:\b|_)", head, re.IGNORECASE)
-            if is_named and not _Column(head.lower()).is_acceleration:
-                quantity = quantity or name
-        for unit in re.findall(r"[\[(]\s*([^\])]+?)\s*[\])]", head):
-            if name := other_quantity(unit):
-                quantity = quantity or f"{name} by its unit {unit}"
-    if quantity:
-        cure = f"its column is {quantity}: take the record of the acceleration, or mend the head"
-        raise table.file.refusal(table.start, " ".join(heads), EXPECTED_HEAD, cure)
+    file = table.file
+    factor = acceleration_factor(column.unit)
+    own = []
+    if factor is not None and column.unit:
+        place = f"line {file.line_number(table.heads[-1])}"
+        own.append(Stated(factor, column.unit, place))
+    of_heads = TextStatements.of(file, table.heads)
+    if not own:
+        found.units += of_heads.units
+    named = named_quantity(column.name)
+    by_unit = other_quantity(column.unit)
+    if by_unit and column.unit:
+        by_unit += f" by its unit {column.unit}"
+    elsewhere = ""
+    line = table.start
+    if not own and not found.units and not re.search(r"(?:\b|_)acc", column.name):
+        elsewhere, line = (found.quantities or [("", line)])[0]
+    is_spectrum = any(
+        x.is_abscissa_of_spectrum or re.match("p?sa\b", x.name) for x in table.columns
+    )
+    what = "a spectrum" if is_spectrum else named or by_unit or elsewhere
+    if column.is_time or what:
+        what = what or "one of times, which stand in the first"
+        cure = f"its column is {what}: take the record of the acceleration, or mend the head"
+        raise file.refusal(line, table.file.lines[line], EXPECTED_HEAD, cure)
+    if "unit" in override and unit:
+        own = own[:1]
+    elif column.unit and factor is None:
+        raise table.refusal(f"{column.unit} is no unit of accelerations: mend the head")
+    elif factors := [*found.factors, *of_heads.factors]:
+        cure = 'multiply the numbers by it, or say unit and override = ["unit"]'
+        text = file.lines[factors[0]].strip()
+        raise file.refusal(factors[0], text, "a unit without a factor", cure)
+    said = Stated(acceleration_factor(unit) or 0.0, unit) if unit else None
+    stated = [*own, *found.units] or found.peak_units
+    return settled(file.location(table.start), "unit", stated, said, override=override)
 
 
-def _cure_of_head(table: _Table, column: _Column, *, unit: str) -> str:
-    """Return what is to be mended in the head of times and accelerations; empty if it is complete.
+def _step_of_times(
+    table: _Table, found: TextStatements, *, said: Stated | None, override: Collection[str]
+) -> tuple[Stated, list[str]]:
+    """Return the step of the times in the first column, in s, and clauses on what is unusual.
 
-    Complete means: times, if the head names them, have a known unit; the column is neither one of
-    times nor a spectrum; and the unit of acceleration, from the head or the user, is known. If the
-    names in the head are unknown, the unit in it must not be another one than that taken.
+    A step that the user or another line states is taken where the times do not tell it: if they
+    count the samples, are all equal, or are rounded too coarsely. Else it must agree.
 
     Args:
-        table: The table, with one column at least.
-        column: Name and unit of the accelerations in the head, both possibly empty.
-        unit: Unit of acceleration that is taken, from the head or the user; empty without one.
-    """
-    first = table.columns[0]
-    # Times without a unit are in s, as most files have them.
-    if first.is_time and not seconds_of(first.unit or "s"):
-        return f"{first.unit} is no unit of times: {', '.join(SECONDS)}"
-    if column.is_time:
-        return "times stand in the first column"
-    if re.match(r"freq|period|sa\b|psa\b", first.name):
-        return "this is a spectrum: take the record of the acceleration over time"
-    if column.unit and acceleration_factor(column.unit) is None:
-        return f"{column.unit} is no unit of accelerations: mend the head"
-    own_factor = acceleration_factor(column.unit)
-    is_named_otherwise = not first.is_time and bool(seconds_of(first.unit)) and own_factor
-    if is_named_otherwise and own_factor != acceleration_factor(unit):
-        # The units tell times and accelerations, as below names in another language.
-        return f"name the columns: time [{first.unit}], acceleration [{column.unit}]"
-    if acceleration_factor(unit) is not None:
-        return ""
-    if re.match(r"\W*(?:samples?|points?|index|number|no|nr|count|n|i)\b", first.name):
-        return 'leave the count of samples out, and say records.step = "0.005 s"'
-    return 'write the unit into the head, or say records.unit = "g"'
-
-
-def _step_and_remarks(table: _Table, *, stated_step: float | None) -> tuple[float, list[str]]:
-    """Return the step of a record's times in s, and clauses on what is unusual about them.
-
-    Times that rise by 1 from 0 or 1 on count the samples. They are then no times in s, and
-    `stated_step` is returned.
-
-    Args:
-        table: The table of two rows or more, whose first column has the times.
-        stated_step: Step that the user states, in s, or None. It is returned where the times do not
-            tell their step: if they count the samples, are all equal, or are rounded too coarsely.
-            Else it is ignored.
+        table: The table of two rows or more.
+        found: What lines of text state.
+        said: Step that the user says.
+        override: "step", where the user says that the file states a wrong one.
 
     Raises:
-        RefusedError: The times are uneven, or their step is not from 4e-5 s to below 0.5 s.
+        RefusedError: The times are uneven or have another step than is stated, their unit is not
+            known, or their step is not from 4e-5 s to below 0.5 s.
     """
-    steps = _even_steps(table, stated_step=stated_step)
-    is_count = steps.step == 1 and steps.first in (0, 1)
-    if is_count and stated_step is not None:
-        return stated_step, ["its times count the samples: the stated step is taken"]
-    cure = ""
+    place = table.file.location(table.start)
+    time = table.columns[0]
+    factor = seconds_of(time.unit)
+    remarks = []
+    if time.unit and not factor:
+        raise table.refusal(f"{time.unit} is no unit of times: {', '.join(SECONDS)}")
+    if not factor:
+        unit = settled(place, "unit of times", found.time_units)
+        factor = unit.value if unit else 1.0
+        if table.heads and not unit:
+            remarks.append("its times have no unit, taken as s")
+    other = settled(place, "step", found.steps, said, override=override, tolerance=0.05)
+    steps = _even_steps(table, factor, other.value if other else None)
+    remarks += filter(None, [steps.remark])
+    is_count = steps.step == factor and steps.first in (0, factor)
+    if is_count and other is not None:
+        return other, ["its times count the samples: the stated step is taken"]
+    cure = "mend the head of the times"
     if is_count:
-        cure = 'times that count the samples do not tell their step: say records.step = "0.005 s"'
-    elif table.columns[0].is_time and seconds_of(table.columns[0].unit or "s") != 1:
-        cure = "the head states another unit of times than s: if they are in s, write time [s]"
-    elif steps.step >= MAX_STEP:
-        cure = "times in ms have the head time [ms]"
-    elif steps.step < MIN_STEP:
-        cure = "times of a spreadsheet are in days: multiply them by 86400"
-    require_step(table.file.location(table.start), steps.step, cure)
-    remarks = [steps.remark] if steps.remark else []
+        cure = "times that count the samples do not tell their step: say records.step"
+    require_step(place, steps.step, cure)
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
         remarks.append(f"its times begin at {steps.first:g} s, taken as 0")
-    return steps.step, remarks
+    of_times = Stated(steps.step, f"{steps.step:.6g} s", "by its times")
+    if steps.is_stated and other is not None:
+        return other, remarks
+    settled(place, "step", [of_times, *found.steps], override=override, tolerance=0.05)
+    return settled(place, "step", [of_times], said, override=override) or of_times, remarks
 
 
 @dataclass(frozen=True)
 class _EvenSteps:
-    """Step and first time of even times, in s, and a clause on how the step was found."""
+    """Step and first time of even times in s, a clause on it, and whether it is the stated one."""
 
     step: float
     first: float
     remark: str = ""
+    is_stated: bool = False
 
 
-def _even_steps(
-    table: _Table,
-    *,
-    stated_step: float | None = None,
-    or_step: str = ', or say records.step = "{:.9g} s"',
-) -> _EvenSteps:
+def _even_steps(table: _Table, factor: float, stated_step: float | None = None) -> _EvenSteps:
     """Return the even steps of the times in the first column of a table of two rows or more.
 
-    A step that the user states is taken where the times do not tell it: if all are equal, or if
-    they were rounded so coarsely that even steps look uneven. In the latter case it must agree with
-    the duration to the last digit of the times.
-
     Args:
-        table: The table. Its times are numbers, in the unit in the head of their column, or in s.
-        stated_step: Step that the user states, in s; None if it states none.
-        or_step: What a hint says of the key that states the step; "{:.9g}" in it is replaced by a
-            step. It is empty where there is no such key.
-
-    Returns:
-        `step` and `first`, the step and the first time in s, where `first` is 0 if all times are
-        equal; and `remark`, a clause on how the step was found, empty if it follows from the times.
+        table: The table. Its times are numbers.
+        factor: Their unit in s.
+        stated_step: Step that user or file state, in s. It is taken where the times do not tell it:
+            if all are equal, or if they were rounded so coarsely that even steps look uneven. Then
+            it must agree with the duration to the last digit of the times.
 
     Raises:
         RefusedError: The times do not rise in even steps, and `stated_step` is missing or does not
@@ -718,26 +608,20 @@ def _even_steps(
     """
     file = table.file
     lines = list(table.rows)
-    to_s = 1.0
-    if table.columns[0].is_time:
-        to_s = seconds_of(table.columns[0].unit or "s")
-    time = to_s * np.array([float(cells[0]) for cells in table.rows.values()])
+    time = factor * table.numbers(lines)[:, 0]
     first = float(time[0])
     duration = float(time[-1]) - first
     n_steps = len(time) - 1
-    if (time == first).all():
-        if stated_step is not None:
-            remark = "its times are all equal: the stated step is taken"
-            return _EvenSteps(stated_step, first=0.0, remark=remark)
-        cure = f"write times of even steps{or_step.format(0.005)}"
-        raise file.refusal(lines[0], f"time {first:g} s, as all times", "times that rise", cure)
-
+    if (time == first).all() and stated_step is not None:
+        remark = "its times are all equal: the stated step is taken"
+        return _EvenSteps(stated_step, 0.0, remark, is_stated=True)
     even: Array = np.asarray(np.linspace(first, time[-1], len(time)), float)
     # The step is the mean, and times are compared with even ones. Differences of neighbours would
     # not do: those of times such as 1.7e9 s, from 1970 on, have lost the digits of the step.
     step = duration / n_steps
-    last_digit = to_s * table.resolution()
-    unevenness = float(np.abs(time - even).max())
+    last_digit = factor * _resolution([cells[0] for cells in table.rows.values()])
+    deviations = np.abs(time - even)
+    unevenness = float(deviations.max())
     if step > 0 and unevenness <= MAX_UNEVENNESS * step:
         # Beyond rounding to their last digit, and 1 % of a step (tuned), as programs leave by
         # adding up steps, the times are those of a clock that jitters.
@@ -745,101 +629,35 @@ def _even_steps(
         if unevenness > max(last_digit, 0.01 * step):
             remark = f"its times are uneven by up to {unevenness:.2g} s, taken as even"
         return _EvenSteps(step, first, remark)
-    if not _are_rounded(time, even, last_digit):
-        raise _uneven(file, lines, time)
-    difference = abs((stated_step or 0.0) * n_steps - duration)
-    if stated_step is None or difference > last_digit * (1 + 1e-6):  # 1e-6 is binary round-off
-        likely = _likely_step(n_steps, duration, last_digit)
-        cure = f"digits were lost: write times of steps of {likely:.9g} s in full"
-        value = f"times to {last_digit:g} s in steps of about {step:.4g} s"
-        raise file.refusal(lines[0], value, "even steps", cure + or_step.format(likely))
-    remark = f"its times are rounded to {last_digit:g} s: the stated step is taken"
-    return _EvenSteps(stated_step, first, remark)
-
-
-def _are_rounded(time: Array, even: Array, last_digit: float) -> bool:
-    """Return whether times are even ones that were rounded or cut to a last digit.
-
-    This needs three things: no time falls, and the last is above the first; each time lies within
-    the last digit of its even place; and two steps or more differ from the median step by 10 % or
-    more. A single odd step is not rounding, but a time that stands twice, or a gap.
-
-    Args:
-        time: The times in s, shape (n,) with n ≥ 2.
-        even: Even times from the first to the last of them, shape (n,).
-        last_digit: Unit of the last digit of the times, in s.
-    """
-    steps = np.diff(time)
-    usual = np.median(steps)
-    is_odd = np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual
     # A rounded time lies within half of the last digit from its place, and so do both ends of the
-    # line of even times: together at most one last digit. A time that was cut lies below its place
-    # by at most one digit, and so does the line. The factor leaves room for binary round-off.
-    is_near = np.abs(time - even).max() <= last_digit * (1 + 1e-6)
-    rises = time[-1] > time[0] and bool((steps >= 0).all())
-    return rises and bool(is_near) and int(is_odd.sum()) > 1
-
-
-def _likely_step(n_steps: int, duration: float, last_digit: float) -> float:
-    """Return the step in s of a usual sampling rate that fits a duration to its last digit.
-
-    Rates are multiples of 100, 128, 50, 64, 25 or 10 samples in a second, tried in this order. If
-    none fits, the mean step `duration / n_steps` is returned.
-
-    Args:
-        n_steps: Number of steps, above 0.
-        duration: Difference of the last and the first time in s, above 0.
-        last_digit: Unit of the last digit of the times, in s.
-    """
-    lowest = n_steps / (duration + last_digit)
-    # A duration of a few last digits alone keeps the rate finite.
-    highest = n_steps / max(duration - last_digit, duration / 2)
-    for multiple in (100, 128, 50, 64, 25, 10):
-        rate = multiple * round(n_steps / duration / multiple)
-        if rate and lowest <= rate <= highest:
-            return 1 / rate
-    return duration / n_steps
-
-
-def _uneven(file: TextFile, lines: Sequence[int], time: Array) -> RefusedError:
-    """Return, without raising it, the error about times that do not rise in even steps.
-
-    The error names the first odd time. Its hint depends on the pattern: a single wrong time, rows
-    in falling order or out of order, two records in one file, a time that stands twice, or a gap.
-
-    Args:
-        file: The file.
-        lines: Index of the line of each time, counted from 0.
-        time: The times in s, shape (n,) with n ≥ 2; not all are equal.
-    """
-    steps = np.diff(time)
-    rising = steps[steps > 0]
-    usual = float(np.median(rising)) if rising.size else 0.0
-    odd = np.flatnonzero(np.abs(steps - usual) > 2 * MAX_UNEVENNESS * usual)
-    wrong = 1 + int(odd[0]) if odd.size else int(np.abs(time - time[0]).argmax())
-    falls = np.flatnonzero(steps < 0)
-    # One wrong time makes two odd steps, one after the other, whose sum is right.
-    is_one_time = odd.size == 2 and odd[1] == odd[0] + 1
-    if is_one_time and abs(steps[odd].sum() - 2 * usual) <= 2 * MAX_UNEVENNESS * usual:
-        cure = f"this time alone is wrong: {time[wrong - 1] + usual:.9g} s fits"
-    elif falls.size:
-        wrong = 1 + int(falls[0])
-        pair = (
-            f"line {file.line_number(lines[wrong - 1])} and line {file.line_number(lines[wrong])}"
-        )
-        cure = f"times must rise, and fall between {pair}: sort the rows"
-        if falls.size == steps.size:
-            cure = "times must rise, and these fall: turn the order of the rows round"
-        elif (np.diff(np.sort(time)) < MAX_UNEVENNESS * usual).any():
-            cure = f"times must rise, and fall between {pair}: of two records in one file keep one"
-    elif time[wrong] == time[wrong - 1]:
-        cure = "a time stands twice: leave one out, or resample to even steps"
-    elif steps[wrong - 1] > 1.5 * usual and odd.size == 1:
-        cure = "samples are missing there: fill the gap, or resample to even steps"
-    else:
-        cure = "resample to even steps"
+    # line of even times. The factor leaves room for binary round-off.
+    digit = last_digit * (1 + 1e-6)
+    are_rounded = step > 0 and unevenness <= digit
+    if are_rounded and stated_step and abs(stated_step * n_steps - duration) <= digit:
+        remark = f"its times are rounded to {last_digit:g} s: the stated step is taken"
+        return _EvenSteps(stated_step, first, remark, is_stated=True)
+    usual = float(np.median(np.diff(time)))
+    odd = np.abs(np.diff(time) - usual) > 2 * MAX_UNEVENNESS * abs(usual)
+    wrong = 1 + int(odd.argmax())
+    cure = "times must rise evenly: mend, sort or resample the rows"
+    if are_rounded:
+        cure = "digits of the times were lost: write them in full, or say records.step"
+    elif duration == 0:
+        cure = "times are all equal: write them, or say records.step"
     value = f"time {time[wrong]:g} s after {time[wrong - 1]:g} s"
-    return file.refusal(lines[wrong], value, "even steps", cure)
+    raise file.refusal(lines[wrong], value, "even steps", cure)
+
+
+def _resolution(cells: Sequence[str]) -> float:
+    """Return the unit of the last digit of times, such as 0.001 for 1.023, in their unit."""
+    # Programs write times with a fixed number of decimals, or with a fixed number of digits. As
+    # zeros at the end may be missing, the cell with most of them tells this number. Of both units
+    # the coarser one is taken, and with a fixed number of digits that of the largest time.
+    times = [Decimal(cell) for cell in cells]
+    finest = min(int(time.as_tuple().exponent) for time in times)
+    digits = max(len(time.as_tuple().digits) for time in times)
+    # `adjusted` is the exponent of the first digit of a decimal number.
+    return float(10.0 ** max(finest, max(times).adjusted() + 1 - digits))
 
 
 @dataclass(frozen=True)
@@ -877,45 +695,26 @@ def read_force_history(path: Path) -> ForceHistory:
     """
     file = TextFile.from_bytes(path.name, read_bytes(path))
     table = _table_of(file)
-    _require_cell_of_each_head(table)
-    if cure := _cure_of_force_head(table):
+    first_row = next(iter(table.rows), 0)
+    is_headed = len(table.rows) > 1 and table.width == 2 and bool(table.heads)
+    if is_headed:
+        time, force = table.columns
+        is_force = re.match(r"\W*(?:force|load|f)\b", force.name) is not None
+        is_headed = time.is_time and seconds_of(time.unit) > 0 and is_force
+        is_headed = is_headed and (not force.unit or force.unit in NEWTONS)
+    if not is_headed:
+        _require_cell_of_each_head(table)
         allowed = "time [s],force [kN], or time [s],force of a course without a unit"
-        raise file.refusal(table.start, table.head[:80] or "without a head", allowed, cure)
-    numbers = table.numbers()
-    steps = _even_steps(table, or_step="")
+        cure = f"units of forces are {', '.join(NEWTONS)}; masses are no forces"
+        value = " ".join(file.lines[k] for k in table.texts)[:80] or "without a head"
+        raise file.refusal(table.start, value, allowed, cure)
+    steps = _even_steps(table, seconds_of(time.unit))
     if abs(steps.first) > MAX_UNEVENNESS * steps.step:
-        first_row = next(iter(table.rows))
         cure = f'write times from 0 s on, and in the case "{file.name}, from {steps.first:g} s"'
         raise file.refusal(first_row, f"time {steps.first:g} s", "even steps from 0 s", cure)
-    if not numbers[:, 1].any():
+    forces = table.numbers(list(table.rows))[:, 1]
+    if not forces.any():
         raise file.refusal(table.start, "zeros throughout", "a force that moves something")
-    unit = table.columns[1].unit
-    samples = NEWTONS.get(unit, 1.0) * numbers[:, 1]
-    return ForceHistory(steps.step, np.asarray(samples), has_unit=bool(unit))
-
-
-def _cure_of_force_head(table: _Table) -> str:
-    """Return what is to be mended in a table of times and forces; empty if it is complete.
-
-    Complete means: two rows or more; two columns, named time and force (or load, or f); a known
-    unit of the times; and a known unit of the force, or none.
-    """
-    if len(table.rows) < 2:
-        return "write two rows of numbers or more below the head"
-    if table.width != 2:
-        return "write two numbers in a row, the time and the force"
-    time, force = table.columns
-    if force.is_time:
-        return "times stand in the first column"
-    if not time.is_time or not re.match(r"\W*(?:force|load|f)\b", force.name):
-        return "name the first column time and the second one force"
-    if not seconds_of(time.unit):
-        return f"write the unit of the times: time [s], or one of {', '.join(SECONDS)}"
-    if not force.unit or force.unit in NEWTONS:
-        return ""
-    if force.unit in ("kg", "t"):
-        return "this is a unit of mass: write the weight in N, or in kgf"
-    by_small_letters = {unit.lower(): unit for unit in NEWTONS}
-    if meant := by_small_letters.get(force.unit.lower()):
-        return f"did you mean {meant}?"
-    return f"units of forces are {', '.join(NEWTONS)}"
+    return ForceHistory(
+        steps.step, np.asarray(NEWTONS.get(force.unit, 1.0) * forces), has_unit=bool(force.unit)
+    )

@@ -255,7 +255,7 @@ def recording_in_si(
     if to_si is None:
         value = f"in units of {unit}" if unit else "without a unit"
         quantity = other_quantity(unit)
-        cure = 'where the file has no unit, say records.unit = "g"'
+        cure = "where the file has no unit, say records.unit"
         if quantity:
             cure = f"{unit} is the unit of {quantity}: take the record of the acceleration"
         elif unit:

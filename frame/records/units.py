@@ -16,12 +16,21 @@ METRES = {
 SECONDS = {
     "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "msec": 1e-3, "s": 1.0, "sec": 1.0,
     "secs": 1.0, "second": 1.0, "seconds": 1.0, "min": 60.0, "minutes": 60.0, "h": 3600.0,
+    "milliseconds": 1e-3, "microseconds": 1e-6, "millisecond": 1e-3, "microsecond": 1e-6,
 }  # fmt: skip
 # Newtons in a unit of force. Capitals count, since mN and MN differ by 1e9.
 NEWTONS = {
     "N": 1.0, "kN": 1e3, "MN": 1e6, "kgf": STANDARD_GRAVITY, "lbf": 4.4482216152605,
     "kip": 4448.2216152605,
 }  # fmt: skip
+# A length over a second squared: "cm/s^2", "CM/SEC**2", "cm/s/s", "cm/(s^2)", "cm s-2" or "cm.s-2".
+_SECOND = r"s(?:ec(?:onds?)?)?"
+_SQUARE = r"(?:\^|\*\*)?\s*[-−]?\{?[2²]\}?"
+PER_SECOND_SQUARED = (
+    rf"(?P<length>{'|'.join(sorted(METRES, key=len, reverse=True))})\s*(?:/\s*{_SECOND}\s*/\s*"
+    rf"{_SECOND}|(?:/\s*\(?\s*{_SECOND}|[\s*·.]\s*s)\s*{_SQUARE}\)?)"
+)
+GALS = {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5, "mgals": 1e-5}
 
 
 def seconds_of(unit: str) -> float:
@@ -37,18 +46,15 @@ def acceleration_factor(unit: str) -> float | None:
     matter. Other units, and an empty one, give None.
     """
     text = _without_brackets(unit)
-    multiple = r"(10\s*\*?|milli|m|%|‰)?\s*g(?:'s|s)?\s*(/\s*10|\*\s*10)?"
+    multiple = r"(10\s*\*?|milli-?|m|%|‰)?\s*g(?:'s|s)?\s*(/\s*10|\*\s*10)?"
     if match := re.fullmatch(multiple, text, re.IGNORECASE):
         prefixes = {"": 1.0, "10": 10.0, "milli": 1e-3, "m": 1e-3, "%": 1e-2, "‰": 1e-3}
-        prefix = (match[1] or "").rstrip(" *").lower()
+        prefix = (match[1] or "").rstrip(" *-").lower()
         tenfold = {"": 1.0, "/": 0.1, "*": 10.0}[(match[2] or "")[:1]]
         return STANDARD_GRAVITY * prefixes[prefix] * tenfold
-    second = r"s(?:ec)?"
-    twice = rf"/\s*{second}\s*/\s*{second}"
-    squared = rf"(?:/\s*{second}|[\s*·]\s*s)\s*(?:\^|\*\*)?\s*[-−]?[2²]"
-    if match := re.fullmatch(rf"([a-zµμ]+?)\s*(?:{twice}|{squared})", text, re.IGNORECASE):
-        return METRES.get(match[1].lower())
-    return {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5}.get(text.lower())
+    if match := re.fullmatch(PER_SECOND_SQUARED, text, re.IGNORECASE):
+        return METRES.get(match["length"].lower())
+    return GALS.get(text.lower())
 
 
 def other_quantity(unit: str) -> str:
@@ -64,7 +70,7 @@ def other_quantity(unit: str) -> str:
     length = "|".join(METRES)
     patterns = {
         "a displacement": length,
-        "a velocity": rf"(?:{length})\s*(?:/\s*s(?:ec)?|[\s*·]\s*s\s*(?:\^|\*\*)?\s*[-−]1)",
+        "a velocity": rf"(?:{length})\s*(?:/\s*s(?:ec)?|[\s*·]\s*s\s*(?:\^|\*\*)?\s*[-−]1)|kines?",
         "a number of counts, which the sensor's sensitivity turns into an acceleration": (
             r"counts?|cnts?|digits?|bits?|lsb"
         ),

@@ -63,11 +63,7 @@ def test_heads_of_another_wording_are_read_or_told_how(tmp_path, head):
     path = saved(tmp_path, head + "\n" + written.csv_text().partition("\n")[2])
     record = read_record(path, unit="g")
     assert record.samples == pytest.approx(written.G * written.samples(), abs=1e-6)
-    if head.endswith("s g"):
-        with refuses("record.AT2, line 1"):
-            read_record(path)
-    else:
-        assert read_record(path).samples == pytest.approx(record.samples)
+    assert read_record(path).samples == pytest.approx(record.samples)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +101,7 @@ def test_columns_without_a_head_need_a_unit_and_one_column_a_step(tmp_path):
     with refuses("record.csv, line 1"):
         read_record(two)
     other = saved(tmp_path, "s,m/s^2\n" + two.read_text(encoding="utf-8"), "other.csv")
-    assert "its head, s,m/s^2, is not" in " ".join(read_record(other, unit="g").remarks)
+    assert read_record(other).samples == pytest.approx(written.samples(), abs=1e-9)
     one = saved(tmp_path, written.lines(written.samples(), "15.7E", 1), "one.csv")
     with refuses("one.csv, line 1"):
         read_record(one, unit="g")
@@ -339,8 +335,7 @@ RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
     ("old", "new", "line"),
     [
         ("[g]", "[kg]", 1),
-        ("acc", "up [g],acc", 1),
-        ("time", "zeit", 1),
+        ("acc", "up [g],acc", 2),
         ("0.01,0.1", "0.01,1_0", 3),
         ("0.01,0.1", "0.01,٣", 3),
         ("0.01,0.1", "0.01", 3),

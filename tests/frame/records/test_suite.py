@@ -42,9 +42,19 @@ def test_what_is_unusual_is_a_remark(tmp_path):
     path = tmp_path / "late.csv"
     rows = "".join(f"{10 + 0.02 * k:.2f},{60 * np.sin(k)}\n" for k in range(80))
     path.write_text(f"time [s],acceleration [m/s^2]\n{rows}")
-    remarks = "; ".join(read_record(path, unit="g").remarks)
-    for words in ("begin at 10 s", "peak is 6.12 g", "its own unit, m/s^2, is taken, not g"):
+    with refuses("late.csv, line 1"):
+        read_record(path, unit="g")
+    remarks = "; ".join(read_record(path).remarks)
+    for words in ("begin at 10 s", "peak is 6.12 g"):
         assert words in remarks
+    other = read_record(path, unit="g", override=["unit"])
+    assert other.samples == pytest.approx(9.80665 * read_record(path).samples)
+    assert "its own unit, m/s^2 (line 1), is overridden by g" in other.remarks
+    with refuses("late.csv, line 1"):
+        read_record(path, step=0.01)
+    assert read_record(path, step=0.01, override=["step"]).step == 0.01
+    with refuses("override"):
+        read_record(path, override=["peak"])
 
 
 @pytest.mark.parametrize(

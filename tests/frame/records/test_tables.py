@@ -60,7 +60,7 @@ def test_a_column_of_times_and_three_components_is_chosen(tmp_path, head):
         assert "one of: 2 or ns; 3 or ew; 4 or v" in refused(path)
     else:
         assert "one of: 2; 3; 4" in refused(path, "", None, "g")
-        assert 'say records.unit = "g"' in refused(path, "2")
+        assert "say records.unit" in refused(path, "2")
     assert "channel 9" in refused(path, "9", None, "g")
 
 
@@ -85,18 +85,18 @@ def test_times_that_lost_digits_are_read_by_the_step_that_the_line_names(tmp_pat
     rows = [f"{k * STEP:{digits}},{x:.5f}" for k, x in enumerate(VALUES[:30])]
     path = saved(tmp_path, rows, "time [s],acceleration [g]")
     message = refused(path)
-    assert "digits were lost" in message
-    assert 'records.step = "0.00390625 s"' in message
+    assert "digits of the times were lost" in message
+    assert "say records.step" in message
     record = read_record(path, step=STEP)
     assert record.step == STEP
     assert record.samples == pytest.approx(G * VALUES[:30], abs=1e-4)
     assert any("rounded to" in remark for remark in record.remarks)
-    assert "digits were lost" in refused(path, "", 2 * STEP)  # a step that does not fit the times
+    assert "step" in refused(path, "", 2 * STEP)  # a step that does not fit the times
 
 
 def test_forces_whose_times_lost_digits_name_the_step(tmp_path):
     rows = [f"{k * STEP:.3f},{k % 7}" for k in range(30)]
-    with refuses("r.csv, line 2"):
+    with refuses("r.csv, line 8"):
         read_force_history(saved(tmp_path, rows, "time [s],force [kN]"))
 
 
@@ -152,51 +152,30 @@ def test_one_column_of_decimal_commas_is_one_column(tmp_path):
     assert len(record.samples) == N_SAMPLES
 
 
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
 @pytest.mark.parametrize(
-    ("row", "cure"),
+    "row",
     [
-        ("00:00:00.010,0.1", "seconds in place of clock times"),
-        ("2020-01-01,0.1", "in place of dates"),
-        ("0.01,1,234.5", "separators of thousands"),
-        ("0.01,nan", "values are missing"),
-        ("0.01,", "cells are empty"),
-        ("0.01,0.1,5", "decimal points"),
-        (",0.1", "cells are empty"),
-        ("max,0.3", "text stands among the numbers: write the number"),
-        ("0.01s,0.3", "units stand in the head"),
-        ("0.01 s,0.3", "units stand in the head"),
-        ("0.01,-", "ends within a number: load the file anew"),
+        "00:00:00.010,0.1",
+        "2020-01-01,0.1",
+        "0.01,1,234.5",
+        "0.01,nan",
+        "0.01,",
+        "0.01,0,15",
+        ",0.1",
+        "max,0.3",
+        "0.01s,0.3",
+        "0.01 s,0.3",
+        "0.01,-",
+        "0.01,1.5E-02-2.5E-02",
+        "1.1O,2",
     ],
 )
-def test_rows_of_no_numbers_tell_their_cure(tmp_path, row, cure):
-    rows = ["0.00,0.5", row.replace("0.01,0.1,5", "0.01,0,15"), "0.02,0.3", "0.03,0.4"]
-    assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
-
-
-@pytest.mark.parametrize("mark", [",", ";"])
-@pytest.mark.parametrize("cell", ["01. Okt", "10-Jan", "2024-10-01", "nan", "1.1O"])
-def test_a_time_that_is_no_number_is_told_by_those_around_it(tmp_path, mark, cell):
-    rows = [f"{0.01 * k:.2f}{mark}{x:.5f}" for k, x in enumerate(VALUES)]
-    if mark == ";" and cell != "1.1O":
-        rows = [row.replace(".", ",") for row in rows]
-    rows[110] = cell + rows[110][4:]
+def test_rows_of_no_numbers_are_named(tmp_path, row, mark):
+    rows = [x.replace(",", mark) for x in ("0.00,0.5", row, "0.02,0.3", "0.03,0.4")]
     message = refused(saved(tmp_path, rows, f"time [s]{mark}acceleration [g]"))
-    assert f"line 112 is {cell}" in message
-    assert "the time alone is no number: 1.1 fits" in message
-
-
-def test_text_behind_the_numbers_is_to_be_cut_off(tmp_path):
-    rows = ["0.00,0.5", "0.01,0.4", "0.02,0.3", "max,0.5"]
-    message = refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
-    assert "text stands among the numbers: cut it off" in message
-
-
-@pytest.mark.parametrize("mark", [",", ";", "\t"])
-def test_units_in_each_cell_are_no_decimal_commas(tmp_path, mark):
-    rows = [f"{0.01 * k:.2f} s{mark}{x:.5f}" for k, x in enumerate(VALUES)]
-    message = refused(saved(tmp_path, rows, f"time [s]{mark}acceleration [g]"))
-    assert "line 2 is 0.00 s" in message
-    assert "write numbers alone: units stand in the head" in message
+    assert message.startswith("r.csv, line 3 is ")
+    assert ("numbers touch" in message) == ("-02-" in row)
 
 
 def test_times_of_a_clock_that_jitters_are_remarked(tmp_path, rng):
@@ -209,39 +188,40 @@ def test_times_of_a_clock_that_jitters_are_remarked(tmp_path, rng):
         assert bool(record.remarks) == bool(words)
 
 
-@pytest.mark.parametrize("unit", ["", "g"])
-def test_names_in_another_language_are_told_what_to_be(tmp_path, unit):
+def test_units_tell_what_names_in_another_language_do_not(tmp_path):
     rows = [f"{0.01 * k:.2f};{x:.5f}".replace(".", ",") for k, x in enumerate(VALUES)]
     path = saved(tmp_path, rows, "Zeit [s];Beschleunigung [m/s²]")
-    assert "name the columns: time [s], acceleration [m/s²]" in refused(path, "", None, unit)
-    assert read_record(path, unit="m/s^2").samples == pytest.approx(VALUES)
+    for unit in ("", "m/s^2"):
+        assert read_record(path, unit=unit).samples == pytest.approx(VALUES)
+    assert "of unit m/s²" in refused(path, "", None, "g")
 
 
 @pytest.mark.parametrize(
-    ("times", "cure"),
+    ("times", "line"),
     [
-        ((0, 1, 2, 2, 3, 4), "a time stands twice"),
-        ((0, 1, 2, 5, 6, 7), "samples are missing there"),
-        ((0, 1, 2, 3, 0, 1, 2, 3), "of two records in one file keep one"),
-        ((0, 1, 2, 4, 3, 5, 6), "fall between line 5 and line 6: sort the rows"),
-        ((6, 5, 4, 3, 2, 1, 0), "turn the order of the rows round"),
-        ((0, 1, 2, 3, 5, 7, 9), "resample to even steps"),
-        ((0, 0, 0, 0, 0), 'records.step = "0.005 s"'),
-        ((0, 1, 2, 9, 4, 5, 6), "this time alone is wrong: 0.03 s fits"),
+        ((0, 1, 2, 2, 3, 4), 5),
+        ((0, 1, 2, 5, 6, 7), 5),
+        ((0, 1, 2, 3, 0, 1, 2, 3), 6),
+        ((0, 1, 2, 4, 3, 5, 6), 5),
+        ((6, 5, 4, 3, 2, 1, 0), 3),
+        ((0, 1, 2, 3, 5, 7, 9), 3),
+        ((0, 0, 0, 0, 0), 3),
+        ((0, 1, 2, 9, 4, 5, 6), 5),
     ],
 )
-def test_uneven_times_tell_their_cure(tmp_path, times, cure):
+def test_uneven_times_are_named(tmp_path, times, line):
     rows = [f"{0.01 * k:.2f},{0.1 * k * k % 1:.3f}" for k in times]
-    assert cure in refused(saved(tmp_path, rows, "time [s],acceleration [g]"))
+    with refuses(f"r.csv, line {line}"):
+        read_record(saved(tmp_path, rows, "time [s],acceleration [g]"))
 
 
 @pytest.mark.parametrize(
     ("head", "step", "cure"),
     [
         ("time [s],acceleration [g]", 1, "say records.step"),
-        ("time [min],acceleration [g]", 0.01, r"write time [s]"),
-        ("time [ms],acceleration [g]", 0.02, r"write time [s]"),
-        ("time [s],acceleration [g]", 5, r"have the head time [ms]"),
+        ("time [min],acceleration [g]", 0.01, "mend the head of the times"),
+        ("time [ms],acceleration [g]", 0.02, "mend the head of the times"),
+        ("time [s],acceleration [g]", 5, "mend the head of the times"),
     ],
 )
 def test_times_whose_step_no_record_has_tell_their_cure(tmp_path, head, step, cure):
@@ -285,7 +265,7 @@ def test_times_without_a_step_give_way_to_the_stated_one(tmp_path, times):
 def test_decimal_commas_between_commas_are_told_apart_by_the_head(tmp_path, is_whole):
     rows = [f"{0.01 * k:.2f},{k if is_whole else 0.1 * k:g}" for k in range(1, 30)]
     path = saved(tmp_path, [row.replace(".", ",") for row in rows], "time [s],acceleration [g]")
-    assert "these seem to be decimal commas" in refused(path)
+    assert "if these are decimal commas" in refused(path)
 
 
 @pytest.mark.parametrize("start", [1, 1_709_290_000])
@@ -340,8 +320,8 @@ def test_heads_of_forces_tell_their_cure(tmp_path, head, key):
         (lambda rows: rows[3:], "r.csv, line 2"),
         (lambda rows: rows[:1], "r.csv, line 1"),
         (lambda rows: [row.replace(".", ",") for row in rows], "r.csv, line 2"),
-        (lambda rows: [*rows[:5], rows[6], rows[5], *rows[7:]], "r.csv, line 8"),
-        (lambda rows: ["0.0,1"] * 9, "r.csv, line 2"),
+        (lambda rows: [*rows[:5], rows[6], rows[5], *rows[7:]], "r.csv, line 7"),
+        (lambda rows: ["0.0,1"] * 9, "r.csv, line 3"),
     ],
 )
 def test_times_of_forces_tell_their_cure(tmp_path, change, key):

@@ -1,0 +1,129 @@
+"""What files state wherever it stands: taken, or refused with both where the user says another."""
+
+import numpy as np
+import pytest
+
+from alphacut.base.stated import Stated, settled
+from alphacut.frame import read_record
+from alphacut.fuzzy import RefusedError
+from tests.refused import refuses
+
+G = 9.80665
+VALUES = np.array([float(f"{x:.6f}") for x in 12 * np.sin(0.31 * np.arange(60)) + 0.5])
+SERIES = "series"
+"""Rows of five numbers in place of a column."""
+TIMED = "timed"
+"""Times every 0.01 s beside the numbers."""
+
+
+def rows_of(layout):
+    if layout == SERIES:
+        return "".join(
+            "".join(f"{x:14.6E}" for x in VALUES[k : k + 5]) + "\n" for k in range(0, 60, 5)
+        )
+    if layout == TIMED:
+        return "".join(f"{0.01 * k:.2f},{x:.6f}\n" for k, x in enumerate(VALUES))
+    separator = "," if layout == 3 else " "
+    return "".join(separator.join([f"{x:.6f}"] * layout) + "\n" for x in VALUES)
+
+
+def saved(folder, head, layout):
+    path = folder / "record.txt"
+    path.write_text(head + rows_of(layout), encoding="utf-8")
+    return path
+
+
+JMA = "SITE CODE= ABC,37.5,137.2,16,7.6\n LAT.=   37.5000\n SAMPLING RATE= 100Hz\n"
+JMA += " UNIT  = gal(cm/s/s)\n INITIAL TIME = 2026 01 01 16 10 00\n NS,EW,UD\n"
+AFAD = "STATION ALTITUDE (m)   : 100.0\nNUMBER OF DATA         : 60\n"
+AFAD += "SAMPLING INTERVAL (sec): 0.010000\nRAW PGA VALUES (gal)   : 12.5 12.5 12.5\n"
+AFAD += "RECORD DATA : \n N-S E-W U-D\n"
+RSPMATCH = "Time history matched to spectrum: TARGET.TGT, run 3\n  60 0.0100 656\n"
+
+
+@pytest.mark.parametrize(
+    ("head", "layout", "channel", "factor"),
+    [
+        (JMA, 3, "NS", 0.01),
+        (AFAD, 3, "n-s", 0.01),
+        ("# unit: cm/s2\nTime [s],Acceleration\n", TIMED, "", 0.01),
+    ],
+    ids=["JMA", "AFAD", "comment"],
+)
+def test_unit_and_step_above_the_columns_are_taken_and_compared(
+    tmp_path, head, layout, channel, factor
+):
+    path = saved(tmp_path, head, layout)
+    record = read_record(path, channel=channel)
+    assert record.step == pytest.approx(0.01)
+    assert record.samples == pytest.approx(factor * VALUES)
+    assert not record.remarks
+    for said in ({"unit": "g"}, {"step": 0.005}, {"unit": "mg", "step": 0.01}):
+        key = next(iter(said))
+        with pytest.raises(RefusedError, match=f"of {key} ") as caught:
+            read_record(path, channel=channel, **said)
+        assert "(line" in str(caught.value) or "(by its times)" in str(caught.value)
+        assert "as is said" in str(caught.value)
+        other = read_record(path, channel=channel, override=[key], **said)
+        assert any("is overridden by" in remark for remark in other.remarks)
+    assert read_record(path, channel=channel, unit="g", override=["unit"]).samples == (
+        pytest.approx(G * VALUES)
+    )
+
+
+def test_a_row_of_count_and_step_above_as_many_numbers_is_a_head(tmp_path):
+    path = saved(tmp_path, RSPMATCH, SERIES)
+    with pytest.raises(RefusedError, match=r"say records.unit: no line states"):
+        read_record(path)
+    record = read_record(path, unit="g")
+    assert (record.step, len(record.samples)) == (0.01, 60)
+    with pytest.raises(RefusedError, match=r"of step 0\.0100 s \(line 2\)"):
+        read_record(path, unit="g", step=0.02)
+
+
+@pytest.mark.parametrize("unit", ["", "g"])
+@pytest.mark.parametrize(
+    ("head", "layout", "words"),
+    [
+        ("time [s],acceleration [m/s2] x10^-3\n", TIMED, "a unit without a factor"),
+        (
+            "PEER STRONG MOTION DATABASE RECORD\nSomewhere 1/1/2026\nVELOCITY TIME SERIES\n"
+            "NPTS=  60, DT= .0100 SEC\n",
+            SERIES,
+            "this is a velocity",
+        ),
+        ("# motion in units of cm/s\ntime [s],v\n", TIMED, "its column is a velocity by its unit"),
+        ("# values are in mm/s^2\n# acceleration, gal\ntime [s],a\n", TIMED, "of unit mm/s\\^2"),
+    ],
+)
+def test_factors_other_quantities_and_two_units_are_refused(tmp_path, head, layout, words, unit):
+    with pytest.raises(RefusedError, match=words) as caught:
+        read_record(saved(tmp_path, head, layout), unit=unit)
+    assert '= "g"' not in str(caught.value)
+
+
+def test_numbers_that_touch_are_read_by_their_format_or_said_to_touch(tmp_path):
+    # Four digits more of each number: the columns of 14 characters touch where one is negative.
+    numbers = -np.abs(VALUES)
+    text = "".join(
+        "".join(f"{x:14.7E}" for x in numbers[k : k + 5]) + "\n" for k in range(0, 60, 5)
+    )
+    path = tmp_path / "glued.txt"
+    path.write_text(text)
+    with pytest.raises(RefusedError, match="numbers touch"):
+        read_record(path, unit="m/s^2", step=0.01)
+    path.write_text("accelerations (5E14.7)\n" + text)
+    record = read_record(path, unit="m/s^2", step=0.01)
+    assert record.samples == pytest.approx(numbers)
+
+
+def test_statements_are_settled_by_one_rule():
+    gal, g = Stated(0.01, "gal", "line 3"), Stated(G, "g")
+    assert settled("f", "unit", []) is None
+    assert settled("f", "unit", [], g) == g
+    assert settled("f", "unit", [gal, gal]) == gal
+    assert settled("f", "unit", [gal], g, override=["unit"]).value == G
+    for stated, said in (([gal, g], None), ([gal], g)):
+        with refuses("f"):
+            settled("f", "unit", stated, said)
+    assert settled("f", "step", [Stated(0.0049, "")], Stated(0.005, ""), tolerance=0.05)
