@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from itertools import pairwise
 from time import process_time
 
 import numpy as np
@@ -79,17 +80,7 @@ def run(cells: int, seed: int, *, conducts: bool, size: int = 8) -> int:
     """Print a row for each of some random cells; return how many do not hold."""
     rng = np.random.default_rng(seed)
     print(f"seed {seed}; {'conductivity' if conducts else 'stiffness'}, {size} voxels a side")
-    head = (
-        "cell",
-        "porosity",
-        "solids",
-        "thickness",
-        "upper/lower",
-        "gaps by grid",
-        "error",
-        "holds",
-    )
-    print(*head, sep="  ")
+    print("cell  porosity  solids  thickness  upper/lower  gaps by grid  error  holds")
     wrong, factors = 0, []
     for number in range(cells):
         dimension = 3 if rng.random() < 0.7 else 2
@@ -113,7 +104,7 @@ def run(cells: int, seed: int, *, conducts: bool, size: int = 8) -> int:
         diagonal = np.diag(of_grids[-1].lower)
         percolates = diagonal > 1e-6 * np.trace(of_grids[-1].upper)
         gaps = [gap(x, percolates) for x in of_grids]
-        factors += [a / b for a, b in zip(gaps, gaps[1:], strict=False) if b > 0]
+        factors += [a / b for a, b in pairwise(gaps) if b > 0]
         ratio = 1 / (1 - gaps[0])
         walls = Percolation.of_mask(solid).thickness
         shown = " ".join(f"{x:.3f}" for x in gaps)

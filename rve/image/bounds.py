@@ -232,10 +232,10 @@ class StiffnessBounds(LoewnerBounds):
                 Hill's.
 
         Returns:
-            Lower and upper bound. Without a positive lower bound of the stiffness (no solid percolates) the
-            lower one is 0 in space and −∞ in the plane; without an upper bound (rigid phases) the
-            upper one is infinite, and in the plane, where G may then exceed any multiple of K, the
-            lower one is −∞ as well.
+            Lower and upper bound. Where the lower bound of the stiffness is not positive (no solid
+            percolates) the lower one is 0 in space and −∞ in the plane; without an upper bound
+            (rigid phases) the upper one is infinite, and in the plane, where G may then exceed any
+            multiple of K, the lower one is −∞ as well.
         """
         min_bulk, max_bulk = self.bulk
         min_shear, max_shear = self.shear(average)

@@ -26,6 +26,7 @@ from alphacut.rve.image.study import (
     AlphaLevel,
     FuzzyImage,
     GreyImage,
+    ImageStudy,
     as_fuzzy,
     cut_or_nominal,
     image_study,

@@ -67,9 +67,9 @@ def energy_fractions(
 
     Args:
         model: Model by which `solution` was made and by which the changed images are solved.
-        solution: Solution of an image whose upper and lower moduli are the same. Its solid percolates
-            in all directions and no phase is rigid, so that both bounds of its constants are finite
-            and positive; this is not checked. Its stresses are the first guess.
+        solution: Solution of an image whose upper and lower moduli are the same. Its solid
+            percolates in all directions and no phase is rigid, so that both bounds of its constants
+            are finite and positive; this is not checked. Its stresses are the first guess.
         images: Moduli of that image.
         phase: Number from 0 of the phase of each pixel or voxel, shape (y, x) or (z, y, x).
         n_phases: Number of phases.

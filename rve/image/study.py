@@ -715,7 +715,8 @@ def solve_study(
     Raises:
         RefusedError: The levels do not rise within [0, 1], a value is not allowed, all phases are
             pores or rigid at a level, only some have loss factors, all have them where the
-            solid does not percolate in all directions or a phase is rigid, or the image does not fit into memory.
+            solid does not percolate in all directions or a phase is rigid, or the image does not
+            fit into memory.
         FailedError: The bounds do not tell that E is positive, or contradict each other; or the
             solver does not converge.
     """
