@@ -2,7 +2,7 @@
 
     ./enter python -m tests.seeds 200                            # all, with 200 seeds each
     ./enter python -m tests.seeds 200 tests/frame/spectra        # those of one folder
-    ./enter python -m tests.seeds 200 --seconds 60 --not-slow    # a test stops after a minute
+    ./enter python -m tests.seeds 200 --seconds 60 --not-slow    # no more than a minute each
 
 Each file of tests has one process, in which its tests run again with one seed after the other. A
 line for each test says how many seeds it got, and which ones failed; SEED=… repeats one of these.
@@ -19,7 +19,6 @@ import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
-from time import perf_counter
 
 import pytest
 
@@ -31,13 +30,13 @@ class Repetition:
 
     Args:
         seeds: Seeds of each test.
-        seconds: Time in s after which a test gets no further seed.
+        seconds: Processor time in s after which a test gets no further seed.
     """
 
     def __init__(self, seeds: range, seconds: float) -> None:
         self.seeds = seeds
         self.seconds = seconds
-        self.spent: dict[str, float] = defaultdict(float)  # s by the name of a test
+        self.spent: dict[str, float] = defaultdict(float)  # processor s by the name of a test
         self.passed: dict[str, int] = defaultdict(int)
         self.failed: dict[str, list[int]] = defaultdict(list)  # seeds
 
@@ -56,9 +55,9 @@ class Repetition:
         name = _name(item)
         if self.spent[name] > self.seconds:
             item.add_marker(pytest.mark.skip("no time for further seeds"))
-        begin = perf_counter()
+        begin = _processor_time()
         result = yield
-        self.spent[name] += perf_counter() - begin
+        self.spent[name] += _processor_time() - begin
         return result
 
     @pytest.hookimpl(wrapper=True)
@@ -86,6 +85,12 @@ def _name(item: pytest.Item) -> str:
     return re.sub(r"\[SEED=\d+\]|-SEED=\d+|(?<=\[)SEED=\d+-", "", item.nodeid)
 
 
+def _processor_time() -> float:
+    """Return the processor time in s of this process and of those that it has waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Register the repetition that the environment describes."""
     first, count, seconds = os.environ["ALPHACUT_SEEDS"].split()
@@ -100,7 +105,9 @@ def main() -> int:
     )
     parser.add_argument("count", type=int, help="number of seeds for each test")
     parser.add_argument("places", nargs="*", type=Path, default=[ROOT / "tests"])
-    parser.add_argument("--seconds", type=float, default=1e9, help="longest time for a test")
+    parser.add_argument(
+        "--seconds", type=float, default=1e9, help="longest processor time for a test"
+    )
     parser.add_argument("--first", type=int, help="first seed (else a random one)")
     parser.add_argument("--not-slow", action="store_true", help="without tests that are slow")
     options = parser.parse_args()

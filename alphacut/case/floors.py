@@ -16,6 +16,7 @@ from alphacut.frame.spectra.response_spectrum import MIN_PERIOD
 from alphacut.frame.structures.linear import frequencies
 
 Period = Annotated[float, Quantity("s", minimum=0)]
+DampingRatio = Annotated[float, Quantity(minimum=0, maximum=0.999)]
 RANGE = ("shortest", "longest", "count")
 
 
@@ -30,8 +31,8 @@ class FloorSpectrumSection(AnalysisSection):
 
     outputs: Names
     """absolute accelerations of the floors, as a4 of [frame]"""
-    damping: Annotated[float, Quantity(minimum=0, maximum=0.999)] = 0.05
-    """damping ratio of the oscillators"""
+    damping: OneOrMany[DampingRatio] = (0.05,)
+    """damping ratio of the oscillators; of several, as ["2 %", "5 %"], the figure shows all"""
     shortest: Time = 0.05
     """shortest period; short ones take long"""
     longest: Time = 2.0
@@ -52,9 +53,10 @@ class FloorSpectrumSection(AnalysisSection):
             allowed = f"0 s, and periods from {MIN_PERIOD:g} s on"
             is_long = smallest >= MIN_PERIOD
             require(is_long, f"floor_spectrum.{name}", f"{smallest:g} s", allowed)
-        is_once = len(set(self.periods)) == len(self.periods)
-        text = ", ".join(f"{x:g} s" for x in self.periods)
-        require(is_once, "floor_spectrum.periods", text, "each period once")
+        for name, unit in (("periods", " s"), ("damping", "")):
+            values = getattr(self, name)
+            text = ", ".join(f"{x:g}{unit}" for x in values)
+            require(len(set(values)) == len(values), f"floor_spectrum.{name}", text, "each once")
         allowed = f"more than floor_spectrum.shortest, {self.shortest:g} s"
         is_range = self.shortest < self.longest
         require(is_range, "floor_spectrum.longest", f"{self.longest:g} s", allowed)

@@ -32,7 +32,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.analyses.decision import LimitDecision, degree_text
 from alphacut.frame.analyses.fragility import LimitFragility
-from alphacut.fuzzy.result import Ends
+from alphacut.fuzzy.result import Ends, Nature
 
 LIMIT: Look = {"color": ORANGE, "lw": 1.3, "ls": "--"}
 """Line of a limit."""
@@ -336,28 +336,37 @@ def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
     """Draw the floor spectra over the period: bounds, attained values and the nominal curve.
 
     Each floor has a panel. Bounds on each level are lines, down to which the nominal curve is
-    filled; guaranteed ones are solid. Attained values on the lowest level are dots.
+    filled. Attained values on the lowest level are dots. Each damping ratio has a style of lines.
 
     Args:
         answer: Floor spectra, of one level at least.
     """
-    size = WIDTH, 0.6 + 2.6 * len(answer.outputs)
-    figure, panels = plt.subplots(len(answer.outputs), sharex=True, squeeze=False, figsize=size)
+    outputs = list(dict.fromkeys(answer.outputs))
+    size = WIDTH, 0.6 + 2.6 * len(outputs)
+    figure, panels = plt.subplots(len(outputs), sharex=True, squeeze=False, figsize=size)
     order = np.argsort(answer.periods)
     periods = answer.periods[order]
     colours = colormaps["viridis_r"](np.linspace(0.25, 0.85, len(answer.alpha)))
-    for k, axes in enumerate(panels[:, 0]):
+    ratios = list(dict.fromkeys(answer.damping))
+    natures: dict[str, dict[Nature, None]] = {name: {} for name in outputs}  # ordered sets
+    for k, (name, ratio) in enumerate(zip(answer.outputs, answer.damping, strict=True)):
+        axes = panels[outputs.index(name), 0]
+        natures[name].update(dict.fromkeys(answer.natures[k]))
+        dashes = ("-", "--", "-.", ":")[ratios.index(ratio) % 4]
+        damping = "" if len(ratios) == 1 else f", ζ = {ratio:.3g}"
         nominal = answer.nominal[k, order] / STANDARD_GRAVITY
         bounds = answer.bound[:, k, order] / STANDARD_GRAVITY
         for alpha, bound, colour in zip(answer.alpha, bounds, colours, strict=True):
             axes.fill_between(periods, nominal, bound, color=colour, alpha=0.15, lw=0)
-            axes.plot(periods, bound, color=colour, lw=1.2, label=f"bound, α = {alpha:g}")
+            label = f"bound, α = {alpha:g}{damping}"
+            axes.plot(periods, bound, color=colour, ls=dashes, lw=1.2, label=label)
         attained = answer.attained[0, k, order] / STANDARD_GRAVITY
-        label = f"attained, α = {answer.alpha[0]:g}"
+        label = None if ratio != ratios[0] else f"attained, α = {answer.alpha[0]:g}"
         axes.plot(periods, attained, color=ORANGE, ls="none", marker="o", ms=3, label=label)
-        axes.plot(periods, nominal, color=INK, lw=1.2, label="nominal")
-        natures = " and ".join(dict.fromkeys(map(str, answer.natures[k])))
-        title = f"{answer.outputs[k]}, ζ = {answer.damping:.3g}; {natures} bounds"
+        axes.plot(periods, nominal, color=INK, ls=dashes, lw=1.2, label=f"nominal{damping}")
+    for name, axes in zip(outputs, panels[:, 0], strict=True):
+        damping = ", ".join(f"{ratio:.3g}" for ratio in ratios)
+        title = f"{name}, ζ = {damping}; {' and '.join(map(str, natures[name]))} bounds"
         if answer.suite:
             title += f" of the mean over {len(answer.suite)} records"
         axes.set(title=title, ylim=(0.0, None), xlim=(0.0, None))

@@ -41,6 +41,8 @@ from alphacut.stages.modulus import ModulusResult, infinite_if_unknown
 from alphacut.stages.summary import FrameResult, Parts
 
 Row = tuple[str, ...]
+FLOOR_ROWS = 12
+"""Most rows of floor spectra that the terminal shows; of more it has the largest ones."""
 MEANING = "Least … largest value if each input stays in its range; α = 1: most plausible"
 """First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
 
@@ -604,7 +606,7 @@ def answers(parts: Parts) -> list[Row]:
     Returns:
         Rows of what is answered, the answer, and its guarantee, in the order of the report. The
         admissible ranges of the inputs, of which a case may have many, share one row. Of floor
-        spectra there is the largest value of each floor.
+        spectra with many periods there is the largest value of each curve.
     """
     rows: list[Row] = []
     for answer in parts.answers:
@@ -617,7 +619,7 @@ def answers(parts: Parts) -> list[Row]:
             inputs = "input" if count == 1 else "inputs"
             answer_rows = [(scale[0], f"{scale[1]}; {scale[3]}", scale[2])]
             answer_rows.append(("ranges", f"of {count} {inputs}", place))
-        if isinstance(answer, FloorSpectrum):
+        if isinstance(answer, FloorSpectrum) and len(answer_rows) > FLOOR_ROWS:
             answer_rows = [answer_rows[k] for k in answer.largest_rows]
         for row in answer_rows:
             rows.append((f"{answer.key}: {row[0]}", row[1], row[2]))

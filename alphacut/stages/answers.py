@@ -175,7 +175,7 @@ def floor_spectra(
     """Return the answer to [floor_spectrum]: bounds of the spectra of floors.
 
     Args:
-        section: Its accelerations, periods and damping ratio.
+        section: Its accelerations, periods and damping ratios.
         response: The structure, and the inputs, α-levels, duration and time step of its response.
             Its peaks are not used. With records the duration is that of the longest response.
         tick: Called with the completed fraction of the work.

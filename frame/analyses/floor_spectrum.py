@@ -36,24 +36,25 @@ class FloorSpectrum(Answer):
     """Floor spectra of a structure over the tolerances of its inputs.
 
     Args:
-        damping: Damping ratio of the oscillators.
-        outputs: Names of the accelerations of the floors.
+        outputs: Name of the acceleration of the floor of each curve. An output has a curve for each
+            damping ratio, one behind the other.
+        damping: Damping ratio of the oscillators of each curve.
         alpha: Levels, rising, shape (levels,).
         periods: Periods of the oscillators in s, as they were given, shape (P,).
-        nominal: Floor spectra at the nominal inputs, in m/s², shape (outputs, P).
-        bound: Upper bounds of the spectra in each cut, in m/s², shape (levels, outputs, P);
+        nominal: Floor spectra at the nominal inputs, in m/s², shape (curves, P).
+        bound: Upper bounds of the spectra in each cut, in m/s², shape (levels, curves, P);
             infinite where none is known.
         attained: Largest value in each cut that some inputs are known to have, the same shape;
             -∞ where none is known.
-        natures: Guarantee of the bounds of each output and period, nested sequences.
+        natures: Guarantee of the bounds of each curve and period, nested sequences.
         suite: Names of the records over which all values are means; empty for one motion.
         unproved: Why some bounds are not guaranteed; empty if all are.
     """
 
     key = "floor_spectrum"
     title = "Which accelerations do oscillators on the floors have?"
-    damping: float
     outputs: tuple[str, ...]
+    damping: tuple[float, ...]
     alpha: Array
     periods: Array
     nominal: Array
@@ -64,19 +65,21 @@ class FloorSpectrum(Answer):
     suite: tuple[str, ...] = ()
 
     def table(self) -> Table:
-        """Return a table of texts with a row for each output and period, at the lowest level.
+        """Return a table of texts with a row for each curve and period, at the lowest level.
 
-        The columns are output with period, the bound, its guarantee, the attained value, and the
-        value at the nominal inputs.
+        The columns are output with period, and with the damping ratio if there are several, the
+        bound, its guarantee, the attained value, and the value at the nominal inputs.
         """
         rows = []
+        is_one = len(set(self.damping)) == 1
         for k, name in enumerate(self.outputs):
             for p, period in enumerate(map(float, self.periods)):
                 nature = self.natures[k][p]
                 _, bound = rounded_ends(0.0, float(self.bound[0, k, p]), nature)
                 attained = float(self.attained[0, k, p])
+                damping = "" if is_one else f", ζ = {self.damping[k]:.3g}"
                 row = {
-                    "spectrum of": f"{name}, T = {period:.4g} s",
+                    "spectrum of": f"{name}, T = {period:.4g} s{damping}",
                     f"Sa at α = {self.alpha[0]:g}": "not bounded",
                     "nature": self.nature_text(nature),
                     "reached": "not known",
@@ -91,18 +94,19 @@ class FloorSpectrum(Answer):
 
     @property
     def largest_rows(self) -> list[int]:
-        """Numbers of the rows of `table` with the largest bound of each output, from 0 on."""
+        """Numbers of the rows of `table` with the largest bound of each curve, from 0 on."""
         count = len(self.periods)
         return [k * count + int(self.bound[0, k].argmax()) for k in range(len(self.outputs))]
 
     def records(self) -> list[Record]:
-        """Return a row for each output, level and period, in s and m/s²; None where unknown."""
+        """Return a row for each curve, level and period, in s and m/s²; None where unknown."""
         rows: list[Record] = []
         for k, name in enumerate(self.outputs):
             for j, level in enumerate(map(float, self.alpha)):
                 for p, period in enumerate(map(float, self.periods)):
                     row: Record = {
                         "output": name,
+                        "damping ratio": self.damping[k],
                         "alpha": level,
                         "period [s]": period,
                         "nominal [m/s^2]": float(self.nominal[k, p]),
@@ -119,8 +123,9 @@ class FloorSpectrum(Answer):
         what = "Largest"
         if self.suite:
             what = f"Mean over {len(self.suite)} records of the largest"
+        damping = " or ".join(f"{ratio:.3g}" for ratio in dict.fromkeys(self.damping))
         return (
-            f"{what} |ω² w| of an oscillator with the damping ratio {self.damping:.3g} and the"
+            f"{what} |ω² w| of an oscillator with the damping ratio {damping} and the"
             " relative displacement w that stands on the floor and is too light to move it, within"
             " the duration. Some structure of the cut has the attained value, and none has more"
             f" than a guaranteed bound.{unproved}"
@@ -132,7 +137,7 @@ def floor_spectrum(
     inputs: Mapping[str, FuzzyNumber | float],
     outputs: str | Sequence[str],
     periods: ArrayLike,
-    damping: float = 0.05,
+    damping: float | Sequence[float] = 0.05,
     *,
     duration: float,
     step: float,
@@ -155,7 +160,7 @@ def floor_spectrum(
         outputs: Names of absolute accelerations, one or more: "a3" of a storey frame.
         periods: Periods in s, 0 or from 0.001 s on. At 0 the spectrum is the floor's largest
             acceleration.
-        damping: Damping ratio of the oscillators, from 0 to 0.999.
+        damping: Damping ratio of the oscillators, from 0 to 0.999, or several, each once.
         duration: Length of the simulation, in s. An oscillator may swing higher after the record.
         step: Largest distance of the time nodes, in s. It is divided for short periods.
         alpha: Levels, rising within [0, 1].
@@ -184,37 +189,71 @@ def floor_spectrum(
     require(len(names) > 0, "outputs", None, "one acceleration or more")
     shaped = checked_periods(periods).ravel()
     require(len(shaped) > 0, "periods", None, "one period or more")
-    ratio = checked_number("damping", damping, least=0, most=0.999)
+    ratios = [
+        checked_number("damping", x, least=0, most=0.999) for x in np.atleast_1d(damping).tolist()
+    ]
+    is_once = len(set(ratios)) == len(ratios) > 0
+    require(is_once, "damping", damping, "one damping ratio or more, each once")
     time_nodes(duration, step)  # refuses what is not whole steps, before these are divided
     cuts = boxes(inputs, alpha)
     motions = [(x,) if isinstance(x, Accelerogram) else tuple(x) for x in records]
     systems = [
         observed_accelerations(moved, names, inputs) for moved in moved_by(structure, motions)
     ]
-    floor = FloorOscillators.of(systems[0], cuts, ratio, duration=duration, step=step, error=error)
-    floors = [replace(floor, system=system) for system in systems]
-    columns: list[FloorValues] = []
+    floor = FloorOscillators.of(
+        systems[0], cuts, ratios[0], duration=duration, step=step, error=error
+    )
+    by_ratio: list[list[FloorValues]] = []  # with an entry for each period
     with progress_reporter(progress) as report:
-        for p, period in enumerate(map(float, shaped)):
-            tick = nth_subprogress(report, p, len(shaped))
-            of_records = [
-                moved.values(period, nth_subprogress(tick, r, len(floors)))
-                for r, moved in enumerate(floors)
-            ]
-            columns.append(mean_values(of_records, cuts))
-    natures = [[column.natures[k] for column in columns] for k in range(len(names))]
+        for r, ratio in enumerate(ratios):
+            floors = [replace(floor, system=system, damping=ratio) for system in systems]
+            tick = nth_subprogress(report, r, len(ratios))
+            by_ratio.append(_values_of_periods(floors, shaped, tick))
+
+    def of_curves(field: str) -> Array:
+        """Return values of all curves from the field of `FloorValues`, shape (…, curves, P)."""
+        columns = [[getattr(values, field) for values in found] for found in by_ratio]
+        values = np.moveaxis(np.array(columns), (0, 1), (-2, -1))  # (…, outputs, ratios, P)
+        return values.reshape(*values.shape[:-3], -1, len(shaped))
+
+    natures = tuple(
+        tuple(values.natures[k] for values in found)
+        for k in range(len(names))
+        for found in by_ratio
+    )
     is_proved = all(nature is Nature.GUARANTEED for row in natures for nature in row)
     reason = floor.unproved or "branch and bound and the dual bound find none there"
     return FloorSpectrum(
-        encloses=columns[0].encloses,
-        damping=ratio,
-        outputs=floor.system.outputs,
+        encloses=by_ratio[0][0].encloses,
+        outputs=tuple(name for name in floor.system.outputs for _ in ratios),
+        damping=tuple(ratios) * len(names),
         alpha=cuts.alpha,
         periods=shaped,
-        nominal=np.stack([column.nominal for column in columns], axis=-1),
-        bound=np.stack([column.bound for column in columns], axis=-1),
-        attained=np.stack([column.attained for column in columns], axis=-1),
-        natures=tuple(map(tuple, natures)),
+        nominal=of_curves("nominal"),
+        bound=of_curves("bound"),
+        attained=of_curves("attained"),
+        natures=natures,
         unproved="" if is_proved else reason,
         suite=tuple(record_names(motions)) if motions else (),
     )
+
+
+def _values_of_periods(
+    floors: Sequence[FloorOscillators], periods: Array, progress: Progress
+) -> list[FloorValues]:
+    """Return the values at each period in s, which are means over motions of the structure.
+
+    Args:
+        floors: The oscillators on the structure under each motion.
+        periods: The periods, shape (P,).
+        progress: Called with the completed fraction.
+    """
+    found = []
+    for p, period in enumerate(map(float, periods)):
+        tick = nth_subprogress(progress, p, len(periods))
+        of_motions = [
+            floor.values(period, nth_subprogress(tick, r, len(floors)))
+            for r, floor in enumerate(floors)
+        ]
+        found.append(mean_values(of_motions, floors[0].cuts))
+    return found

@@ -73,6 +73,32 @@ def test_a_case_has_the_answer_of_the_function_with_its_figure_and_table(tmp_pat
     assert (rows["attained [m/s^2]"] <= rows["bound [m/s^2]"]).all()
 
 
+def test_several_dampings_share_a_figure_and_the_terminal_has_their_table(tmp_path, capsys):
+    text = CASE.replace("[0, 1]", "[0]") + 'damping = ["2 %", "5 %"]\n'
+    case, out = written(tmp_path, text), tmp_path / "out"
+    assert main(["run", str(case), "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    found = from_document(FloorSpectrum, summary_of(out)["floor_spectrum"])
+    assert (found.outputs, found.damping) == (("a1", "a1"), (0.02, 0.05))
+    structure = load(case).content.structure
+    for k, ratio in enumerate(found.damping):
+        alone = floor_spectrum(
+            structure.model, structure.inputs(["k1"]), "a1", [0.0, 0.3], ratio,
+            duration=1.5, step=0.02, alpha=[0], progress=False,
+        )  # fmt: skip
+        for name in ("bound", "attained", "nominal"):
+            values = getattr(found, name)[..., k, :]
+            assert values == pytest.approx(getattr(alone, name)[..., 0, :], rel=1e-9)
+        assert found.natures[k] == alone.natures[0]
+        for period in ("0 s", "0.3 s"):
+            assert f"floor_spectrum: a1, T = {period}, ζ = {ratio}: ≤" in shown
+    with figure_style():
+        (axes,) = draw_floor_spectrum(found).axes
+    lines = {line.get_label(): line.get_ydata() * 9.80665 for line in axes.lines}
+    for k, ratio in enumerate(found.damping):
+        assert lines[f"bound, α = 0, ζ = {ratio}"] == pytest.approx(found.bound[0, k])
+
+
 def test_a_suite_of_records_has_mean_spectra(tmp_path):
     text = CASE.replace(RECORD, '[records]\nfiles = ["record.csv", "other.csv"]\n')
     case, out = written(tmp_path, text), tmp_path / "out"
@@ -111,10 +137,15 @@ def test_periods_are_given_by_their_range(tmp_path):
         ('"a1"', '"q1"', "floor_spectrum: output is q1; allowed: absolute accelerations, as a3"),
         ('"a1"', '"a2"', "floor_spectrum: output is a2; allowed:"),
         ('"0.3 s"]', '"0.3 s"]\ncount = 3', "floor_spectrum.periods is beside count; allowed"),
-        ('"0.3 s"]', '"0 s"]', "floor_spectrum.periods is 0 s, 0 s; allowed: each period once"),
+        ('"0.3 s"]', '"0 s"]', "floor_spectrum.periods is 0 s, 0 s; allowed: each once"),
         ('"0.3 s"]', '"0.1 ms"]', "floor_spectrum.periods is 0.0001 s; allowed: 0 s, and"),
         ('periods = ["0 s", "0.3 s"]', 'longest = "10 ms"', "floor_spectrum.longest is 0.01 s"),
-        ('periods = ["0 s", "0.3 s"]', 'damping = "120 %"', "floor_spectrum.damping is 120 %"),
+        ('periods = ["0 s", "0.3 s"]', 'damping = "120 %"', "floor_spectrum.damping[1] is 120 %"),
+        (
+            'periods = ["0',
+            'damping = [0.05, 0.05]\nperiods = ["0',
+            "floor_spectrum.damping is 0.05,",
+        ),
         ('"5 %"', '"5 %"\ndisplacements = "1 mm"', "floor_spectrum: structure is displaced"),
         ('"5 %"', '"5 %"\nyield_force = "30 kN"', "floor_spectrum: structure is StoreyFrame"),
         (RECORD, '[records]\nfiles = "record.csv"\n', "floor_spectrum: output is q1; allowed:"),
