@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, radians
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field, ValidationInfo
@@ -25,9 +26,7 @@ from alphacut.case.types import (
     require_alone,
     text,
 )
-from alphacut.frame import (
-    History,
-)
+from alphacut.frame import History, StoreyFrame
 from alphacut.frame.records.recording import Baseline, Recording
 from alphacut.frame.records.suite import MAX_RECORDS, read_recordings, require_distinct
 from alphacut.frame.records.text_file import ACCELERATION_UNITS, require_stated_step
@@ -38,19 +37,23 @@ from alphacut.io import quantity
 
 
 class ForceHistory(NamedTuple):
-    """Time history of a force (None: impulse), and SI unit of its amplitudes, empty of factors."""
+    """Time history of a force (None: impulse), and SI unit of its amplitudes, empty of factors.
+
+    The `frequency` in Hz stands there if it is fuzzy; the history has its nominal value.
+    """
 
     history: History | None
     unit: str = "N"
+    frequency: FuzzyNumber | None = None
 
 
 def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
     """Return the time history that a text such as "harmonic, 1.5 Hz, 90 deg, from 2 s" states.
 
     The words are separated by commas. The first is "step", "harmonic", "impulse" or the name of a
-    file. A harmonic force has a frequency and may have a phase. All but the impulse may have "from
-    TIME", the start; a step or a file may have "static" instead, by which the structure starts at
-    rest under the force.
+    file. A harmonic force has a frequency, which may be fuzzy, and may have a phase. All but the
+    impulse may have "from TIME", the start; a step or a file may have "static" instead, by which
+    the structure starts at rest under the force.
 
     Args:
         value: The text.
@@ -67,7 +70,8 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         '"step", "harmonic, 1.5 Hz, 90 deg", "impulse" or a file as "wind.csv", then "from 2 s" or'
         ' "static"'
     )
-    kind, *words = [word.strip() for word in str(value).split(",")]
+    # The commas within the brackets of a fuzzy frequency separate no words.
+    kind, *words = [word.strip() for word in re.split(r",(?![^\[]*\])", str(value))]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
     numbers = [word for word in words if word != "static" and not word.startswith("from ")]
     is_static = "static" in words
@@ -86,11 +90,15 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
         if starts:
             start = quantity.parse_number(starts[0], "s")
         if kind == "harmonic":
-            frequency = quantity.parse_number(numbers[0], "Hz")
+            frequency = quantity.parse_fuzzy(numbers[0], "Hz")
+            if frequency.support.lower <= 0:
+                raise ValueError("frequencies are above 0 Hz")
             phase = 0.0
             if len(numbers) == 2:
                 phase = quantity.parse_number(numbers[1], "rad")
-            return ForceHistory(History.harmonic(frequency, phase, start))
+            history = History.harmonic(frequency.nominal, phase, start)
+            is_fuzzy = frequency.support.width > 0
+            return ForceHistory(history, frequency=frequency if is_fuzzy else None)
         if kind == "step":
             return ForceHistory(History.constant(start, is_static=is_static))
     except ValueError as error:
@@ -133,7 +141,9 @@ class ForceSection(Section):
     """
 
     history: Annotated[ForceHistory, text(_parse_history)]
-    """step, harmonic with frequency and phase, impulse, or a file; then its start"""
+    """step, harmonic with frequency and phase, impulse, or a file; then its start; the frequency
+    of the only force on a frame may be fuzzy, as harmonic, [8, 12] Hz: it is the input `frequency`
+    of each study, times count in periods, and peaks alone are given"""
     amplitude: dict[str, Amplitude]
     """amplitude by floor or unknown, as {3 = "8 kN"}; factor of a file with a unit"""
 
@@ -171,7 +181,8 @@ def with_forces(
             forces.
 
     Raises:
-        RefusedError: The structure takes no forces, or a force acts on no degree of freedom.
+        RefusedError: The structure takes no forces, a force acts on no degree of freedom, or
+            several forces or another structure than a frame have a fuzzy frequency.
     """
     if not sections:
         return structure
@@ -191,7 +202,20 @@ def with_forces(
     model, names = structure.model.with_forces(forces)
     numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
     force_units = dict(zip(names, units, strict=True))
-    return replace(structure, model=model, numbers=numbers, force_units=force_units)
+    structure = replace(structure, model=model, numbers=numbers, force_units=force_units)
+    ranges = [section.history.frequency for section in sections if section.history.frequency]
+    if not ranges:
+        return structure
+    is_possible = isinstance(model, StoreyFrame) and len(sections) == 1
+    allowed = "the frequency of the only force on a frame, or one number"
+    require(is_possible, "force.history", "of a fuzzy frequency", allowed)
+    (frequency,) = ranges
+    try:
+        model = replace(cast("StoreyFrame", model), frequency=frequency.nominal)
+    except RefusedError as error:
+        raise RefusedError("force.history", "of a fuzzy frequency", error.allowed) from None
+    numbers = {**numbers, "frequency": frequency}
+    return replace(structure, model=model, numbers=numbers, always_fuzzy=("frequency",))
 
 
 SCALED_MEASURES = ("PGA", "Sa(T1)", "RotD50(T1)", "RotD100(T1)")

@@ -122,6 +122,7 @@ class Structure:
         heights: Heights of storeys in m by the names of their drifts and residual drifts.
         force_units: SI units of the amplitudes of forces by parameter, empty of factors.
         learned: Set of parameters that measured modes left; None if none were learned.
+        always_fuzzy: Parameters that are fuzzy whether the case lists them or not.
     """
 
     model: StructureModel
@@ -129,6 +130,7 @@ class Structure:
     heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
     force_units: Mapping[str, str] = field(default_factory=dict)
     learned: Identified | None = None
+    always_fuzzy: tuple[str, ...] = ()
 
     @property
     def floor_masses(self) -> tuple[FuzzyNumber, ...]:
@@ -177,16 +179,22 @@ class Structure:
         require(bool(fuzzy), key, name, "inputs that are fuzzy", cure=f"{name} is one number")
         return fuzzy
 
+    def with_always_fuzzy(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return names of fuzzy inputs of a case, and those that always are fuzzy, each once."""
+        return tuple(dict.fromkeys((*names, *self.always_fuzzy)))
+
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
         """Return the fuzzy parameters that names stand for, in SI units.
 
         Args:
             names: Names of the case; "m" stands for m1 … mn of a frame.
-            key: Key that has them, for messages.
+            key: Key that has them, for messages. Keys "….fuzzy" have those, too, that always are.
 
         Raises:
             RefusedError: A name is no parameter, or none of those that it stands for is fuzzy.
         """
+        if key.endswith(".fuzzy"):
+            names = self.with_always_fuzzy(names)
         members = [member for name in names for member in self.fuzzy_members(name, key)]
         return {member: self.numbers[member] for member in members}
 

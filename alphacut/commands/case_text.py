@@ -182,6 +182,9 @@ def _words_and_kind(entry: object) -> Iterator[tuple[str, str]]:
         # Types are told apart by their own classes, since keys may take several of them.
         case (FuzzyNumber() as force, str(si)):
             yield _numbers(force, si), _kind_of(force) + _mark_of_size(force, si)
+        case ForceHistory(frequency=FuzzyNumber() as frequency):
+            kind = _kind_of(frequency) + _mark_of_size(frequency, "Hz")
+            yield _numbers(frequency, "Hz"), f"harmonic, {kind}"
         case ForceHistory(History(frequency=omega)) if omega:  # in rad/s; 0 of other histories
             hertz = engineering(omega / (2 * pi), "")
             yield f"{hertz} Hz, period {engineering(2 * pi / omega, '')} s", "harmonic"

@@ -58,8 +58,11 @@ def drawings(results: Results) -> Iterator[tuple[str, Figure]]:
 
 
 def drawn_outputs(results: Results, task: EnvelopeTask) -> list[str]:
-    """Return the outputs of a study that the case wants drawn; all if it names none."""
-    outputs = results.envelopes[task.name].arrays["output"].values
+    """Return the outputs of a study that the case wants drawn over time; all if it names none."""
+    study = results.envelopes[task.name]
+    if not study.numbers.is_over_time:
+        return []
+    outputs = study.arrays["output"].values
     return list(task.figures) or [str(name) for name in outputs]
 
 

@@ -361,7 +361,8 @@ def draw_floor_spectrum(answer: FloorSpectrum) -> Figure:
             label = f"bound, α = {alpha:g}{damping}"
             axes.plot(periods, bound, color=colour, ls=dashes, lw=1.2, label=label)
         attained = answer.attained[0, k, order] / STANDARD_GRAVITY
-        label = None if ratio != ratios[0] else f"attained, α = {answer.alpha[0]:g}"
+        # one entry of the legend, since the dots of all damping ratios look alike
+        label = f"attained, α = {answer.alpha[0]:g}" if ratio == ratios[0] else ""
         axes.plot(periods, attained, color=ORANGE, ls="none", marker="o", ms=3, label=label)
         axes.plot(periods, nominal, color=INK, ls=dashes, lw=1.2, label=f"nominal{damping}")
     for name, axes in zip(outputs, panels[:, 0], strict=True):

@@ -63,7 +63,8 @@ def render_page(folder: ResultsFolder) -> str:
     envelopes: list[Document] = []
     for name, study in summary.envelopes.items():
         dataset = folder.dataset(f"envelope_{name}.nc")
-        envelopes.append(plot(name, study, dataset, summary.shown_units))
+        if study.is_over_time:
+            envelopes.append(plot(name, study, dataset, summary.shown_units))
     return render_template(
         "report.html",
         title=summary.title,

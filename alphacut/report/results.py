@@ -521,6 +521,8 @@ def natures(parts: Parts) -> Iterator[str]:
         yield mesh_words(parts.modulus.nature)
     peaks_of_studies = [study.peak for study in parts.envelopes.values()]
     over = "over time"
+    if not all(study.is_over_time for study in parts.envelopes.values()):
+        over = "over as many periods of the force as its nominal frequency has in the duration"
     if suite is not None:
         peaks_of_studies.append(suite.peak)
         over = "over time and records"

@@ -252,7 +252,7 @@ def write_tables(parts: Parts, results: ResultsFolder, folder: Path) -> list[Pat
     # The summary has the extremes of envelopes alone; their courses over time are in datasets.
     for name, study in parts.envelopes.items():
         data = results.dataset(f"envelope_{name}.nc")
-        for output in study.min:
+        for output in study.min if study.is_over_time else ():
             found[f"envelope_{name}-{output}"] = over_time(data, output, study.units[output])
     return write_csv(found, folder)
 

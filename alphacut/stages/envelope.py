@@ -71,6 +71,11 @@ class EnvelopeResult:
     units: dict[str, str]
     drawn: tuple[str, ...] = ()
 
+    @property
+    def is_over_time(self) -> bool:
+        """Whether times are in s: not where the period of the force is uncertain."""
+        return "frequency" not in self.fuzzy
+
 
 @dataclass(frozen=True)
 class EnvelopeTask:
@@ -150,7 +155,7 @@ class EnvelopeTask:
             return dict(zip(names, map(float, values.values), strict=True))
 
         numbers = EnvelopeResult(
-            fuzzy=self.fuzzy,
+            fuzzy=structure.with_always_fuzzy(self.fuzzy),
             min=by_output(lowest["lower"].min("time")),
             max=by_output(lowest["upper"].max("time")),
             error=by_output(lowest["error"].max("time")),

@@ -81,14 +81,15 @@ def _fractions_of_widths(
     if structure is None or task is None:
         return StageResult(table)
     # An input such as "m" stands for m1 … mn: they are fixed together, as the case names them.
-    if structure.model.floors and len(task.fuzzy) > 1:
+    names = structure.with_always_fuzzy(task.fuzzy)
+    if structure.model.floors and len(names) > 1:
         table |= sensitivity(
             structure.model,
             structure.inputs(task.fuzzy),
             duration=task.duration,
             step=task.section.step,
             level=task.section.alpha[0],
-            groups={name: structure.fuzzy_members(name) for name in task.fuzzy},
+            groups={name: structure.fuzzy_members(name) for name in names},
             reached_at={name: peak.reached_at for name, peak in peaks.items()},
         ).shares
     return StageResult(table)

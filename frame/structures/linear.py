@@ -126,6 +126,31 @@ def stack(values: Sequence[Number]) -> Number:
     return type(values[0]).stack(values)
 
 
+def in_periods(assembly: Assembly[Number], ratio: Number, is_velocity: Mask) -> Assembly[Number]:
+    """Return a structure in the time τ = r t, in which loads of the frequency r f0 have f0.
+
+    With ẋ = r dx/dτ the equation M q̈ + D q̇ + K q = b f becomes r² M q″ + r D q′ + K q = b f, where
+    ′ is d/dτ. Displacements and forces are those of the structure, at the same part of a period.
+
+    Args:
+        assembly: The structure in the time t. No output observes accelerations.
+        ratio: r above 0, shape (…).
+        is_velocity: Which outputs are velocities, shape (outputs,); others are none in part.
+    """
+    a, b = assembly.rayleigh
+    factors = [ratio if is_one else ratio**0 for is_one in is_velocity]
+    return replace(
+        assembly,
+        mass=assembly.mass * (ratio**2)[..., None, None],
+        dashpots=assembly.dashpots * ratio[..., None, None],
+        # a M + b K times r, where M is r² times as large.
+        rayleigh=(a * ratio**-1, b * ratio),
+        # Damping ratios need no factor: frequencies of modes are 1/r times as large.
+        v0=assembly.v0 * (ratio**-1)[..., None],
+        row_factors=assembly.row_factors * stack(factors),
+    )
+
+
 class LinearSystem(StructureModel):
     """Base of structures whose matrices are smooth functions of named parameters.
 

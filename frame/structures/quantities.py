@@ -145,6 +145,7 @@ OF_STOREY_FRAME = {
     "hardening": Quantity(minimum=0, maximum=1),
     "q": Quantity("m"),
     "v": Quantity("m/s"),
+    "frequency": Quantity("Hz", above=0),
     "F": Quantity("N"),
     "J": Quantity("N*s"),
 }

@@ -28,8 +28,8 @@ from alphacut.base.number_text import STANDARD_GRAVITY
 from alphacut.base.quantity import Quantity
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.records.history import Accelerogram
-from alphacut.frame.structures.linear import Assembly, LinearSystem, Number, stack
-from alphacut.frame.structures.loads import Force, require_loads
+from alphacut.frame.structures.linear import Assembly, LinearSystem, Number, in_periods, stack
+from alphacut.frame.structures.loads import Force, distinct_histories, require_loads
 from alphacut.frame.structures.model import Dynamics, PlacedForce, StructureModel
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME, Output, Parameter, of_storey_frame
 
@@ -69,9 +69,9 @@ class StoreyFrame(LinearSystem):
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
     storey), or "k1" … where stiffnesses are given (and "l1" … beside them); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
-    and "zeta", or "zeta1" … of single modes, where there are damping ratios; "F3" of a force on
-    floor 3, "F3_2" of a second one there, "J3" of an impulse; of columns that yield "fy1" … or
-    "dy1" … (yield forces or drifts) and "hardening1" ….
+    and "zeta", or "zeta1" … of single modes, where there are damping ratios; "frequency" where it
+    is given; "F3" of a force on floor 3, "F3_2" of a second one there, "J3" of an impulse; of
+    columns that yield "fy1" … or "dy1" … (yield forces or drifts) and "hardening1" ….
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z of the columns,
     without dampers' forces, N); "base_shear" is "shear1", "overturning_moment" Σ_z l_z shear_z
@@ -110,6 +110,9 @@ class StoreyFrame(LinearSystem):
             first storey; a storey of hardening 1 stays elastic.
         yield_drift: Drift of each storey at which they yield, in m, in place of yield_force.
         hardening: Stiffness of each storey after yielding over k_z, from 0 (the default) to 1.
+        frequency: Frequency f0 in Hz of the harmonic loads, if the parameter "frequency" is to
+            change it. Times are then those of the period: at a frequency f what happens at t is
+            found at t f / f0, so that a duration is a number of periods. See `in_periods`.
 
     Raises:
         RefusedError: The lists differ in length, a value is outside its range, the weight buckles a
@@ -142,6 +145,7 @@ class StoreyFrame(LinearSystem):
     yield_drift: Annotated[Sequence[float], OF_STOREY_FRAME["dy"]] = ()
     hardening: Annotated[Sequence[float], OF_STOREY_FRAME["hardening"]] = ()
     rayleigh_of: Literal["initial", "tangent"] = "initial"
+    frequency: float | None = None
 
     def __post_init__(self) -> None:
         """Check all fields, store lists as tuples, and fill empty ones with their defaults.
@@ -183,6 +187,7 @@ class StoreyFrame(LinearSystem):
             self.quantity(output)
         are_unique = len(set(self.outputs)) == len(self.outputs)
         require(are_unique, "output", value=", ".join(self.outputs), allowed="each output once")
+        self._require_frequency()
         # The empty box is the nominal structure alone; boxes of inputs are checked where they are
         # known.
         self.require_standing({})
@@ -282,6 +287,23 @@ class StoreyFrame(LinearSystem):
             allowed = "one of them beside hardening"
             require(has_force or has_drift, "yield_force, yield_drift", None, allowed)
 
+    def _require_frequency(self) -> None:
+        """Refuse an uncertain frequency beside loads of other frequencies.
+
+        Raises:
+            RefusedError: The ground moves, columns yield, or a load is not harmonic with the
+                frequency in the field of this name.
+        """
+        if self.frequency is None:
+            return
+        hertz = checked_number("frequency", self.frequency, positive=True)
+        allowed = "one course of harmonic loads, an elastic frame, and no motion of the ground"
+        histories = distinct_histories(self.loads)
+        is_one = len(histories) == 1 and all(force.history for force in self.loads)
+        is_harmonic = is_one and bool(np.isclose(histories[0].frequency, 2 * np.pi * hertz))
+        is_alone = self.ground is None and not self.hardening
+        require(is_harmonic and is_alone, "frequency", f"{hertz:g} Hz", allowed)
+
     @property
     def floors(self) -> int:
         """Number of floors n."""
@@ -330,6 +352,8 @@ class StoreyFrame(LinearSystem):
             named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         named["rayleigh_mass"], named["rayleigh_stiffness"] = self.rayleigh
         named |= self.ratios
+        if self.frequency is not None:
+            named["frequency"] = self.frequency
         for name, force in zip(self.force_names, self.loads, strict=True):
             named[name] = checked_number(name, force.amplitude)
         return named
@@ -482,6 +506,14 @@ class StoreyFrame(LinearSystem):
             1; the force vector of each load at its amplitude, shape (…, n, loads), None without
             loads. Here … stands for S with jets and for nothing with Taylor models.
         """
+        found = self._in_seconds(p)
+        if self.frequency is None:
+            return found
+        is_velocity = np.array([self.quantity(name)[0] == "v" for name in self.outputs])
+        return in_periods(found, p["frequency"] * (1 / self.frequency), is_velocity)
+
+    def _in_seconds(self, p: Mapping[str, Number]) -> Assembly[Number]:
+        """Return the `assembly` at the nominal frequency."""
         n = self.floors
         identity: Array = np.eye(n)
         # Matrices are sums of constant ones, one for each floor or storey, with the parameters as
@@ -572,6 +604,8 @@ class StoreyFrame(LinearSystem):
             require(len(self.lengths) > 0, "output", value=name, allowed=allowed)
             return MOMENT, 0
         kinds = ["q", "v", "a", "drift", "shear"]
+        if self.frequency is not None:  # what a force adds to an acceleration at once has no factor
+            kinds.remove("a")
         if self.hardening:
             kinds += ["residual", "ductility", "dissipated"]
         pattern = rf"({'|'.join(kinds)})([1-9]\d{{0,5}})"
