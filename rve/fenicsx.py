@@ -68,7 +68,15 @@ with uninterrupted(), _without_numba(), extra_named():
     from dolfinx import fem
     from dolfinx.fem import petsc
 
-__all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
+__all__ = [
+    "MPI",
+    "PETSc",
+    "basix",
+    "dolfinx",
+    "fem",
+    "petsc",
+    "ufl",
+]  # imported from here by others
 
 
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}

@@ -146,7 +146,7 @@ class MeshedCell(Section):
     methods: ClassVar = ("auto", "prism")
     particles: ClassVar = "mesh"  # in results
 
-    phases: dict[str, PhaseSection] = Field(description="phase of each physical group of volumes")
+    phases: dict[str, PhaseSection] = Field(description="phase of each physical group")
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
@@ -507,8 +507,8 @@ class Mesh(Section):
     """Discretisation of the product domain."""
 
     file: CaseFile | None = None
-    """mesh of Gmsh, prisms of 15 nodes over a parallelogram or hexagon and θ, in place of size and
-    layers; its physical groups are the phases of [cell.phases]"""
+    """mesh of Gmsh in place of size and layers: prisms of 15 nodes over a parallelogram or hexagon
+    and θ, or its triangles alone; its physical groups are the phases of [cell.phases]"""
     refine: bool = False
     """whether to refine the mesh of a file once, for a declared error"""
     bounds: bool = False

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from alphacut.case.content import Case
 
 PETSC_PREFIX = "-rve_"
+OPTIONS_FILE = "-options_file"
+PETSC_HELP = f"""\
+options of PETSc, for prisms (method prism, or a mesh): {PETSC_PREFIX}… anywhere, as
+{PETSC_PREFIX}ksp_type gmres {PETSC_PREFIX}pc_type gamg, or {OPTIONS_FILE} FILE with such words"""
 
 
 @dataclass(frozen=True)
@@ -96,17 +100,26 @@ def split_petsc(arguments: Sequence[str]) -> CommandLine:
     Args:
         arguments: Words of the command line. An option of PETSc begins with "-rve_". The word after
             it is its value, unless this begins as an option, such as "-x" or "--json", or ends in
-            ".toml", as a case does. Negative numbers such as "-1" are values.
+            ".toml", as a case does. Negative numbers such as "-1" are values. "-options_file FILE"
+            stands for the words of a file, in which "#" begins a comment.
 
     Returns:
         All other words in their order; and the values of the options by their names without
         "-rve_". An option without a value has "", and of one that is given twice the last value
         counts.
+
+    Raises:
+        RefusedError: There is no such file of options.
     """
     # argparse cannot know PETSc's options, of which there are thousands, nor which take a value.
     line = CommandLine([], {})
     option = ""  # whose value may follow
-    for word in arguments:
+    all_words = list(arguments)
+    if OPTIONS_FILE in all_words[:-1]:
+        place = all_words.index(OPTIONS_FILE)
+        text = text_of(Path(all_words[place + 1]))
+        all_words[place : place + 2] = re.sub("#.*", "", text).split()
+    for word in all_words:
         is_value = not re.match(r"--?[A-Za-z_]", word) and not word.endswith(".toml")
         if word.startswith(PETSC_PREFIX):
             option = word.removeprefix(PETSC_PREFIX)
@@ -152,8 +165,10 @@ def read_case(options: argparse.Namespace) -> Case:
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of every command on a case to a parser, in place.
 
-    They are CASE as `case`, ``--set`` as the list `set`, ``--json`` and ``--quiet``.
+    They are CASE as `case`, ``--set`` as the list `set`, ``--json`` and ``--quiet``. The help says
+    below them how options of PETSc are given.
     """
+    parser.epilog = PETSC_HELP
     parser.add_argument("case", metavar="CASE", help="case file, for example cases/paper.toml")
     parser.add_argument(
         "--set",

@@ -280,7 +280,8 @@ class CellProblem:
         except ImportError as error:
             raise RefusedError("mesh.file", self.mesh.file, "no mesh", missing(error)) from None
         try:
-            grid = read_grid(self.mesh.file)
+            law = cast("ThetaDistribution", self.nominal_radius)
+            grid = read_grid(self.mesh.file, (law.lower, law.upper))
         except MeshError as error:
             value = f"{self.mesh.file.name}: {error.what}"
             allowed = "a periodic cell of prisms"

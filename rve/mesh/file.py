@@ -1,7 +1,8 @@
-"""The user's mesh: prisms of the product space in a file of Gmsh, as they are.
+"""The user's mesh in a file of Gmsh: prisms of the product space as they are, or plane triangles.
 
-The file is the geometry at its own θ: levels may be uneven, columns bent and phases any number.
-Gmsh's 15-node prisms ("Prism 15") have Basix's order of nodes; physical groups name phases.
+A file of prisms is the geometry at its own θ: levels may be uneven, columns bent and phases any
+number. Plane triangles are extruded along θ. Gmsh's 15-node prisms ("Prism 15") have Basix's order
+of nodes; physical groups name phases.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,42 +21,81 @@ from alphacut.base.memory import require_text
 from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.msh import REWRITE, DamagedMeshError, MshFile, element_name, parse_msh
+from alphacut.rve.mesh.msh import (
+    REWRITE,
+    SURFACE,
+    VOLUME,
+    DamagedMeshError,
+    MshFile,
+    element_name,
+    parse_msh,
+)
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
-from alphacut.rve.mesh.prism_grid import PrismGrid, Prisms
+from alphacut.rve.mesh.plane import PlaneMesh
+from alphacut.rve.mesh.prism_grid import Elements, PrismGrid, Prisms
 from alphacut.rve.mesh.wedge import prism_rule, vertices_and_midpoints, wedge
 
 PRISM_15 = 18  # Gmsh's number of the type "Prism 15", in its table of MSH file elements
-MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms"
+TRIANGLE_3 = 2
+"""Gmsh's number of the type "Triangle 3"."""
+TRIANGLE_6 = 9
+"""Gmsh's number of the type "Triangle 6"."""
+MESH_FILES = "meshes in Gmsh's format MSH with 15-node prisms or plane triangles"
 PRISM_15_BY_GMSH = "extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2"
+T = TypeVar("T", bound=Elements)
 
 
-def read_grid(path: Path | str) -> PrismGrid:
+def read_grid(
+    path: Path | str, theta: tuple[float, float] = (0.0, 1.0), layers: int = 1
+) -> PrismGrid:
     """Read a mesh of the cell from a file in Gmsh's format MSH and check it.
 
     The mesh consists of 15-node prisms (Gmsh's "Prism 15") that stand in columns on a
     parallelogram or a regular hexagon, with the random number θ as third coordinate. Each physical
-    group of volumes is a material.
+    group of volumes is a material. A file without volumes has plane triangles of three or six
+    nodes, whose materials are physical groups of surfaces; they are extruded along θ.
 
     Args:
         path: The file, MSH 2.x or 4.1, text or binary.
+        theta: Lowest and highest level of θ of extruded triangles.
+        layers: Layers of extruded triangles, at least 1.
 
     Returns:
         The prisms where the file has them (`fixed`), with nodes numbered level by level of θ.
 
     Raises:
         RefusedError: The file cannot be read, is not in that format, or contradicts itself.
-        MeshError: It is no mesh of a cell: other elements than prisms, a volume without a group or
-            in two, θ along another axis, no such cell, no columns, edges without a middle node of
-            their own, folded prisms, voids or overlaps, opposite sides that do not match, slits, or
-            a material that changes along θ.
+        MeshError: It is no mesh of a cell, as `checked_grid` says, or has other elements, or a
+            volume or surface without a group or in two.
     """
     try:
-        mesh = parse_msh(mesh_content(path))
+        content = mesh_content(path)
+        mesh = parse_msh(content)
+        is_plane = not mesh.entities
+        if is_plane:
+            mesh = parse_msh(content, SURFACE)
     except DamagedMeshError as error:
         cure = "" if REWRITE in str(error) else "copy the file anew, or write it anew by Gmsh"
         raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES, cure) from None
-    prisms = read_prisms(mesh)
+    prisms = read_plane(mesh).prisms(theta, layers) if is_plane else read_prisms(mesh)
+    return checked_grid(prisms)
+
+
+def checked_grid(prisms: Prisms) -> PrismGrid:
+    """Order prisms of the user into levels and columns, and check that they are a cell.
+
+    Args:
+        prisms: Prisms in any order, whose nodes have any numbers; each stands upright or upside
+            down.
+
+    Returns:
+        The prisms where they are (`fixed`), with nodes numbered level by level of θ.
+
+    Raises:
+        MeshError: It is no mesh of a cell: θ along another axis, no parallelogram or hexagon, no
+            columns, edges without a middle node of their own, folded prisms, voids or overlaps,
+            opposite sides that do not match, slits, or a material that changes along θ.
+    """
     try:
         grid = grid_of(orient(prisms))
     except MeshError:
@@ -98,75 +139,80 @@ def mesh_content(path: Path | str) -> bytes:
 
 
 def read_prisms(mesh: MshFile) -> Prisms:
-    """Collect all prisms of a parsed file; each physical group of volumes becomes a phase.
+    """Collect all prisms of a file parsed for volumes; see `_elements`."""
+    # Gmsh's order of the nodes of "Prism 15" is Basix's: vertices, then midpoints of edges.
+    return _elements(mesh, Prisms, PRISM_15, VOLUME, f"mesh with Prism 15: {PRISM_15_BY_GMSH}")
+
+
+def read_plane(mesh: MshFile) -> PlaneMesh:
+    """Collect all triangles of a file parsed for surfaces, all of three nodes or all of six.
+
+    See `_elements`.
+    """
+    is_quadratic = any(kind == TRIANGLE_6 for _, kind in mesh.elements)
+    kind = TRIANGLE_6 if is_quadratic else TRIANGLE_3
+    cure = "mesh with triangles of order 1 or 2, all alike"
+    plane = _elements(mesh, PlaneMesh, kind, SURFACE, cure)
+    # Gmsh has the middles of the edges 01, 12 and 02 behind the vertices.
+    return replace(plane, cells=plane.cells[:, [0, 1, 2, 3, 5, 4]]) if is_quadratic else plane
+
+
+def _elements(mesh: MshFile, made: type[T], kind: int, dimension: int, cure: str) -> T:
+    """Collect the elements of a parsed file; each physical group becomes a phase.
 
     Args:
-        mesh: What the file says: points, elements by volume and type, groups of volumes and names.
+        mesh: What the file says: points, elements by entity and type, groups and names.
+        made: Class of what is returned.
+        kind: Gmsh's number of the only type that is allowed.
+        dimension: 3 where the file was read for volumes, 2 for surfaces.
+        cure: Says how to mesh with that type.
 
     Returns:
-        Points that belong to a prism, shape (n, 3); the 15 nodes of each prism as indices of these
-        points, shape (m, 15), in Basix's order; the phase of each prism, shape (m,), an index of
-        the names; and the names by rising number of the group. A group without a name is "group
+        The elements, and points that belong to one of them. A group without a name is "group
         NUMBER".
 
     Raises:
-        MeshError: The mesh is divided into partitions or has no volumes; a volume is in no physical
-            group or in two; or a volume has no elements or others than 15-node prisms.
+        MeshError: The mesh is divided into partitions; a volume (or surface) is in no physical
+            group or in two; or it has no elements or others than those of `kind`.
     """
+    entity = {VOLUME: "volume", SURFACE: "surface"}[dimension]
     if mesh.partitions:
-        cure = "write the mesh before it is divided among processes"
-        raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", cure)
-    if not mesh.volumes and not mesh.elements:
-        cure = f"make prisms of the triangles along θ: {PRISM_15_BY_GMSH}, a physical group a phase"
-        raise MeshError("the mesh is plane: it has no volumes, and prisms are wanted", cure)
+        whole = "write the mesh before it is divided among processes"
+        raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", whole)
     names: list[str] = []
     cells: list[Ints] = []
     phases: list[Ints] = []
     grouped: set[int] = set()
     for group in sorted(mesh.groups):
         name = mesh.names.get(group) or f"group {group}"
-        volumes = sorted(mesh.groups[group])
-        if grouped & set(volumes):
-            cure = "give each volume one physical group alone"
-            raise MeshError(f"prisms of the physical group {name!r} are in another one too", cure)
-        grouped |= set(volumes)
-        for volume in volumes:
-            cells.append(_cells_of(mesh, volume, name))
+        tags = sorted(mesh.groups[group])
+        if grouped & set(tags):
+            alone = f"give each {entity} one physical group alone"
+            raise MeshError(
+                f"{entity}s of the physical group {name!r} are in another one too", alone
+            )
+        grouped |= set(tags)
+        for tag in tags:
+            kinds = [of_element for place, of_element in mesh.elements if place == tag]
+            if kinds != [kind]:
+                listed = ", ".join(element_name(k) for k in kinds) or "no elements"
+                raise MeshError(f"the physical group {name!r} holds {listed}", cure)
+            cells.append(mesh.elements[tag, kind])
             phases.append(np.full(len(cells[-1]), len(names)))
         names.append(name)
-    ungrouped = sorted(mesh.volumes - grouped)
+    ungrouped = sorted(mesh.entities - grouped)
     if ungrouped or not names:
-        what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
-        cure = 'name each phase: gmsh.model.addPhysicalGroup(3, volumes, name="matrix")'
-        raise MeshError(f"{what} has no physical group that names its phase", cure)
-    # Nodes of curves and surfaces alone belong to no prism; they would be unknowns without
-    # stiffness.
-    used, compact = np.unique(np.concatenate(cells), return_inverse=True)
-    return Prisms(mesh.points[used], compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
-
-
-def _cells_of(mesh: MshFile, volume: int, name: str) -> Ints:
-    """Return the nodes of the prisms of one volume as indices of the file's points, shape (m, 15).
-
-    The order within a prism is that of Gmsh's type "Prism 15", the same as Basix's: vertices, then
-    midpoints of edges.
-
-    Args:
-        mesh: Elements by the tag of their volume and the number of their type.
-        volume: Tag of the volume.
-        name: Name of its physical group, for the message.
-
-    Raises:
-        MeshError: The volume has no elements, or other ones beside or instead of 15-node prisms.
-    """
-    kinds = [kind for entity, kind in mesh.elements if entity == volume]
-    if kinds != [PRISM_15]:
-        found = ", ".join(element_name(kind) for kind in kinds)
+        what = f"{entity} {ungrouped[0]}" if ungrouped else "the mesh"
+        name_it = f'gmsh.model.addPhysicalGroup({dimension}, {entity}s, name="matrix")'
         raise MeshError(
-            f"the physical group {name!r} holds {found or 'no elements'}",
-            f"mesh with Prism 15: {PRISM_15_BY_GMSH}",
+            f"{what} has no physical group that names its phase", f"name each phase: {name_it}"
         )
-    return mesh.elements[volume, PRISM_15]
+    # Nodes of curves and surfaces alone belong to no element; they would be unknowns without
+    # stiffness.
+    all_cells = np.concatenate(cells)
+    used, compact = np.unique(all_cells, return_inverse=True)
+    compact = compact.reshape(all_cells.shape)
+    return made(mesh.points[used], compact, np.concatenate(phases), tuple(names))
 
 
 def refined(grid: PrismGrid) -> PrismGrid:

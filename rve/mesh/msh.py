@@ -29,9 +29,17 @@ SOLIDS = {
     29: "Tetrahedron", 30: "Tetrahedron", 31: "Tetrahedron", 92: "Hexahedron", 93: "Hexahedron",
 }  # fmt: skip
 """Names of the elements of three dimensions by their type."""
+FACES = {
+    2: "Triangle", 3: "Quadrangle", 9: "Triangle", 10: "Quadrangle", 16: "Quadrangle",
+    20: "Triangle", 21: "Triangle", 22: "Triangle", 23: "Triangle", 24: "Triangle",
+    25: "Triangle",
+}  # fmt: skip
+"""Names of the elements of two dimensions by their type."""
 REWRITE = "write it as MSH 4.1 or 2.2"
 VOLUME = 3
 """Dimension of the entities that hold prisms."""
+SURFACE = 2
+"""Dimension of the entities that hold plane triangles."""
 
 _Source = Callable[[bytes], "_Numbers"]
 """The numbers of a section by its name."""
@@ -43,15 +51,15 @@ class DamagedMeshError(ValueError):
 
 @dataclass
 class MshFile:
-    """What a file in the format MSH says of its volumes.
+    """What a file in the format MSH says of its volumes, or of its surfaces.
 
     Args:
         points: Coordinates of the nodes, shape (n, 3).
         elements: Indices of the nodes in `points`, shape (elements, nodes of one), by the tag of
-            the volume and the type of the element.
-        groups: Tags of the volumes of each physical group.
+            the entity and the type of the element.
+        groups: Tags of the entities of each physical group.
         names: Names of physical groups, of those that have one.
-        volumes: Tags of all volumes that have elements or are named among the entities.
+        entities: Tags of all volumes (or surfaces) that have elements or are listed in the file.
         partitions: Number of parts into which the mesh is divided; 0 if it is whole.
     """
 
@@ -59,24 +67,25 @@ class MshFile:
     elements: dict[tuple[int, int], Ints]
     groups: dict[int, list[int]] = field(default_factory=dict)
     names: dict[int, str] = field(default_factory=dict)
-    volumes: set[int] = field(default_factory=set)
+    entities: set[int] = field(default_factory=set)
     partitions: int = 0
 
 
-def parse_msh(content: bytes) -> MshFile:
-    """Return what a mesh file in Gmsh's format MSH says of its volumes.
+def parse_msh(content: bytes, dimension: int = VOLUME) -> MshFile:
+    """Return what a mesh file in Gmsh's format MSH says of its volumes, or of its surfaces.
 
-    Versions 2 to 2.2 and 4.1 are read, in text or in bytes of either order. Of elements only those
-    of three dimensions are kept, by the tag of their volume and the number of their type, and of
-    physical groups only those of volumes.
+    Versions 2 to 2.2 and 4.1 are read, in text or in bytes of either order. Only elements of one
+    dimension are kept, by the tag of their entity and the number of their type, and only physical
+    groups of that dimension.
 
     Args:
         content: The file from its first section $MeshFormat on.
+        dimension: 3 for volumes, 2 for surfaces.
 
     Returns:
-        MshFile with the coordinates of all nodes; elements as indices of these nodes; volumes, also
-        empty ones; groups; names of groups; and the number of partitions, 0 for a mesh that is
-        whole. A file without volumes gives empty ones.
+        MshFile with the coordinates of all nodes; elements as indices of these nodes; entities of
+        the dimension, also empty ones; groups; names of groups; and the number of partitions, 0 for
+        a mesh that is whole. A file without such entities gives empty ones.
 
     Raises:
         DamagedMeshError: The file is cut off, contradicts itself (counts that do not fit, tags that
@@ -108,14 +117,14 @@ def parse_msh(content: bytes) -> MshFile:
         return _Binary(sections[name], order) if is_binary else _Text(sections[name])
 
     if version == "4.1":
-        mesh = _read_version_4(numbers, has_entities=b"Entities" in sections)
+        mesh = _read_version_4(numbers, dimension, has_entities=b"Entities" in sections)
     else:
-        mesh = _read_version_2(numbers)
+        mesh = _read_version_2(numbers, dimension)
     if b"PartitionedEntities" in sections:
         mesh.partitions = max(numbers(b"PartitionedEntities").count(), 1)
     names = re.findall(rb'\s*(\d+)\s+(-?\d+)\s+"([^"]*)"', sections.get(b"PhysicalNames", b""))
-    for dimension, tag, name in names:
-        if int(dimension) == VOLUME:
+    for of_dimension, tag, name in names:
+        if int(of_dimension) == dimension:
             mesh.names[int(tag)] = name.decode("utf-8", "replace")
     return mesh
 
@@ -281,19 +290,20 @@ def _sections(content: bytes) -> dict[bytes, bytes]:
     return sections
 
 
-def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
-    """Read the volumes of a file of version 4.1.
+def _read_version_4(numbers: _Source, dimension: int, *, has_entities: bool) -> MshFile:
+    """Read the entities of one dimension of a file of version 4.1.
 
-    The sections $Entities (which gives the physical groups of each volume), $Nodes and $Elements
-    are used. Elements of fewer than three dimensions are checked and left out.
+    The sections $Entities (which gives the physical groups of each entity), $Nodes and $Elements
+    are used. Elements of other dimensions are checked and left out.
 
     Args:
         numbers: Function that returns the numbers of a section, to be taken one after another.
+        dimension: 3 for volumes, 2 for surfaces.
         has_entities: Whether the file has the section $Entities; without it there are no groups.
 
     Returns:
-        Points, elements as indices of the points by volume and type, groups, and volumes; names and
-        partitions are not filled in.
+        Points, elements as indices of the points by entity and type, groups, and entities; names
+        and partitions are not filled in.
 
     Raises:
         DamagedMeshError: A section is missing or too short, or the sections contradict themselves
@@ -302,10 +312,10 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
     mesh = MshFile(np.empty((0, 3)), {})
     groups = defaultdict[int, list[int]](list)
     if has_entities:
-        for volume, physical_groups in _volumes_of_version_4(numbers(b"Entities")):
-            mesh.volumes.add(volume)
+        for tag, physical_groups in _entities_of_version_4(numbers(b"Entities"), dimension):
+            mesh.entities.add(tag)
             for group in physical_groups:
-                groups[group].append(volume)
+                groups[group].append(tag)
     mesh.groups = dict(groups)
 
     source = numbers(b"Nodes")
@@ -313,14 +323,14 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
     tags: list[Ints] = [np.empty(0, np.int64)]
     points: list[Array] = [np.empty((0, 3))]
     for _ in range(n_blocks):
-        dimension, _, is_parametric = source.int_list(3)
+        of_block, _, is_parametric = source.int_list(3)
         count = source.count()
-        if is_parametric not in (0, 1) or dimension not in range(4):
+        if is_parametric not in (0, 1) or of_block not in range(4):
             raise DamagedMeshError("with a block of nodes of an unknown kind")
         tags.append(source.sizes(count))
         # All tags of a block come before all its coordinates. In a parametric block each node has,
         # behind its coordinates, as many parameters as the entity has dimensions.
-        width = 3 + dimension * is_parametric
+        width = 3 + of_block * is_parametric
         points.append(source.floats(count * width).reshape(count, width)[:, :3])
     mesh.points = np.concatenate(points)
     if len(mesh.points) != n_nodes:
@@ -330,52 +340,54 @@ def _read_version_4(numbers: _Source, *, has_entities: bool) -> MshFile:
     n_blocks, _, _, _ = source.size_list(4)
     runs = defaultdict[tuple[int, int], list[Ints]](list)
     for _ in range(n_blocks):
-        dimension, entity, kind = source.int_list(3)
+        of_block, entity, kind = source.int_list(3)
         width = 1 + _node_count(kind)  # a tag before the nodes
         count = source.count()
         block = source.sizes(count * width).reshape(count, width)
-        if dimension == VOLUME:
+        if of_block == dimension:
             runs[entity, kind].append(block[:, 1:])
     return _with_elements(mesh, np.concatenate(tags), runs)
 
 
-def _volumes_of_version_4(source: _Numbers) -> Iterator[tuple[int, list[int]]]:
-    """Yield the volumes of a section $Entities of version 4.1.
+def _entities_of_version_4(source: _Numbers, dimension: int) -> Iterator[tuple[int, list[int]]]:
+    """Yield the entities of one dimension of a section $Entities of version 4.1.
 
-    Points, curves and surfaces stand before the volumes and are passed over.
+    Those of other dimensions are passed over.
 
     Args:
         source: Numbers of the section, from its start; they are taken.
+        dimension: 3 for volumes, 2 for surfaces.
 
     Yields:
-        The tag of a volume and the tags of the physical groups that it is in, which may be none.
+        The tag of an entity and the tags of the physical groups that it is in, which may be none.
 
     Raises:
         DamagedMeshError: The section ends too early, or a count is no whole number of 0 or more.
     """
     counts = source.size_list(4)  # of points, curves, surfaces and volumes
-    for dimension, count in enumerate(counts):
+    for of_entities, count in enumerate(counts):
         for _ in range(count):
             tag = int(source.ints(1)[0])
-            source.floats(3 if dimension == 0 else 6)  # the point, or the box around the entity
+            source.floats(3 if of_entities == 0 else 6)  # the point, or the box around the entity
             groups = source.int_list(source.count())
-            if dimension > 0:
+            if of_entities > 0:
                 source.ints(source.count())  # the entities that bound it
-            if dimension == VOLUME:
+            if of_entities == dimension:
                 yield tag, groups
 
 
-def _read_version_2(numbers: _Source) -> MshFile:
-    """Read the volumes of a file of version 2, whose elements name their physical group and volume.
+def _read_version_2(numbers: _Source, dimension: int) -> MshFile:
+    """Read a file of version 2, whose elements name their physical group and entity.
 
-    Elements of fewer than three dimensions are left out. The group 0 stands for none.
+    Elements of other dimensions are left out. The group 0 stands for none.
 
     Args:
         numbers: Function that returns the numbers of a section, to be taken one after another.
+        dimension: 3 for volumes, 2 for surfaces.
 
     Returns:
-        Points, elements as indices of the points by volume and type, groups with the volumes of
-        each, volumes, and the largest number of a partition; names are not filled in.
+        Points, elements as indices of the points by entity and type, groups with the entities of
+        each, entities, and the largest number of a partition; names are not filled in.
 
     Raises:
         DamagedMeshError: A section is missing or too short, an element has fewer than two labels,
@@ -386,7 +398,7 @@ def _read_version_2(numbers: _Source) -> MshFile:
     groups = defaultdict[int, set[int]](set)
     runs = defaultdict[tuple[int, int], list[Ints]](list)
     for run in _runs_of_version_2(numbers(b"Elements")):
-        if run.kind not in SOLIDS:
+        if run.kind not in (SOLIDS if dimension == VOLUME else FACES):
             continue
         if run.labels.shape[1] < 2:
             raise DamagedMeshError("with elements that name no entity")
@@ -482,7 +494,7 @@ def _runs_of_version_2(source: _Numbers) -> Iterator[_Run]:
 
 def element_name(kind: int) -> str:
     """Return Gmsh's name of a type of element, as "Prism 15"."""
-    return f"{SOLIDS.get(kind, f'type {kind}')} {NODES[kind]}"
+    return f"{(SOLIDS | FACES).get(kind, f'type {kind}')} {NODES[kind]}"
 
 
 def _node_count(kind: int) -> int:
@@ -517,10 +529,10 @@ def _with_elements(
     """Add elements to a mesh, with their nodes as indices of the mesh's points in place of tags.
 
     Args:
-        mesh: The mesh with its points, shape (n, 3). Its `elements` and `volumes` are changed in
+        mesh: The mesh with its points, shape (n, 3). Its `elements` and `entities` are changed in
             place.
         tags: Tags of the points, any whole numbers in any order, shape (n,).
-        runs: Elements by the tag of their volume and the number of their type: arrays of the tags
+        runs: Elements by the tag of their entity and the number of their type: arrays of the tags
             of their nodes, each of shape (elements, nodes of one), which are concatenated.
 
     Returns:
@@ -543,5 +555,5 @@ def _with_elements(
         if wanted.size and (not len(rising) or (rising[place] != wanted).any()):
             raise DamagedMeshError("with an element whose node is not there")
         mesh.elements[key] = order[place]
-        mesh.volumes.add(key[0])
+        mesh.entities.add(key[0])
     return mesh

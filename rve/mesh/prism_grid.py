@@ -53,13 +53,13 @@ class Triangulation:
 
 
 @dataclass(frozen=True, eq=False)
-class Prisms:
-    """Prisms of the product space as Gmsh numbers them.
+class Elements:
+    """Elements of a mesh of the user, of one kind, each of one phase.
 
     Args:
-        points: (x1, x2, θ) of all nodes, shape (n, 3).
-        cells: Nodes of each prism in Basix's order, shape (m, 15).
-        phase: Phase of each prism, an index of `names`, shape (m,).
+        points: Three coordinates of all nodes, shape (n, 3).
+        cells: Nodes of each element as indices of `points`, shape (m, nodes of an element).
+        phase: Phase of each element, an index of `names`, shape (m,).
         names: Names of the phases.
     """
 
@@ -67,6 +67,10 @@ class Prisms:
     cells: Ints
     phase: Ints
     names: tuple[str, ...]
+
+
+class Prisms(Elements):
+    """Prisms of 15 nodes in Basix's order; the third coordinate is θ."""
 
 
 def reference_radius(

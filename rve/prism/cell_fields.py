@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import permutations
 from pathlib import Path
 
@@ -28,6 +29,7 @@ class CellFields:
             (n, 3, loads), in Pa.
         names: Names of the phases.
         node: Node of the mesh that each point is, shape (n,).
+        scalars: Fields of the user by name, shape (n,) each.
         writes: Whether `write` writes the file: of MPI ranks that have the same fields, one does.
     """
 
@@ -39,9 +41,10 @@ class CellFields:
     names: tuple[str, ...]
     node: Ints
     writes: bool = True
+    scalars: Mapping[str, Array] = field(default_factory=dict)
 
     def write(self, path: Path | str) -> int:
-        """Write mesh, phases, displacements and stresses; return the number of nodes in the file.
+        """Write mesh, phases and fields; return the number of nodes in the file.
 
         Ranks that solved one cell together have the same fields, and the first one writes the file;
         the others go on at once, so that they must wait before they read it.
@@ -51,7 +54,7 @@ class CellFields:
         nodes of the interface stand twice, since stresses jump there, and each prism is three
         quadratic tetrahedra, which ParaView and PyVista draw. A file that exists is replaced.
         Fields are named by load, counted from 1: "displacement_1_in_half_sides", "stress_1_11_Pa"
-        and so on.
+        and so on, and scalars of the user as the user names them.
 
         Args:
             path: Name that ends in .msh, .vtu or .xdmf.
@@ -112,9 +115,9 @@ class CellFields:
 
         Returns:
             "displacement_K_in_half_sides": (u1, u2, 0) in halves of the cell's side, shape (n, 3);
-            and "stress_K_11_Pa", "stress_K_22_Pa" and "stress_K_12_Pa", shape (n,) each.
+            "stress_K_11_Pa", "stress_K_22_Pa" and "stress_K_12_Pa", shape (n,) each; and `scalars`.
         """
-        data = {}
+        data = dict(self.scalars)
         for load in range(self.displacement.shape[-1]):
             # Viewers want vectors of three components; the one along θ is 0.
             in_space = np.pad(self.displacement[..., load], ((0, 0), (0, 1)))
@@ -177,6 +180,7 @@ class CellFields:
             names=self.names,
             node=np.concatenate([self.node, np.full(len(sides), -1)]),
             writes=self.writes,
+            scalars={name: with_centres(values) for name, values in self.scalars.items()},
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,7 +55,11 @@ def solved_fields(
 
 
 def fields_of_solution(
-    problem: PrismProblem, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], load: Array
+    problem: PrismProblem,
+    u: fem.Function,
+    stress: Mapping[str, ufl.core.expr.Expr],
+    load: Array,
+    scalars: Mapping[str, ufl.core.expr.Expr],
 ) -> CellFields:
     """Return displacements and stresses at the nodes, for a solution of a material law of the user.
 
@@ -67,20 +72,25 @@ def fields_of_solution(
         stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of three components, in
             Pa.
         load: Macroscopic strain (ε11, ε22, 2 ε12), shape (3,).
+        scalars: Further fields by name, scalar UFL expressions.
 
     Returns:
-        Total displacements in halves of the cell's side and stresses in Pa at the nodes, for the
-        one load. A stress is the mean over the prisms of one phase that meet in the node.
+        Total displacements in halves of the cell's side, stresses in Pa and scalars at the nodes,
+        for the one load. A stress or scalar is the mean over the prisms of one phase that meet in
+        the node.
 
     Raises:
         RefusedError: The names in `stress` are not exactly those of the phases, or an expression
-            has not three components.
+            has not three components, or of `scalars` not one.
     """
     names = problem.grid.names
     require(set(stress) == set(names), "stress of phases", list(stress), ", ".join(names))
     for name, expression in stress.items():
         shape = expression.ufl_shape
         require(shape == (3,), f"shape of the stress of {name}", shape, "(3,): σ11, σ22, σ12")
+    for name, expression in scalars.items():
+        shape = getattr(expression, "ufl_shape", type(expression).__name__)
+        require(shape == (), f"shape of the scalar {name}", shape, "(), a UFL expression")
     phase = phase_at_nodes(problem)
     # Every phase's stress is evaluated in all prisms, since a level set may cut a prism; shape
     # (phases, prisms, 15, 3). Then the stress of the phase at each node is taken.
@@ -88,7 +98,15 @@ def fields_of_solution(
     prism, node = np.indices(phase.shape)
     values = of_phases[phase, prism, node][..., np.newaxis]
     fluctuation = u.x.array.reshape(-1, 2, 1)
-    return nodal_fields(problem, fluctuation, np.array([load], float), values, phase)
+    fields = nodal_fields(problem, fluctuation, np.array([load], float), values, phase)
+    order = np.argsort(np.concatenate(problem.comm.allgather(problem.wedge)))
+    points = fields.cells.ravel()
+    means = {}
+    for name, expression in scalars.items():
+        of_ranks = problem.comm.allgather(_at_nodes_of_prisms(problem, expression))
+        at_nodes = np.concatenate(of_ranks)[order]
+        means[name] = np.bincount(points, at_nodes.ravel()) / np.bincount(points)
+    return replace(fields, scalars=means)
 
 
 def phase_at_nodes(problem: PrismProblem) -> Ints:
@@ -112,10 +130,10 @@ def phase_at_nodes(problem: PrismProblem) -> Ints:
 
 
 def _at_nodes_of_prisms(problem: PrismProblem, expression: ufl.core.expr.Expr) -> Array:
-    """Return an expression of three components at the nodes of prisms, shape (prisms, 15, 3)."""
+    """Return an expression at the nodes of prisms, shape (prisms, 15, …), … its own shape."""
     cells = np.arange(len(problem.wedge), dtype=np.int32)
     values = at_points(expression, vertices_and_midpoints()).eval(problem.mesh, cells)
-    return np.asarray(values).reshape(len(cells), -1, 3)
+    return np.asarray(values).reshape(len(cells), 15, *expression.ufl_shape)
 
 
 def nodal_fields(

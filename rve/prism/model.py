@@ -406,6 +406,11 @@ class PrismModel(CellModel):
 def require_prisms(mesh_size: float, layers: int) -> None:
     """Refuse a mesh size or a number of layers that is not allowed."""
     require_mesh_size(mesh_size)
+    require_layers(layers)
+
+
+def require_layers(layers: int) -> None:
+    """Refuse a number of layers that is no whole number of 1 or more."""
     if not (is_number(layers, whole=True) and layers >= 1):
         allowed = "1 or more" if is_number(layers, whole=True) else "a whole number, 1 or more"
         raise RefusedError("the number of layers", repr(layers), allowed)

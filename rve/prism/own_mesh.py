@@ -1,4 +1,4 @@
-"""Prisms of the user's own: a mesh from a file, or particles by a level set.
+"""Prisms of the user's own: a mesh from a file or of DOLFINx, or particles by a level set.
 
 Both take the law of θ and the materials by name, and give one result; only a mesh that is refined
 declares an error.
@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 
@@ -22,16 +22,19 @@ from alphacut.rve.cell.lattice import Arrangement, lattice_of
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.image.bounds import StiffnessBounds
 from alphacut.rve.mesh.columns import from_first_rank
-from alphacut.rve.mesh.file import read_grid, refined
+from alphacut.rve.mesh.file import checked_grid, read_grid, refined
 from alphacut.rve.mesh.periodicity import unknowns
+from alphacut.rve.mesh.plane import PlaneMesh
 from alphacut.rve.mesh.prism_grid import NAMES, FixedCell, LevelFunction, LevelSet, PrismGrid
 from alphacut.rve.prism.cell_fields import CellFields
+from alphacut.rve.prism.dolfinx_mesh import plane_of_dolfinx
 from alphacut.rve.prism.fields import solved_fields
 from alphacut.rve.prism.mesh_bounds import mesh_bounds
 from alphacut.rve.prism.model import (
     cached_grid,
     cached_problem,
     prism_result,
+    require_layers,
     require_prisms,
     with_distance,
 )
@@ -43,6 +46,9 @@ from alphacut.rve.result.result import HomogenisedStiffness, PhaseEnergies
 from alphacut.rve.solver.krylov import SolverOptions, require_petsc
 from alphacut.stochastic import ThetaDistribution
 from alphacut.stochastic.theta.distribution import require_distribution
+
+if TYPE_CHECKING:
+    import dolfinx
 
 MAX_CROSSWISE = 10.0
 """Contrast of phases that meet crosswise from which on no error is declared. In a checkerboard of
@@ -149,7 +155,11 @@ class _NamedModel(NamedPhasesModel):
 
 @dataclass(frozen=True)
 class MeshModel(_NamedModel):
-    """The user's mesh of 15-node prisms, solved as it is.
+    """The user's mesh of 15-node prisms, solved as it is, or of triangles that are extruded.
+
+    Plane triangles are extruded along θ over the support of its distribution. They have three or
+    six nodes; those of three are made quadratic and keep their straight sides, so that a round
+    particle is the polygon that the file has.
 
     With `refine` it is solved twice: as it is, and with each prism split into eight of its own
     curved shape, whose result is returned. The declared error is 2.5 times the distance of both; it
@@ -158,21 +168,58 @@ class MeshModel(_NamedModel):
     there. `bounds` holds there too.
 
     Args:
-        file: File of Gmsh; its cell is a parallelogram or regular hexagon of any size and place.
+        file: File of Gmsh; its cell is a parallelogram or regular hexagon of any size and place. Or
+            triangles in memory, as `from_dolfinx` gives them.
+        layers: Layers of extruded triangles, at least 1. One is exact for phases that do not depend
+            on θ.
         refine: Whether to refine the mesh once, for a declared error.
         petsc: PETSc options without their prefix `rve_`.
         parallel: Whether all MPI ranks work on one cell together.
     """
 
-    file: Path | str
+    file: Path | str | PlaneMesh
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     refine: bool = False
+    layers: int = 1
 
     def __post_init__(self) -> None:
-        """RefusedError unless `petsc` is a table of options without dash, and `refine` a bool."""
+        """RefusedError for options with a dash, no bool `refine`, or `layers` that are no count."""
         require_petsc(self.petsc)
         require(isinstance(self.refine, bool), "refine", repr(self.refine), "True or False")
+        require_layers(self.layers)
+
+    @classmethod
+    def from_dolfinx(
+        cls,
+        mesh: dolfinx.mesh.Mesh,
+        cell_tags: dolfinx.mesh.MeshTags,
+        names: Mapping[int, str] | None = None,
+        **options: Any,
+    ) -> Self:
+        """Return the model of a plane mesh of DOLFINx, which is extruded along θ.
+
+        Args:
+            mesh: Triangles with straight sides or of order 2 on one process, which fill a
+                parallelogram or regular hexagon and have the same nodes on opposite sides.
+            cell_tags: A tag for each cell, which names its phase.
+            names: Names of the phases by tag; "group TAG" for tags that are not in it.
+            options: `petsc`, `parallel`, `refine` and `layers` of the model.
+
+        Raises:
+            RefusedError: The mesh has other cells or is distributed over processes, a cell has no
+                tag, a name is of no tag, or an option is not allowed.
+
+        Example:
+            >>> from alphacut.rve.fenicsx import MPI, dolfinx
+            >>> mesh = dolfinx.mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
+            >>> cells = np.arange(8, dtype=np.int32)
+            >>> tags = dolfinx.mesh.meshtags(mesh, 2, cells, (cells > 3).astype(np.int32))
+            >>> model = MeshModel.from_dolfinx(mesh, tags, {0: "soft", 1: "hard"})
+            >>> model.file.names
+            ('soft', 'hard')
+        """
+        return cls(plane_of_dolfinx(mesh, cell_tags, names or {}), **options)
 
     def solve(
         self, law: ThetaDistribution, phases: Mapping[str, AnyPhase]
@@ -199,7 +246,7 @@ class MeshModel(_NamedModel):
         results = super().solve(law, phases)
         if not self.refine:
             return results
-        grid = self.cached_problem().grid
+        grid = self.moved_problem(law).grid
         stiffness = [phase.stiffness for phase in in_order_of(grid.names, phases).values()]
         if max_contrast(stiffness) > MAX_CROSSWISE and meet_crosswise(grid, stiffness):
             return results
@@ -236,25 +283,53 @@ class MeshModel(_NamedModel):
 
     def moved_problem(self, distribution: object) -> PrismProblem:
         """Return the problem on the mesh; see `_NamedModel`."""
-        problem = self.cached_problem()
+        require_distribution(distribution)
+        theta = cast("ThetaDistribution", distribution)
+        problem = self.cached_problem((float(theta.lower), float(theta.upper)))
         problem.move(mesh_law(problem.grid, distribution))
         return problem
 
-    def cached_problem(self) -> PrismProblem:
-        """Return the problem on the mesh, cached as long as the file does not change."""
-        if not isinstance(self.file, str | Path) or not Path(self.file).is_file():
-            raise RefusedError("mesh.file", self.file, "path of a file of Gmsh")
-        path = Path(self.file)
-        # The time of the last change is part of the cache's key: a new file is read anew.
-        return _mesh_problem(str(path), path.stat().st_mtime_ns, self.parallel, self.refine)
+    def cached_problem(self, theta: tuple[float, float] = (0.0, 1.0)) -> PrismProblem:
+        """Return the problem on the mesh, cached as long as the file does not change.
+
+        Args:
+            theta: Lowest and highest level of θ of extruded triangles.
+
+        Raises:
+            MeshError: It is no mesh of a cell.
+            RefusedError: There is no such file, or it cannot be read.
+        """
+        source = self.file
+        changed = 0
+        if isinstance(source, str | Path) and Path(source).is_file():
+            # The time of the last change is part of the cache's key: a new file is read anew.
+            changed = Path(source).stat().st_mtime_ns
+        elif not isinstance(source, PlaneMesh):
+            raise RefusedError("mesh.file", source, "path of a file of Gmsh")
+        read = _Read(source, changed, theta, self.layers)
+        return _mesh_problem(read, self.parallel, self.refine)
+
+
+class _Read(NamedTuple):
+    """A mesh that was changed at a time, in ns, with the levels of extruded triangles."""
+
+    source: Path | str | PlaneMesh
+    changed: int
+    theta: tuple[float, float]
+    layers: int
+
+    def grid(self) -> PrismGrid:
+        """Return the checked grid of the file, or of the triangles in memory."""
+        if isinstance(self.source, PlaneMesh):
+            return checked_grid(self.source.prisms(self.theta, self.layers))
+        return read_grid(self.source, self.theta, self.layers)
 
 
 @lru_cache(maxsize=2)
-def _mesh_problem(path: str, _changed: int, parallel: bool, refine: bool) -> PrismProblem:
-    """Return the problem on the mesh of a file that was changed at a time, in ns."""
+def _mesh_problem(read: _Read, parallel: bool, refine: bool) -> PrismProblem:
+    """Return the problem on a mesh."""
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    read = partial(read_grid, path)
-    grid = from_first_rank(read) if parallel else read()
+    grid = from_first_rank(read.grid) if parallel else read.grid()
     return PrismProblem(refined(grid) if refine else grid, comm)
 
 

@@ -16,7 +16,7 @@ from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.prism.cell_fields import CellFields
 from alphacut.rve.prism.fields import fields_of_solution
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.prism.own_mesh import MeshModel, mesh_law
+from alphacut.rve.prism.own_mesh import MeshModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.form import strain
 from alphacut.rve.solver.krylov import Solutions, SolverOptions, require_petsc, solve
@@ -85,7 +85,11 @@ class ProductSpace:
         function.x.array[:] = self._problem.elimination.displacements(vector).ravel()
 
     def fields(
-        self, u: fem.Function, stress: Mapping[str, ufl.core.expr.Expr], strain: Sequence[float]
+        self,
+        u: fem.Function,
+        stress: Mapping[str, ufl.core.expr.Expr],
+        strain: Sequence[float],
+        scalars: Mapping[str, ufl.core.expr.Expr] | None = None,
     ) -> CellFields:
         """Return displacements and stresses at the nodes for a solution, to be drawn or written.
 
@@ -94,16 +98,19 @@ class ProductSpace:
                 side; it is without the displacements of the macroscopic strain.
             stress: (σ11, σ22, σ12) of each phase by its name, UFL expressions of shape (3,), in Pa.
             strain: The macroscopic strain (ε11, ε22, 2 ε12).
+            scalars: Further fields by name, as scalar UFL expressions of `u` and of the place;
+                files have them by these names.
 
         Returns:
-            Total displacements, and stresses as means over the prisms of one phase that meet in a
-            node.
+            Total displacements, and stresses and scalars as means over the prisms of one phase that
+            meet in a node.
 
         Raises:
             RefusedError: The names in `stress` are not exactly those of the phases, or an
-                expression has not three components.
+                expression has not three components, or of `scalars` not one.
         """
-        return fields_of_solution(self._problem, u, stress, np.asarray(strain, float))
+        load = np.asarray(strain, float)
+        return fields_of_solution(self._problem, u, stress, load, scalars or {})
 
     def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
         """Preconditioner along θ for `PC.setPythonContext`; the form has the density as factor."""
@@ -218,13 +225,11 @@ def _separate_problem(
         "give the particle as an outline, or mesh the particles",
     )
     if isinstance(model, MeshModel):
-        cached = model.cached_problem()
-        radius_map: RadiusMap = mesh_law(cached.grid, law)
+        cached = model.moved_problem(law)
     else:
         cached = model.problem(cast("RadiusMap", law))
-        radius_map = cached.map
     problem = PrismProblem(cached.grid, cached.comm)
-    problem.move(radius_map)
+    problem.move(cached.map)
     return problem
 
 

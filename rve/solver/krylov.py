@@ -25,13 +25,23 @@ from alphacut.rve.solver.theta_preconditioner import PREFIX, ThetaPreconditioner
 class SolverOptions:
     """The default solver with the PETSc options, without prefix, that override it.
 
-    Those of the environment, PETSC_OPTIONS, come after the default and before `overrides`.
+    Those of the environment, PETSC_OPTIONS, come after the default and before `overrides`. A value
+    of "" stands for an option without one.
     """
 
     overrides: Mapping[str, str] = field(default_factory=dict)
     environment: Mapping[str, str] = field(
-        default_factory=lambda: dict(PETSc.Options(PREFIX).getAll())
+        # petsc4py takes the next option for the value of one without a value.
+        default_factory=lambda: {
+            name: "" if re.match("-[A-Za-z]", value) else value
+            for name, value in PETSc.Options(PREFIX).getAll().items()
+        }
     )
+
+    @property
+    def chosen(self) -> dict[str, str]:
+        """Values of the options that override the default solver, by their names without prefix."""
+        return {**self.environment, **self.overrides}
 
     @property
     def all(self) -> dict[str, str]:
@@ -39,7 +49,8 @@ class SolverOptions:
 
         The default solver (conjugate gradients to a relative residual of 1e-8, preconditioned along
         θ) is overridden by the environment, and both by `overrides`. Options that print and have no
-        value get standard error as their value. The default limit of iterations is 500 with the
+        value get standard error as their value, and others without a value "true", which PETSc
+        refuses where it expects a number or a name. The default limit of iterations is 500 with the
         preconditioner along θ, and 5000 with others.
         """
         defaults = {
@@ -48,13 +59,13 @@ class SolverOptions:
             "ksp_norm_type": "unpreconditioned",
             "pc_type": "python",
         }
-        chosen = defaults | dict(self.environment) | dict(self.overrides)
+        chosen = defaults | self.chosen
         # Options that make PETSc print do so to standard error if they have no value: tables of
         # results go to standard output.
         prints = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
         for name, value in chosen.items():
-            if prints.search(name) and not value:
-                chosen[name] = "ascii:stderr"
+            if not value:
+                chosen[name] = "ascii:stderr" if prints.search(name) else "true"
         # The preconditioner along θ takes tens of iterations at most, others may take hundreds.
         max_iterations = 500 if chosen["pc_type"] == "python" else 5000
         return {"ksp_max_it": str(max_iterations), **chosen}
@@ -71,9 +82,8 @@ class SolverOptions:
 
     def __str__(self) -> str:
         """Return "theta" for the preconditioner along θ, and the options that were changed."""
-        changes = {**self.environment, **self.overrides}
         words = ["theta"] if self.by_levels else []
-        words += [f"-{PREFIX}{name} {value}".strip() for name, value in changes.items()]
+        words += [f"-{PREFIX}{name} {value}".strip() for name, value in self.chosen.items()]
         return " ".join(words)
 
 
@@ -255,22 +265,25 @@ def in_database(options: SolverOptions) -> Iterator[None]:
         options: The default solver, the options of the environment, and the overrides.
 
     Raises:
-        RefusedError: PETSc raised an error in the block and there are overrides, or it has not used
-            one of the overrides in the block.
+        RefusedError: PETSc raised an error in the block and options override the default, or it has
+            not used one of these options.
         ConvergenceError: PETSc raised an error in the block though no option overrides the default.
     """
     database = PETSc.Options(PREFIX)
     environment = options.environment
-    from_environment = environment.keys() - options.overrides.keys()
-    added = {name: value for name, value in options.all.items() if name not in from_environment}
+    chosen = options.chosen
+    added = {name: value for name, value in options.all.items() if environment.get(name) != value}
     for name, value in added.items():
         database[name] = value
     try:
         yield
-        unused = [name for name in options.overrides if not option_is_used(PREFIX + name)]
+        unused = [name for name in chosen if not option_is_used(PREFIX + name)]
     except PETSc.Error as failure:
         reason = str(failure).splitlines()[-1].strip()
-        if options.overrides:
+        for name in chosen:
+            if options.all[name] == "true" != chosen[name]:
+                raise RefusedError(f"value of -{PREFIX}{name}", None, "", reason) from failure
+        if chosen:
             if "norm type" in reason:
                 reason += f"; say -{PREFIX}ksp_norm_type preconditioned, or none, beside it"
             raise RefusedError("PETSc", str(options), "what PETSc takes", reason) from failure
@@ -282,6 +295,6 @@ def in_database(options: SolverOptions) -> Iterator[None]:
             database[name] = environment[name]
             database.getString(name)  # read, so that PETSc does not call it unused
     if unused:
-        value = options.overrides[unused[0]]
+        value = chosen[unused[0]]
         option = f"-{PREFIX}{unused[0]}"
         raise RefusedError(option, value, "options that PETSc uses", "check its spelling")

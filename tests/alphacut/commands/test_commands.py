@@ -13,6 +13,7 @@ import pytest
 
 from alphacut import main
 from alphacut.commands import case_text, required, verify
+from alphacut.commands.options import split_petsc
 from alphacut.frame.verification import self_test
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FailedError, RefusedError
@@ -160,6 +161,8 @@ REFUSED = [
     ("check case.toml --set frame.masses=", "frame.masses[1] is empty; allowed: mass above 0"),
     ("check case.toml -rve_ksp_rtol 1e-9", "-rve_ksp_rtol"),
     ("run case.toml -rve_ksp_rtol 1e-9", "method prism"),
+    ("run case.toml -options_file none.txt", "none.txt is no such file"),
+    ("run case.toml -options_file", "option is -options_file"),
     ("check case.toml --set frame.masses=[1_0] t", "does not begin with a number"),
     ("check case.toml --set frame.lengths=" + "[" * 3000, "too long"),
     ("check case.toml --set frame.lengths=1e308 mm", "magnitudes"),
@@ -184,6 +187,15 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
     assert len(err) < 1100
     assert err[:-1].isprintable()
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_a_file_may_hold_options_of_petsc_and_help_names_them(tmp_path, capfd):
+    (tmp_path / "petsc.txt").write_text("# multigrid\n-rve_pc_type gamg  # algebraic\n-rve_x\n")
+    line = split_petsc(["cell", "-options_file", str(tmp_path / "petsc.txt"), "case.toml"])
+    assert line == (["cell", "case.toml"], {"pc_type": "gamg", "x": ""})
+    with pytest.raises(SystemExit):
+        main(["cell", "--help"])
+    assert "-rve_ksp_type gmres" in capfd.readouterr().out
 
 
 def test_debug_shows_the_traceback_and_what_is_done(tmp_path, capfd):

@@ -267,15 +267,6 @@ def test_a_volume_without_a_name_of_other_elements_or_in_parts_is_refused(
         read()
 
 
-def test_a_mesh_of_plane_triangles_is_told_to_make_prisms(tmp_path, gmsh):
-    surface = square.surfaces(0.5, 0.0, CIRCLE)[0]
-    gmsh.model.addPhysicalGroup(2, [surface], name="matrix")
-    gmsh.model.mesh.generate(2)
-    gmsh.write(str(tmp_path / "cell.msh"))
-    with pytest.raises(FailedError, match=r"the mesh is plane: .*; make prisms of the triangles"):
-        MeshModel(tmp_path / "cell.msh").cached_problem()
-
-
 def test_the_rule_of_prisms_prints_in_full_since_forms_are_told_apart_by_that():
     points, weights = prism_rule()
     assert "..." not in f"{points} {weights}"

@@ -72,3 +72,30 @@ def test_a_solution_of_ones_own_law_has_the_fields_of_the_linear_model(tmp_path)
         cell.fields(u, {"matrix": stress["matrix"]}, load)
     with refuses("shape of the stress of matrix"):
         cell.fields(u, {**stress, "matrix": ufl.as_matrix([[1.0]])}, load)
+
+
+@pytest.mark.parametrize("ending", ["vtu", "xdmf"])
+def test_a_scalar_of_the_user_is_written_and_read_back(ending, tmp_path):
+    """A polynomial of the place at each node, and a field that jumps between phases."""
+    meshio = pytest.importorskip("meshio")
+    cell = ProductSpace(MeshModel(MESHES / "two-particles.msh"), LAW)
+    x1, x2, theta = ufl.SpatialCoordinate(cell.space.mesh)
+    u = fem.Function(cell.space)
+    u.interpolate(lambda x: np.array([x[0] ** 2, x[1]]))
+    stress = dict.fromkeys(cell.dx, cell.strain(u))
+    scalars = {"rising": x1 + 2 * x2 * theta, "dilatation": cell.strain(u)[0] + cell.strain(u)[1]}
+    fields = cell.fields(u, stress, (0.0, 0.0, 0.0), scalars)
+    path = tmp_path / f"cell.{ending}"
+    written = fields.write(path)
+    mesh = meshio.read(path)
+    count = len(fields.points)
+    assert len(mesh.points) == written > count
+    a, b, c = mesh.points[:count].T
+    assert mesh.point_data["rising"][:count] == pytest.approx(a + 2 * b * c, abs=1e-12)
+    # its curved elements represent x1² only nearly
+    assert mesh.point_data["dilatation"][:count] == pytest.approx(2 * a + 1, abs=0.05)
+    assert cell.fields(u, stress, (0, 0, 0)).write(tmp_path / "cell.msh") > 0
+    with refuses("shape of the scalar strain"):
+        cell.fields(u, stress, (0, 0, 0), {"strain": cell.strain(u)})
+    with refuses("shape of the scalar number"):
+        cell.fields(u, stress, (0, 0, 0), {"number": 1.0})

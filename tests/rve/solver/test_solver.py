@@ -12,6 +12,7 @@ from alphacut.rve import Phase, PrismModel
 from alphacut.rve.fenicsx import MPI, option_is_used
 from alphacut.rve.solver.numbering import Elimination
 from alphacut.stochastic import HermiteMap
+from tests.refused import refuses
 
 CRISP = HermiteMap(0.5, 0, 0.5, 0)
 PHASES = Phase(20e9).stiffness, Phase(80e9).stiffness
@@ -85,6 +86,32 @@ def test_options_of_the_caller_hold_and_stay(problem):
     finally:
         database.delValue("rve_ksp_rtol")
         database.delValue("rve_pc_type")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "key"),
+    [("ksp_tpye", "gmres", "-rve_ksp_tpye"), ("ksp_rtol", None, "value of -rve_ksp_rtol")],
+)
+@pytest.mark.parametrize("by_environment", [True, False])
+def test_options_that_petsc_does_not_use_or_that_lack_a_value_are_refused(
+    name, value, key, by_environment, problem
+):
+    """Where PETSC_OPTIONS puts them as on the command line."""
+    database = PETSc.Options()
+    if by_environment:
+        database[f"rve_{name}"] = value
+    chosen = {} if by_environment else {name: value or ""}
+    try:
+        with refuses(key):
+            problem.solver(options(**chosen), problem.matrix)
+        assert database.hasName(f"rve_{name}") == by_environment
+    finally:
+        database.delValue(f"rve_{name}")
+
+
+def test_an_option_may_be_a_flag_without_a_value(problem):
+    ksp = problem.solver(options(ksp_error_if_not_converged=""), problem.matrix)
+    assert ksp.getErrorIfNotConverged()
 
 
 def test_a_matrix_refuses_a_place_outside_of_its_pattern():
