@@ -43,7 +43,7 @@ def noise(rng: np.random.Generator, shape: tuple[int, ...], length: float, poros
 
 def cut(image: Array, parts: int) -> Array:
     """Return an image whose pixels or voxels are cut into parts along each axis."""
-    return np.kron(image, np.ones((parts,) * image.ndim))
+    return np.asarray(np.kron(image, np.ones((parts,) * image.ndim)))
 
 
 def extrapolated(coarse: Array, middle: Array, fine: Array) -> Array:
@@ -147,7 +147,7 @@ def mirrored(seed: int, size: int = 12) -> None:
     rng = np.random.default_rng(seed)
     print(f"seed {seed}\nporosity  two-point  lower    upper    time of lower over upper")
     for porosity in (0.3, 0.4, 0.5, 0.6):
-        image = 1.0 * noise(rng, (size,) * 3, 1.5, porosity)
+        image: Array = noise(rng, (size,) * 3, 1.5, porosity).astype(float)
         for axis in range(3):
             image = np.concatenate([image, np.flip(image, axis)], axis)
         low, high = solve_conduction(image).bounds.components()[0]

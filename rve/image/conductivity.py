@@ -112,7 +112,8 @@ class FuzzyImageConductivity(FuzzyImage):
         """
         allowed = "insulators, of conductivity 0, beside one phase that conducts"
         require(self.straight is not None, "conductivities", "of several conductors", allowed)
-        found = {}
+        assert self.straight is not None
+        found: dict[str, Array] = {}
         for axis in "xyz"[: len(self.lengths)]:
             # k rises with k₀ in proportion: each bound of k belongs to one end of k₀.
             with np.errstate(divide="ignore"):

@@ -257,7 +257,7 @@ class ImageStudy(Generic[Phases]):
     @property
     def percolation(self) -> Percolation | None:
         """What the phases outside pores connect at nominal values; None without pores."""
-        is_solid = (self.images(None, None).lower > 0).all(axis=0)
+        is_solid = np.asarray((self.images(None, None).lower > 0).all(axis=0))
         return None if is_solid.all() else Percolation.of_mask(is_solid)
 
     def require_solid(self, alpha: Sequence[float]) -> None:
