@@ -14,6 +14,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import require_text
+from alphacut.base.stated import METRES
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 """A number in plain ASCII digits."""
@@ -150,21 +151,16 @@ def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
     Raises:
         RefusedError: There is no such column, or its unit is missing or unknown.
     """
-    # Metres in a unit. The micro sign and the Greek letter look alike, and both are in use.
-    metres = {
-        "m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "μm": 1e-6, "um": 1e-6,
-        "micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.3048,
-    }  # fmt: skip
     factors = {name: 1.0}
     if name == "r":
         factors = {"r": 1.0, "radius": 1.0, "d": 0.5, "diameter": 0.5, "size": 0.5}
     for column, cell in enumerate(header):
         # The name of the column, and its unit in round or square brackets.
         match = re.fullmatch(r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
-        if match and match[1].lower() in factors and match[2] in metres:
-            return column, metres[match[2]] * factors[match[1].lower()]
+        if match and match[1].lower() in factors and match[2] in METRES:
+            return column, METRES[match[2]] * factors[match[1].lower()]
     allowed = f"a column '{name} [mm]'"
     if name == "r":
         allowed += " or 'd [mm]'"
-    units = f"units are {', '.join(metres)}"
+    units = f"units are {', '.join(METRES)}"
     raise RefusedError(f"{path.name}, header", ",".join(header)[:80], allowed, units)

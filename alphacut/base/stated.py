@@ -13,6 +13,13 @@ from math import isclose
 
 from alphacut.base.errors import RefusedError, require
 
+METRES = {
+    "pm": 1e-12, "å": 1e-10, "angstrom": 1e-10, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6,
+    "micron": 1e-6, "microns": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3,
+    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
+}  # fmt: skip
+"""Metres in a unit of length, in small letters. The micro sign and the Greek letter look alike."""
+
 
 @dataclass(frozen=True)
 class Stated:

@@ -384,6 +384,9 @@ class ImageCell(Section):
     """side of a pixel, or its width and height"""
     voxel: OneOrMany[Length] | None = None
     """side of a voxel, or those along x, y and z, in place of pixel: the image is a volume"""
+    override: list[Literal["voxel"]] = Field(
+        default=[], description="what a volume states wrongly: that of the case is taken"
+    )
     threshold: tuple[Number, ...] | None = None
     """grey value from which on a pixel is of the next phase"""
     labels: tuple[Annotated[float, Quantity()], ...] | None = None
@@ -474,11 +477,6 @@ class ImageCell(Section):
         if len(lengths) == 1:
             return lengths * self.dimension
         return lengths[::-1]  # as the axes of arrays
-
-    @property
-    def sides(self) -> tuple[float, ...]:
-        """The same over the side along x."""
-        return tuple(length / self.lengths[-1] for length in self.lengths)
 
 
 def _cell_kind(table: Mapping[str, object]) -> str:

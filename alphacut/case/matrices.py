@@ -81,7 +81,8 @@ def _array(file: str, info: ValidationInfo) -> Array:
     # Pydantic leaves refused keys out: without names the number of rows is not judged.
     unknowns = info.data.get("unknowns", ())
     rows = len(unknowns) or MAX_ROWS
-    array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns)
+    override = info.data.get("override", [])
+    array = read_matrix(path, name=member, max_rows=rows, unknowns=unknowns, override=override)
     if unknowns:
         names = unknowns
         held: tuple[str, ...] = ()
@@ -298,6 +299,9 @@ class MatricesSection(StructureSection):
     affine: bool = False
     """whether matrices of exports are known to be affine in their parameters: then two exports for
     one parameter are enough, and none tells whether it is so"""
+    override: list[Literal["unit"]] = Field(
+        default=[], description="what comments of files state wrongly: SI units are taken"
+    )
     mass: Terms = Field(
         default=(), description="pairs [factor, file] of M, or exports; none for stage static alone"
     )

@@ -129,6 +129,10 @@ class Identify(Section):
 
     measured: CaseFile
     """CSV file mode,frequency [Hz],q1,q2 …, or a universal file"""
+    frequency_unit: str = Field(default="", description="of a CSV file that states none, as Hz")
+    override: list[Literal["frequency_unit"]] = Field(
+        default=[], description="what the file states wrongly: that of the case is taken"
+    )
     floors: dict[str, Annotated[int, Quantity(minimum=1, is_integer=True)]] = Field(
         default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
     )

@@ -64,6 +64,8 @@ def _arguments(section: Identify, structure: Structure, alpha: tuple[float, ...]
             frequency_deviation=section.frequency_deviation,
             shape_deviation=section.shape_deviation,
             floors=section.floors,
+            frequency_unit=section.frequency_unit,
+            override=section.override,
         )
     except RefusedError as error:
         # The reader names arguments, which are keys of the section, or places in the file.

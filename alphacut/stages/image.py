@@ -109,7 +109,7 @@ def study_of(cell: ImageCell) -> ImageStudy[ImagePhase]:
     Raises:
         RefusedError: The image is not read, or the phases do not fit it.
     """
-    image = GreyImage(read_grid(cell.image, cell.sides), cell.lengths)
+    image = GreyImage(read_grid(cell.image, cell.lengths, cell.override), cell.lengths)
     # Either all phases have a loss factor or none has.
     losses = cell.losses or (None,) * len(cell.pairs)
     phases = [

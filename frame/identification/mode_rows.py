@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.csv_columns import fields, number
-from alphacut.base.errors import require
+from alphacut.base.csv_columns import fields, number, text_of
+from alphacut.base.errors import RefusedError, require
+from alphacut.base.stated import Stated, settled
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +38,26 @@ class ModeRows:
     shape_deviation: float | None = None
 
 
-def mode_rows(path: Path) -> tuple[ModeRows, ...]:
+# Hz in a unit of frequency, in small letters; 0 of angular frequencies and periods.
+HERTZ = {
+    "hz": 1.0, "khz": 1e3, "hertz": 1.0, "cps": 1.0, "cycles/s": 1.0, "cycles/sec": 1.0,
+    "cycle/s": 1.0, "cycles per second": 1.0, "rad/s": 0.0, "rad/sec": 0.0, "rpm": 0.0,
+    "1/min": 0.0, "radians per second": 0.0, "radians/second": 0.0, "rad s-1": 0.0, "rad*hz": 0.0,
+}  # fmt: skip
+
+
+def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tuple[ModeRows, ...]:
     """Read the measurements of each mode, by rising number, from a CSV file.
 
     The header is ``mode,frequency [Hz],q1,q2`` with the floors that were measured, in any order of
     the columns. Each row is one measurement of a mode, and a mode may have several. Standard
     deviations may stand in the columns ``frequency_std [Hz]`` and ``shape_std``. An empty cell
-    means that the amplitude was not measured.
+    means that the amplitude was not measured. The unit of the frequencies may stand in a comment.
+
+    Args:
+        path: The file.
+        unit: Unit of the frequencies that the user says; empty where the file states it.
+        override: "frequency_unit", where the file states a wrong one.
 
     Returns:
         For each mode its number; its frequencies in Hz, one for each row; its amplitudes by floor,
@@ -51,24 +66,45 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         its mean, that of the amplitudes to the largest mean amplitude.
 
     Raises:
-        RefusedError: The file is missing, its header or a row is wrong, a mode has an amplitude
-            in some rows and not in others, or all amplitudes of a mode are zero.
+        RefusedError: The file is missing, its header or a row is wrong; it states no unit of the
+            frequencies, or angular frequencies or periods; a mode has an amplitude in some rows and
+            not in others; or all amplitudes of a mode are zero.
     """
-    (_, header), *rows = fields(path)
+    (head_row, header), *rows = fields(path)
+    known = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "mode": "mode"}
     columns: dict[str, int] = {}
+    units: dict[str, str] = {}
     for column, cell in enumerate(header):
-        title = re.fullmatch(r"\s*(mode|shape_std|q[1-9]\d*|frequency(_std)?\s*(\[Hz\])?)\s*", cell)
-        name = ""  # of an unknown column
-        if title is not None:
-            name = title[1].partition("[")[0].strip()
+        title = re.fullmatch(r"\s*(\w*?)(?:[\s,_]*[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
+        name = title[1] if title else cell
+        by_word = re.fullmatch(r"(\w+?)[_ ](k?hz)", name.strip(), re.IGNORECASE)
+        if by_word:
+            name = by_word[1]
+        name = known.get(name.lower(), name)
         columns[name] = column
-    is_complete = {"mode", "frequency"} <= columns.keys() and len(columns) == len(header)
+        units[name] = by_word[2] if by_word else (title[2] or "") if title else ""
+    place = f"{path.name}, header"
+    shown = ",".join(header)[:80]
+    words = r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation)\b|ω|^T\b"
+    other = next((cell for cell in header if re.search(words, cell.strip())), "")
+    cure = "write frequencies in Hz: ω/(2π), or 1/T"
+    require(not other, place, shown, "frequencies, not angular ones or periods", cure)
     allowed = (
         "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
         " shape_std may stand before q1"
     )
-    is_known = is_complete and "" not in columns
-    require(is_known, f"{path.name}, header", ",".join(header)[:80], allowed)
+    is_known = {"mode", "frequency"} <= columns.keys() and len(columns) == len(header)
+    is_known = is_known and all(
+        re.fullmatch(r"mode|shape_std|q[1-9]\d*|frequency(_std)?", name) for name in columns
+    )
+    require(is_known, place, shown, allowed)
+    stated = [Stated(_hertz_of(place, x), x, place) for k, x in units.items() if k[:1] == "f" and x]
+    stated += _units_in_comments(path, head_row)
+    said = Stated(_hertz_of("frequency_unit", unit), unit) if unit else None
+    found = settled(path.name, "frequency_unit", stated, said, override=override)
+    cure = "write the unit into the header, frequency [Hz], or say frequency_unit"
+    if found is None:
+        raise RefusedError(place, f"{shown}, without a unit", "frequencies with a unit", cure)
 
     # Frequencies and deviations are positive; amplitudes have either sign.
     positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
@@ -78,6 +114,8 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         for column in range(len(header)):
             if cells[column : column + 1] != [""]:
                 values[column] = number(path, row, cells, column)
+        for name in {"frequency", "frequency_std"} & columns.keys():
+            values[columns[name]] *= found.value
         mode = values[columns["mode"]]
         fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         allowed = "a mode from 1, frequency and deviations above 0"
@@ -87,6 +125,27 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     return tuple(
         _measurements_of_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes)
     )
+
+
+def _hertz_of(place: str, unit: str) -> float:
+    """Return Hz in a unit of frequency, 0 of angular frequencies; refuse others."""
+    hertz = HERTZ.get(unit.strip().lower())
+    if not hertz:
+        cure = "divide by 2π, or by 60" if hertz == 0 else ""
+        raise RefusedError(place, f"in {unit}", "frequencies in Hz, kHz or cycles/s", cure)
+    return hertz
+
+
+def _units_in_comments(path: Path, head_row: int) -> Iterator[Stated]:
+    """Yield units of frequency in the comments of a file; angular ones and periods are refused."""
+    pattern = "|".join(re.escape(unit) for unit in sorted(HERTZ, key=len, reverse=True))
+    for row, line in enumerate(text_of(path).splitlines(), 1):
+        if line.startswith("#") and row != head_row:
+            found = re.search(rf"(?<![\w/.])(?:{pattern})(?!\w)", line, re.IGNORECASE)
+            place = f"{path.name}, line {row}"
+            is_sampling = re.search(r"(?i)sampl|filter|band|resolution|\bdf\b", line)
+            if found and not is_sampling:
+                yield Stated(_hertz_of(place, found[0]), found[0], f"line {row}")
 
 
 def _measurements_of_mode(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from alphacut.base.errors import checked_number, path_of, require
+from alphacut.base.stated import require_overrides
 from alphacut.frame.identification.mode_rows import mode_rows
 from alphacut.frame.identification.modes import MeasuredMode, measured_mode
 from alphacut.frame.identification.uff_modes import uff_mode_rows
@@ -17,13 +18,15 @@ def read_modes(
     frequency_deviation: float | None = None,
     shape_deviation: float | None = None,
     floors: Mapping[str, int] | None = None,
+    frequency_unit: str = "",
+    override: Sequence[str] = (),
 ) -> tuple[MeasuredMode, ...]:
     """Read the measured natural modes of a frame from a CSV file or a universal file.
 
     A CSV file has the header ``mode,frequency [Hz],q1,q2`` with the floors that were measured, and
     a row for each measurement of a mode. ``frequency_std [Hz]`` and ``shape_std``, the standard
     deviations of an operational modal analysis, may stand before ``q1``. A universal file (ending
-    .uff or .unv) has the modes in data sets 55.
+    .uff or .unv) has the modes in data sets 55 or 2414.
 
     Args:
         path: The file.
@@ -33,6 +36,8 @@ def read_modes(
             likewise.
         floors: For a universal file, the floor of each unknown that was measured, by
             NODE.DIRECTION, as ``{"12.x": 1}``.
+        frequency_unit: Unit of the frequencies of a CSV file that states none, as "Hz".
+        override: ``["frequency_unit"]`` where the file states a wrong one.
 
     Returns:
         The modes by rising number, each with its mean frequency and mean amplitudes as fuzzy
@@ -53,13 +58,14 @@ def read_modes(
     for key, deviation in deviations.items():
         if deviation is not None:
             checked_number(key, deviation, positive=True)
+    require_overrides(override, ("frequency_unit",))
     file = path_of("path", path)
     if file.suffix.lower() in (".uff", ".unv"):
         require(bool(floors), "floors", None, "the floors of its unknowns")
         found = uff_mode_rows(file, floors or {})
     else:
         require(not floors, "floors", floors, "left out beside a CSV file")
-        found = mode_rows(file)
+        found = mode_rows(file, frequency_unit, override)
     modes = []
     for rows in found:
         mode = measured_mode(

@@ -19,7 +19,7 @@ from alphacut.frame.records.uff import COMPLEX, DIRECTIONS, data_sets, floats
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
     """Read the modes of a universal file, by rising number, with one measurement each.
 
-    They stand in data sets 55 of normal or complex modes; other data sets are passed over. If only
+    They stand in data sets 55 or 2414 of normal or complex modes; others are passed over. If only
     one floor was measured, the mode has no shape.
 
     Args:
@@ -35,9 +35,13 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
     require(is_clear, "floors", floors, "one unknown for each floor")
     content = read_bytes(path)
     try:
-        sets = [_parse_shape(found.head, found.lines) for found in data_sets(content, 55)]
+        sets = [
+            _parse_shape(found.head, found.lines)
+            for number in (55, 2414)
+            for found in data_sets(content, number)
+        ]
     except (ValueError, IndexError) as error:
-        allowed = "data sets 55 of a universal file"
+        allowed = "data sets 55 or 2414 of a universal file"
         raise RefusedError(path.name, str(error)[:80], allowed) from None
     modes: dict[int, ModeRows] = {}
     for found in sets:
@@ -53,12 +57,12 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         if len(shape) < 2:
             shape = {}  # the amplitude of one floor alone says nothing
         modes[mode] = ModeRows(mode, np.array([hertz]), shape)
-    require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
+    require(bool(modes), path.name, "without a mode", "a data set 55 or 2414 of a mode")
     return tuple(modes[number] for number in sorted(modes))
 
 
 class UffShape(NamedTuple):
-    """A mode shape of a data set 55.
+    """A mode shape of a data set 55 or 2414.
 
     Args:
         mode: Number of the mode.
@@ -72,13 +76,13 @@ class UffShape(NamedTuple):
 
 
 def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
-    """Return the mode shape of a data set 55, or None for a data set of another analysis.
+    """Return the mode shape of a data set 55 or 2414, or None for a data set of another analysis.
 
     The frequency of a complex mode is |s| / 2π in Hz with its eigenvalue s. Amplitudes are complex
     numbers named by node and direction, such as "12.x"; real ones have no imaginary part.
 
     Args:
-        head: The eight lines of the head.
+        head: The lines of the head, 8 of a data set 55, 13 of a data set 2414.
         values: The lines below the head: for each node a line that begins with its number, and
             lines with six numbers each. Empty lines are passed over.
 
@@ -90,19 +94,23 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
             given twice.
         IndexError: A line of the head has too few words.
     """
-    # The sixth line has six codes: of the model, the analysis (2 of normal modes, 3 and 7 of
+    # A data set 2414 has its codes, the number of the mode, the frequency and the eigenvalue in
+    # other lines, and each in a line of its own.
+    is_2414 = len(head) > 8
+    codes, counts, numbers = (8, 9, 11) if is_2414 else (5, 6, 7)
+    # The line of codes has six: of the model, the analysis (2 of normal modes, 3 and 7 of
     # complex modes of first and second order), the kind of the data (as of a displacement in three
     # directions), its meaning, the type of its numbers, and their count at a node.
-    _, analysis, _, _, kind, size = (int(word) for word in head[5].split()[:6])
+    _, analysis, _, _, kind, size = (int(word) for word in head[codes].split()[:6])
     is_normal = analysis == 2
     is_complex = analysis in (3, 7)
     if not (is_normal or is_complex):
         return None
-    numbers_of_head = floats(head[7])
-    hertz = numbers_of_head[0]
+    hertz = floats(head[numbers])[1 if is_2414 else 0]
     if is_complex:
         # The first two numbers are the complex eigenvalue s; its frequency is |s| / 2π.
-        hertz = np.hypot(numbers_of_head[0], numbers_of_head[1]) / (2 * np.pi)
+        real, imaginary = floats(head[12 if is_2414 else 7])[:2]
+        hertz = np.hypot(real, imaginary) / (2 * np.pi)
 
     # Each node has a line with its number, and then its numbers, six in a line.
     numbers_of_value = 2 if kind in COMPLEX else 1
@@ -120,8 +128,9 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
         # A node has three or six directions.
         for axis, k in zip(DIRECTIONS, range(0, numbers_of_node, numbers_of_value), strict=False):
             amplitudes[f"{node}.{axis}"] = complex(*numbers[k : k + numbers_of_value])
-    # The seventh line has the counts of its codes and of its numbers, the load case and the mode.
-    mode = int(head[6].split()[3])
+    # The seventh line of a data set 55 has the counts of its codes and of its numbers, the load
+    # case and the mode; the tenth of a data set 2414 has the mode as its sixth number.
+    mode = int(head[counts].split()[5 if is_2414 else 3])
     return UffShape(mode, hertz, amplitudes)
 
 

@@ -166,7 +166,7 @@ class DataSet:
     """A data set of a universal file.
 
     Args:
-        head: Lines of its head: 11 of a data set 58, 8 of a data set 55.
+        head: Lines of its head: 11 of a data set 58, 8 of a data set 55, 13 of a data set 2414.
         lines: Lines of its values; none where these are bytes.
         content: The values of a data set 58 in bytes; None of one in text.
         byte_order: Order of these bytes as NumPy names it, < or >.
@@ -186,10 +186,10 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
 
     Args:
         content: The file.
-        number: 55 (modes and other data at nodes) or 58 (functions, such as time histories).
+        number: 55 or 2414 (modes and other data at nodes), or 58 (functions, as time histories).
 
     Yields:
-        The data set: `head`, the 8 (55) or 11 (58) lines of its head, and `lines`, the lines of its
+        The data set: `head`, the 8 (55), 11 (58) or 13 (2414) lines of its head, and `lines`, its
         values. A binary one has no lines; the bytes of its values are `content`, which is None
         otherwise, and their `byte_order` is ">" or "<". If the file is cut off, values are missing.
 
@@ -198,7 +198,7 @@ def data_sets(content: bytes, number: int) -> Iterator[DataSet]:
             not count its bytes.
         KeyError: `number` is another one.
     """
-    head_lines = {55: 8, 58: 11}[number]
+    head_lines = {55: 8, 58: 11, 2414: 13}[number]
     file = BytesIO(content)
     while line := file.readline():
         if line.strip() != b"-1":

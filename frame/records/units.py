@@ -5,13 +5,8 @@ from __future__ import annotations
 import re
 
 from alphacut.base.number_text import STANDARD_GRAVITY
+from alphacut.base.stated import METRES
 
-# Metres in a unit of length, in small letters.
-METRES = {
-    "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0,
-    "km": 1e3, "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "ft": 0.3048, "foot": 0.3048,
-    "feet": 0.3048,
-}  # fmt: skip
 # Seconds in a unit of time.
 SECONDS = {
     "ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "msec": 1e-3, "s": 1.0, "sec": 1.0,

@@ -19,6 +19,7 @@ from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
 from alphacut.base.arrays import Array
 from alphacut.base.errors import RefusedError, cure_of, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
+from alphacut.base.stated import Stated, require_overrides, settled
 from alphacut.frame.structures.entry_lists import (
     NamedMatrix,
     chosen_place,
@@ -43,7 +44,12 @@ HELD_STIFFNESS = 1e35
 
 
 def read_matrix(
-    path: str | Path, *, name: str = "", max_rows: int = MAX_ROWS, unknowns: Sequence[str] = ()
+    path: str | Path,
+    *,
+    name: str = "",
+    max_rows: int = MAX_ROWS,
+    unknowns: Sequence[str] = (),
+    override: Sequence[str] = (),
 ) -> Array:
     """Read a matrix, as of masses or stiffnesses, from a file; a sparse one becomes dense.
 
@@ -59,20 +65,25 @@ def read_matrix(
             (`read_unknowns`). Unknowns that are left out are held, and their rows go; those that
             the file does not have are rows of zeros, as of unknowns without mass. A file without
             names is returned as it is.
+        override: ``["unit"]`` where a comment in the file states a wrong unit of its numbers.
 
     Returns:
-        The matrix, shape (n, m); or a vector, shape (n,), where the file has one.
+        The matrix, shape (n, m); or a vector, shape (n,), where the file has one. Its numbers are
+        those of the file, but where a comment states kN or MN with m, or t, they are turned to SI.
 
     Raises:
-        RefusedError: The file cannot be read, holds something else, or more than allowed; or it
-            names unknowns, and none of these.
+        RefusedError: The file cannot be read, holds something else, or more than allowed; it states
+            units whose numbers are no multiples of those in SI, as mm beside rotations; or it names
+            unknowns, and none of these.
 
     Example:
         >>> read_matrix("cases/plane-frame/stiffness1.mtx").shape
         (18, 18)
     """
+    require_overrides(override, ("unit",))
     file = path_of("path", path)
     array, names = _read_named(file, name, max_rows=max_rows)
+    factor = 1.0 if override else _stated_factor(file)
     if names and unknowns:
         array = _arranged(file.name, array, names, unknowns)
     shape = " × ".join(str(n) for n in array.shape)
@@ -91,7 +102,46 @@ def read_matrix(
             place += f", column {index[1] + 1}"
         cure = "write finite numbers there"
         raise RefusedError(file.name, f"{array[index]} at {place}", ALLOWED, cure)
-    return np.array(array, float)
+    return factor * np.array(array, float)
+
+
+def _stated_factor(path: Path) -> float:
+    """Return the factor to SI of the numbers of a matrix, by the units in comments of its file.
+
+    In a system of units with m and s the numbers of stiffnesses, dampings and masses differ from
+    those in SI by the factor of its force: of kN (with t) 1e3, of MN 1e6. Other lengths change
+    those of rotations and of displacements differently.
+
+    Raises:
+        RefusedError: A comment states other units, or two of different factors.
+    """
+    if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
+        return 1.0
+    stated = []
+    force = r"(?:[kM]?N|lbf?|kips?|kgf|tonf?|dyn)"
+    length = r"(?:mm|cm|m|in|ft|inch|inches)"
+    quotient = rf"(?<![\w./]){force}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{length}\b"
+    word = rf"(?<![\w./])(?:{force}|{length}|t|tonnes?|tons?|Mg|kg|g|slugs?)(?![\w.])"
+    for row, line in enumerate(path.read_text(encoding="latin-1").splitlines(), 1):
+        if not re.match(r"\s*(?:%|#|\*\*|\$|//)", line):
+            continue
+        units = re.findall(quotient, line)
+        if re.search(r"(?i)\bunits?\b|[\[(]", line):
+            units += re.findall(word, line)
+        for unit in units:
+            text = re.sub(r"\s", "", unit)
+            factors = {"k": 1e3, "M": 1e6, "N": 1.0, "t": 1e3}
+            is_metric = re.fullmatch(r"[kM]?N.*/m|[kM]?N|m|kg|t|tonnes?|Mg", text) is not None
+            cure = (
+                "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
+            )
+            place = f"{path.name}, line {row}"
+            require(is_metric, place, f"in {text}", "units of SI, or kN and t with m", cure)
+            if text != "m":
+                value = {"Mg": 1e3, "kg": 1.0}.get(text) or factors[text[0]]
+                stated.append(Stated(value, text, f"line {row}"))
+    found = settled(path.name, "unit", stated)
+    return found.value if found else 1.0
 
 
 def read_unknowns(path: str | Path, *, name: str = "", held: bool = False) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ as its file orders them: pages or slices along z, rows along y, columns along x.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +29,7 @@ SLICES = (".tif", ".tiff", ".png", ".bmp")
 """Endings of the pictures of a folder that are its slices."""
 
 
-def read_grid(path: Path, sides: Sequence[float]) -> Array:
+def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()) -> Array:
     """Return grey values or labels, shape (y, x) of a picture or (z, y, x) of a volume.
 
     A picture is read with its bottom row first, so that y points up. A volume stays as its file
@@ -38,13 +38,14 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
     Args:
         path: Picture (PNG, TIFF …) or ``.npy``; of a volume a TIFF stack, a folder of pictures in
             the order of the numbers in their names, ``.npy``, ``.mhd`` or ``.nhdr``/``.nrrd``.
-        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in any unit. With two
-            a picture is read, with three a volume.
+        sides: Sides of a pixel along (y, x) or of a voxel along (z, y, x), in m. With two a
+            picture is read, with three a volume.
+        override: "voxel", where a volume states wrong sides.
 
     Raises:
         RefusedError: The file cannot be read; its array is of another dimension, complex, shorter
             than 2 along an axis, not finite everywhere, or too large for memory; or the file states
-            pixels or voxels whose sides have other ratios.
+            other sides of a voxel, or other ratios of those of a pixel.
         MemoryError: The file did not fit into memory while it was read.
     """
     dimension = len(sides)
@@ -66,7 +67,7 @@ def read_grid(path: Path, sides: Sequence[float]) -> Array:
         elif dimension == 2:
             values = _read_picture(path, has_square_pixels=sides[0] == sides[1])
         else:
-            values = _read_volume(path, sides)
+            values = _read_volume(path, sides, override)
     except (RefusedError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
@@ -88,29 +89,30 @@ def files_of(path: Path) -> list[Path]:
     if path.is_dir():
         return sorted(file for file in path.iterdir() if file.suffix.lower() in SLICES)
     is_head = path.suffix.lower() in (".mhd", ".nhdr")
-    data = data_of_head(path) if is_head else path
-    return [path, data] if data != path and data.is_file() else [path]
+    data = data_of_head(path) if is_head else ()
+    return [path, *(file for file in data if file != path and file.is_file())]
 
 
-def _read_volume(path: Path, sides: Sequence[float]) -> Array:
+def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) -> Array:
     """Return the numbers of a volume along the axes (z, y, x), in the type of its file.
 
     Args:
         path: TIFF stack, folder of pictures, or head of MetaImage or NRRD.
-        sides: Sides of a voxel along (z, y, x), in any unit.
+        sides: Sides of a voxel along (z, y, x), in m.
+        override: "voxel", where the file states wrong ones.
 
     Raises:
         RefusedError: The file has another ending (the message says how to convert some), is too
-            large for memory, or states voxels whose sides have other ratios.
+            large for memory, or states other voxels.
         Exception: What readers raise of damaged files, of many kinds.
     """
     if path.is_dir():
         return _read_slices(path, has_square_pixels=sides[-1] == sides[-2])
     ending = path.suffix.lower()
     if ending in (".tif", ".tiff"):
-        return read_stack(path, sides)
+        return read_stack(path, sides, override)
     if ending in HEADS:
-        head = read_head(path, sides)
+        head = read_head(path, sides, override)
         require_memory(head.shape)
         return head.read()
     from_hdf5 = 'np.save("v.npy", h5py.File("v.h5")["data"])'

@@ -6,7 +6,7 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -29,8 +29,8 @@ class RawHead:
     fastest.
 
     Args:
-        data: File of the numbers, which may be that of the head.
-        offset: Bytes before the numbers; −1 if they are the last bytes of the file.
+        data: Files of the numbers one after another, of which one may be that of the head.
+        offset: Bytes before the numbers of each; −1 if they are the last bytes of the file.
         dtype: Type of a number, with its byte order.
         stored_shape: Numbers along each axis of the stored array.
         order: Axes of the stored array along z, y and x, shape (3,).
@@ -38,7 +38,7 @@ class RawHead:
         is_compressed: Whether the numbers are compressed by zlib or gzip.
     """
 
-    data: Path
+    data: tuple[Path, ...]
     offset: int
     dtype: np.dtype[np.generic]
     stored_shape: tuple[int, ...]
@@ -60,33 +60,35 @@ class RawHead:
             RefusedError: The file has another size than the head says, or cannot be unpacked.
             OSError: The file cannot be read.
         """
-        expected = math.prod(self.stored_shape) * self.dtype.itemsize
-        found = self.data.stat().st_size
+        expected = math.prod(self.stored_shape) * self.dtype.itemsize // len(self.data)
         sizes = " × ".join(map(str, self.stored_shape[::-1]))
-        name = self.data.name
         cure = "mend the sizes and the type in the head, or copy the data anew"
-        allowed = f"{expected} for {sizes} of {self.dtype}"
-        if self.is_compressed:
-            content = self._decompressed(expected)
-            require(len(content) == expected, name, f"{len(content)} bytes unpacked", allowed, cure)
-            values = np.frombuffer(content, self.dtype)
-        else:
-            offset = self.offset
+        parts = []
+        for file in self.data:
+            found = file.stat().st_size
+            allowed = f"{expected} for {sizes} of {self.dtype}"
+            if self.is_compressed:
+                content = self._decompressed(file, expected)
+                is_whole = len(content) == expected
+                require(is_whole, file.name, f"{len(content)} bytes unpacked", allowed, cure)
+                parts.append(np.frombuffer(content, self.dtype))
+                continue
             # A skip of −1 means that the numbers are the last bytes, whatever stands before them.
-            if offset < 0:
-                offset = found - expected
+            offset = self.offset if self.offset >= 0 else found - expected
             if offset > 0:
                 allowed = f"{offset} + {allowed}"
             is_whole = offset >= 0 and found == offset + expected
-            require(is_whole, name, f"{found} bytes", allowed, cure)
-            values = np.fromfile(self.data, self.dtype, offset=offset)
+            require(is_whole, file.name, f"{found} bytes", allowed, cure)
+            parts.append(np.fromfile(file, self.dtype, offset=offset))
+        values = np.concatenate(parts)
         values = values.reshape(self.stored_shape).astype(self.dtype.newbyteorder("="))
         return np.asarray(np.flip(values, self.reversed_axes).transpose(self.order))
 
-    def _decompressed(self, expected: int) -> bytes:
-        """Return the unpacked numbers of the file: one byte more than expected at most.
+    def _decompressed(self, file: Path, expected: int) -> bytes:
+        """Return the unpacked numbers of a file: one byte more than expected at most.
 
         Args:
+            file: The file.
             expected: Bytes that the head promises. A result of another length tells that it is
                 wrong.
 
@@ -94,23 +96,22 @@ class RawHead:
             RefusedError: The data is not compressed by gzip or zlib, or is damaged.
             OSError: The file cannot be read.
         """
-        with self.data.open("rb") as file:
-            file.seek(max(self.offset, 0))
-            packed = file.read()
+        packed = file.read_bytes()[max(self.offset, 0) :]
         # The limit stops a small file that would unpack to gigabytes.
         gzip_or_zlib = 47  # zlib's code: the largest window, 15, plus 32 to detect which head it is
         try:
             return zlib.decompressobj(gzip_or_zlib).decompress(packed, expected + 1)
         except zlib.error as error:
-            raise RefusedError(self.data.name, f"damaged ({error})", "gzip or zlib") from None
+            raise RefusedError(file.name, f"damaged ({error})", "gzip or zlib") from None
 
 
-def read_head(path: Path, sides: Sequence[float]) -> RawHead:
-    """Return the head of a volume, whose voxels must have sides of the given ratios.
+def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()) -> RawHead:
+    """Return the head of a volume, whose voxels must have the given sides.
 
     Args:
         path: File of the head.
-        sides: Sides of a voxel along (z, y, x), in any unit.
+        sides: Sides of a voxel along (z, y, x), in m.
+        override: "voxel", where the head states wrong ones.
 
     Raises:
         RefusedError: The head lacks something, or says what is not read.
@@ -135,10 +136,12 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     are_whole = all(re.fullmatch(r"\+?\d{1,9}", size) and int(size) > 0 for size in sizes)
     are_whole = are_whole and math.prod(map(int, sizes)) <= 1 << 40
     require(are_whole, name, f"sizes {' '.join(sizes)}", "whole numbers greater than 0")
-    # folders and devices are no data
-    value = f"data in {os.path.relpath(data, path.parent)}, which is no file"
-    cure = "put the data there, or mend the name in the head"
-    require(data.is_file(), name, value, "a file, from the folder of the head", cure)
+    for file in data:  # folders and devices are no data
+        value = f"data in {os.path.relpath(file, path.parent)}, which is no file"
+        cure = "put the data there, or mend the name in the head"
+        require(file.is_file(), name, value, "a file, from the folder of the head", cure)
+    fits = len(data) == 1 or len(data) == int(sizes[2])
+    require(fits, name, f"of {len(data)} files of data", "one, or one for each z")
 
     encoding = entries.value("encoding").lower() or "raw"
     is_gzip = encoding in ("gzip", "gz")
@@ -153,14 +156,25 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
 
     # Spacings are those of the axes of the file, the case's those of x, y and z.
     layout = _layout(name, entries)
-    lengths = layout.lengths[np.argsort(layout.axes)]  # along x, y, z
-    require_spacing(name, [float(length) for length in lengths], sides)
+    order = np.argsort(layout.axes)  # of the axes of the file along x, y, z
+    lengths = [float(layout.lengths[axis]) for axis in order]
+    units = re.findall(r'[^\s"]+', entries.value("units", "space units", "distanceunits"))
+    units = [""] * 3 if len(units) not in (1, 3) or units == ["?"] else (3 * units)[:3]
+    # Units stand in the order of the axes of the file, those of a space in that of x, y and z.
+    in_file_order = "units" in entries.values
+    ordered = [units[axis] for axis in order] if in_file_order else units
+    kinds = entries.value("kinds").split()
+    is_time = "time" in kinds or bool({"s", "ms", "sec"} & {unit.lower() for unit in units})
+    require(not is_time, name, f"with a time as an axis, {kinds or units}", "three axes of space")
+    known = ("units", "spacings", "elementspacing", "elementsize", "elementdatafile", "data file")
+    texts = [f"{key} {value}" for key, value in entries.values.items() if key not in known]
+    require_spacing(name, lengths, sides, ordered, texts=texts, override=override)
     endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
     byte_order: Literal[">", "<"] = "<"
     if endian.lower() in ("big", *yes):
         byte_order = ">"
     offset = entries.size
-    if data != path:
+    if data != (path,):
         offset = _skipped(name, entries, is_packed=is_packed)
     return RawHead(
         data=data,
@@ -173,10 +187,34 @@ def read_head(path: Path, sides: Sequence[float]) -> RawHead:
     )
 
 
-def data_of_head(path: Path) -> Path:
-    """Return the file of the numbers, which may be that of the head."""
-    name = _Entries.of_file(path).value("elementdatafile", "data file", "datafile") or "LOCAL"
-    return path if name == "LOCAL" else path.parent / name
+def data_of_head(path: Path) -> tuple[Path, ...]:
+    """Return the files of the numbers, of which one may be that of the head.
+
+    A head names one file, LOCAL for its own, LIST above the names of slices, or a pattern of names
+    with the first and the last number, and perhaps the step, as "slice%02d.raw 0 5 1".
+
+    Raises:
+        RefusedError: A list or a pattern names a file outside the folder of the head, or more than
+            100,000 of them.
+    """
+    entries = _Entries.of_file(path)
+    name = entries.value("elementdatafile", "data file", "datafile") or "LOCAL"
+    names = [name]
+    pattern = re.fullmatch(
+        r"([^%]*%0?\d?d[^%]*?)\s+(\d{1,9})\s+(\d{1,9})(?:\s+([1-9]\d{0,8}))?.*", name
+    )
+    if name == "LOCAL":
+        return (path,)
+    if re.fullmatch(r"LIST(?:\s+\d+)?", name):
+        names = list(entries.listed)
+    elif pattern:
+        numbers = range(int(pattern[2]), int(pattern[3]) + 1, int(pattern[4] or 1))
+        names = [pattern[1] % number for number in numbers[: 10**5 + 1]]
+    if names != [name]:
+        is_beside = all(Path(one).name == one for one in names) and 0 < len(names) <= 10**5
+        cure = "put all slices into the folder of the head, and list their names"
+        require(is_beside, path.name, f"with the data {name}", "files beside it", cure)
+    return tuple(path.parent / one for one in names)
 
 
 @dataclass(frozen=True)
@@ -186,10 +224,12 @@ class _Entries:
     Args:
         values: Values by keys in small letters.
         size: Bytes of the head, with the line that ends it.
+        listed: Lines behind the one that ends the head or begins a list of files.
     """
 
     values: dict[str, str]
     size: int
+    listed: tuple[str, ...] = ()
 
     @classmethod
     def of_file(cls, path: Path) -> _Entries:
@@ -216,12 +256,15 @@ class _Entries:
         size = 0
         with path.open("rb") as file:
             start = file.read(longest_head)
-        for line in start.splitlines(keepends=True):
+        lines = start.splitlines(keepends=True)
+        for row, line in enumerate(lines, 1):
             size += len(line)
             key, *value = re.split(r":=|[=:]", line.decode("latin-1").strip(), maxsplit=1)
             values[key.strip().lower()] = "".join(value).strip()
-            if key.strip() in ("", "ElementDataFile"):  # raw data may follow
-                return cls(values, size)
+            is_list = values[key.strip().lower()].startswith("LIST")
+            if key.strip() in ("", "ElementDataFile") or is_list:  # raw data may follow
+                listed = [text.decode("latin-1").strip() for text in lines[row:]] if is_list else []
+                return cls(values, size, tuple(filter(None, listed)))
         is_whole = len(start) < longest_head
         require(is_whole, path.name, "without an end of its head", f"{longest_head} bytes")
         return cls(values, size)

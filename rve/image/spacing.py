@@ -4,68 +4,91 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from alphacut.base.errors import require
+from alphacut.base.stated import METRES, Stated, settled
+
+_UNITS = "|".join(sorted(METRES, key=len, reverse=True))
 
 
-def require_spacing(name: str, stated: Sequence[float], sides: Sequence[float]) -> None:
-    """Refuse voxels of a file whose sides have other ratios than those of the case.
+def require_spacing(
+    name: str,
+    stated: Sequence[float],
+    sides: Sequence[float],
+    units: Sequence[str] = (),
+    *,
+    texts: Iterable[str] = (),
+    override: Collection[str] = (),
+) -> None:
+    """Refuse voxels of a file whose sides are not those of the case.
 
-    Only the ratios of the sides that the file states are compared, so that one alone is allowed.
+    Sides with a unit are compared as they are; of sides without one the ratios.
 
     Args:
         name: Name of the file, for messages.
-        stated: Distances of voxels along x, y, z that the file states, in any unit; NaN where it
-            states none.
-        sides: Sides of a voxel of the case along z, y, x, in any unit, positive.
+        stated: Distances of voxels along x, y, z that the file states; NaN where it states none.
+        sides: Sides of a voxel of the case along z, y, x, in m, positive.
+        units: Unit of each of the distances; empty where the file states none, and none at all if
+            there are no units.
+        texts: Other lines of the file, which may state sides as well, as "voxel size 2.5 um".
+        override: "voxel", where the user says that the file is wrong.
 
     Raises:
-        RefusedError: A stated distance is not above 0 and finite, or the ratios differ by more than
-            1 %.
+        RefusedError: A stated distance is not above 0 and finite; a unit is unknown beside a known
+            one; or sides or ratios differ by more than 1 %.
         ValueError: The numbers of distances and sides differ.
     """
+    if "voxel" in override:
+        return
     # The case's sides are those of the array's axes (z, y, x), a file states x, y, z.
     expected = list(reversed(sides))
-    pairs = zip(stated, expected, strict=True)
-    known = [(length, side) for length, side in pairs if not math.isnan(length)]
-    shown = " × ".join(f"{length:g}" for length in stated)
-    are_lengths = all(0 < length < math.inf for length, _ in known)
+    units = [unit.strip().lower() for unit in units] or [""] * len(stated)
+    shown = " × ".join(f"{x:g} {u}".strip() for x, u in zip(stated, units, strict=True))
+    known = [k for k, length in enumerate(stated) if not math.isnan(length)]
+    are_lengths = all(0 < stated[k] < math.inf for k in known)
     require(are_lengths, name, f"voxels of {shown}", "spacings greater than 0, or none")
-    ratios = [length / side for length, side in known] or [1.0]
-    is_alike = max(ratios) <= 1.01 * min(ratios)  # heads round to two or three digits
-    allowed = " : ".join(f"{side:g}" for side in expected)
-    cure = "give cell.voxel = [x, y, z] as they are"
-    require(is_alike, name, f"voxels of {shown} along x, y, z", allowed, cure)
+    # Without a known unit the ratios of the sides count: of all axes in the unit of the first one.
+    factors = [METRES.get(unit, math.nan) for unit in units]
+    if all(math.isnan(factors[k]) for k in known):
+        is_one = len({units[k] for k in known}) < 2
+        require(is_one, name, f"voxels of {shown}", f"units {', '.join(METRES)}")
+        scales = [expected[k] / stated[k] for k in known] or [1.0]
+        factors = [scales[0]] * len(stated)
+        shown_sides = " : ".join(f"{side:g}" for side in expected)
+    else:
+        shown_sides = " × ".join(f"{side:g} m" for side in expected)
+    are_alike = all(math.isclose(stated[k] * factors[k], expected[k], rel_tol=0.01) for k in known)
+    cure = "give the voxel as it is"
+    require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
+    number = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
+    further = rf"(?:\s*(?:[x×,;*]|\s)\s*{number}\s*[x×,;*\s]\s*{number})?"
+    pattern = rf"(?:vox|pix|spac|resol)[^\d\n]{{0,40}}{number}{further}\s*[\[(]?({_UNITS})\b"
+    for text in texts:
+        for match in re.finditer(pattern, text, re.IGNORECASE):
+            lengths = [x or match[1] for x in match.groups()[:3]][: len(expected)]
+            for axis, (length, side) in enumerate(zip(lengths, expected, strict=True)):
+                own = Stated(METRES[match[4].lower()] * float(length), match[0])
+                said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")
+                settled(name, "voxel", [own], said, tolerance=0.01)
 
 
-def ome_spacing(head: str) -> tuple[float, float, float]:
-    """Return the distances of voxels along x, y, z in a head of OME-XML.
+def ome_spacing(head: str) -> tuple[list[float], list[str]]:
+    """Return the distances of voxels along x, y, z in a head of OME-XML, and their units.
 
     Args:
         head: Text of the head, of which the attributes PhysicalSizeX, …Unit and so on are used.
 
     Returns:
-        Distances in µm if all units that are stated are known; a side without a unit counts as µm.
-        If one unit is not known, the three plain numbers. NaN for a distance that is missing or no
-        number.
+        NaN for a distance that is missing or no number. If one unit is stated, those that are not
+        are µm, as OME says; else all are empty.
     """
-    micrometres = {
-        "pm": 1e-6, "nm": 1e-3, "µm": 1.0, "um": 1.0, "μm": 1.0, "mm": 1e3, "cm": 1e4, "m": 1e6,
-        "Å": 1e-4, "&#181;m": 1.0, "&#xB5;m": 1.0,
-    }  # fmt: skip
-    lengths = []
-    factors = []
-    for axis in "XYZ":
-        size = re.search(rf'\bPhysicalSize{axis}\s*=\s*"([^"]*)"', head)
-        unit = re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head)
-        lengths.append(_length(size))
-        factors.append(1.0 if unit is None else micrometres.get(unit[1], math.nan))
-    # Ratios need no unit, if all lengths have the same unknown one.
-    if any(math.isnan(factor) for factor in factors):
-        factors = [1.0] * 3
-    x, y, z = (length * factor for length, factor in zip(lengths, factors, strict=True))
-    return x, y, z
+    sizes = [re.search(rf'\bPhysicalSize{axis}\s*=\s*"([^"]*)"', head) for axis in "XYZ"]
+    found = [re.search(rf'\bPhysicalSize{axis}Unit\s*=\s*"([^"]*)"', head) for axis in "XYZ"]
+    default = "µm" if any(found) else ""
+    micro = re.compile("&#(?:181|xB5);")
+    units = [micro.sub("µ", unit[1]) if unit else default for unit in found]
+    return [_length(size) for size in sizes], units
 
 
 def _length(match: re.Match[str] | None) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     from tifffile import TiffFile
 
 
-def read_stack(path: Path, sides: Sequence[float]) -> Array:
+def read_stack(path: Path, sides: Sequence[float], override: Collection[str] = ()) -> Array:
     """Return the pages of a TIFF file along (z, y, x), bright as large numbers.
 
     Args:
         path: The file.
-        sides: Sides of a voxel along (z, y, x), in any unit.
+        sides: Sides of a voxel along (z, y, x), in m.
+        override: "voxel", where the file states wrong ones.
 
     Returns:
         Array of three axes, in the type of the file.
@@ -42,10 +43,12 @@ def read_stack(path: Path, sides: Sequence[float]) -> Array:
     with extra_named(path.name, "save the volume as .npy"):
         import tifffile
     with tifffile.TiffFile(path) as file:
-        return _read_file(path, file, sides)
+        return _read_file(path, file, sides, override)
 
 
-def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
+def _read_file(
+    path: Path, file: TiffFile, sides: Sequence[float], override: Collection[str]
+) -> Array:
     """Return the pages of an open TIFF file as a volume along (z, y, x), bright as large numbers.
 
     The sizes that the heads promise are held against the memory and the length of the file before
@@ -54,7 +57,8 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     Args:
         path: The file.
         file: The same file, opened by tifffile.
-        sides: Sides of a voxel along (z, y, x), in any unit.
+        sides: Sides of a voxel along (z, y, x), in m.
+        override: "voxel", where the file states wrong ones.
 
     Returns:
         Array of three axes, in the type of the file. Axes of length 1 are left out.
@@ -82,12 +86,12 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
         shape = (len(series), *shape)
 
     # One axis beside rows and columns: not colours, and of red, green and blue alone equal ones.
-    # Up to four pages that a file calls channels are colours, else slices.
+    # Up to four pages that a file calls channels are colours, else slices; times are none.
     has_colours = axes.endswith("S") and shape[-1] == 3
     spatial = shape[:-1] if has_colours else shape
     pages = [(a, n) for a, n in zip(axes, spatial, strict=False) if a not in "YX" and n > 1]
     is_colour = any(a == "S" or (a == "C" and n <= 4) for a, n in pages)
-    is_volume = len(pages) == 1 and not is_colour
+    is_volume = len(pages) == 1 and not is_colour and pages[0][0] != "T"
     what = f"axes {axes} of {' × '.join(map(str, shape))}"
     require(is_volume, name, what, "pages along z, rows, columns", cure)
 
@@ -100,7 +104,9 @@ def _read_file(path: Path, file: TiffFile, sides: Sequence[float]) -> Array:
     file_size = path.stat().st_size
     max_bytes = _max_bytes_per_byte(compression) * file_size
     require(n_bytes <= max_bytes, name, what, f"what {file_size} bytes can hold")
-    require_spacing(name, _spacing(file), sides)
+    spacing, units = _spacing(file)
+    texts = [page.description for page in file.pages[:1] if not file.is_ome]
+    require_spacing(name, spacing, sides, units, texts=texts, override=override)
 
     if compression == 5:  # LZW, which tifffile does not unpack without another package
         values = _pages_by_pillow(path, first.dtype)
@@ -157,10 +163,11 @@ def _pages_by_pillow(path: Path, dtype: np.dtype[Any]) -> Array:
     return np.stack(pages).astype(dtype)
 
 
-def _spacing(file: TiffFile) -> tuple[float, float, float]:
-    """Return the distances of voxels along x, y, z that the heads of OME, ImageJ or TIFF state.
+def _spacing(file: TiffFile) -> tuple[list[float], list[str]]:
+    """Return the distances of voxels along x, y, z in heads of OME, ImageJ or TIFF, with units.
 
-    They are in any common unit; NaN where no head states one. TIFF itself has none along z.
+    NaN stands where no head states a distance, and an empty unit where none states one. TIFF itself
+    has no distance along z, and its resolutions are mostly those of a printer.
 
     Args:
         file: The open file.
@@ -173,14 +180,19 @@ def _spacing(file: TiffFile) -> tuple[float, float, float]:
     x = _pixel_side(file, "XResolution")
     y = _pixel_side(file, "YResolution")
     head = file.imagej_metadata or {}
+    unit = str(head.get("unit", "")).replace("\\u00B5", "µ")
+    is_pixel = unit.lower() in ("", "pixel", "pixels", "null")
+    units = [""] * 3
+    if not is_pixel:  # ImageJ writes the units of y and z where they differ from that of x
+        others = [str(head.get(key, unit)).replace("\\u00B5", "µ") for key in ("yunit", "zunit")]
+        units = [unit, *others]
     if "spacing" not in head:
-        return x, y, math.nan
+        return [x, y, math.nan], units
     # Without a unit of length ImageJ's spacing is in pixels.
-    has_unit = str(head.get("unit", "")).lower() not in ("", "pixel", "pixels", "null")
-    if not has_unit and (math.isnan(x) or x == y == 1):
+    if is_pixel and (math.isnan(x) or x == y == 1):
         x = 1.0
         y = 1.0
-    return x, y, float(head["spacing"])
+    return [x, y, float(head["spacing"])], units
 
 
 def _pixel_side(file: TiffFile, tag: str) -> float:

@@ -30,6 +30,7 @@ from alphacut.base.errors import (
 )
 from alphacut.base.extras import extra_named
 from alphacut.base.progress_bar import Progress, progress_reporter, subprogress
+from alphacut.base.stated import require_overrides
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.fuzzy.sets.claimed import widest_cut
@@ -97,7 +98,9 @@ class GreyImage:
         return tuple(length / self.lengths[-1] for length in self.lengths)
 
 
-def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyImage:
+def read_image(
+    path: Path | str, *, spacing: float | Sequence[float], override: Sequence[str] = ()
+) -> GreyImage:
     """Read an image, or a volume, with the sides of its pixels or voxels.
 
     Args:
@@ -105,6 +108,7 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
             slices, .npy, .mhd or .nhdr.
         spacing: Side of a pixel or voxel in m; or its sides, along (x, y) of a picture or along (x,
             y, z) of a volume. A TIFF file is read as a volume if three sides are given.
+        override: `["voxel"]` where a volume states wrong sides, and those given here count.
 
     Returns:
         `values`, grey values or labels of shape (y, x) with y pointing up, or (z, y, x); and
@@ -112,8 +116,8 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
 
     Raises:
         RefusedError: The file is missing, none of these, damaged, too large for memory, or states
-            sides of other ratios; or a length of `spacing` is no positive, finite number, or there
-            are not as many as axes.
+            other sides of a voxel, or sides of other ratios where it states no unit; or a length of
+            `spacing` is no positive, finite number, or there are not as many as axes.
     """
     file = Path(path)
     # A TIFF file may be a picture or a stack of slices: three sides say that it is a volume.
@@ -124,8 +128,8 @@ def read_image(path: Path | str, *, spacing: float | Sequence[float]) -> GreyIma
     if len(lengths) == 1:
         lengths *= dimension
     image_lengths = lengths[::-1]
-    sides = [length / image_lengths[-1] for length in image_lengths]
-    return GreyImage(read_grid(file, sides), image_lengths)
+    require_overrides(override, ("voxel",))
+    return GreyImage(read_grid(file, image_lengths, override), image_lengths)
 
 
 def _dimension_of(file: Path) -> int:

@@ -82,3 +82,38 @@ def test_a_universal_file_is_read_by_the_floors_of_its_unknowns(tmp_path):
 def test_other_arguments_are_refused(tmp_path, name, options, key):
     with refuses(key):
         read_modes(written(tmp_path, name=name), **options)
+
+
+@pytest.mark.parametrize(
+    ("head", "unit", "factor"),
+    [
+        ("mode,frequency [Hz],q1,q2", "", 1),
+        ("mode,frequency (kHz),q1,q2", "", 1000),
+        ("Mode,f_Hz,q1,q2", "", 1),
+        ("# frequencies in Hz\nmode,frequency,q1,q2", "", 1),
+        ("mode,frequency,q1,q2", "Hz", 1),
+        ("# sampled at 200 Hz\nmode,frequency,q1,q2", "", None),
+        ("mode,frequency,q1,q2", "", None),
+        ("mode,frequency,q1,q2", "rad/s", None),
+        ("mode,frequency [rad/s],q1,q2", "", None),
+        ("# frequencies in rad/s\nmode,frequency,q1,q2", "Hz", None),
+        ("# in kHz\nmode,frequency [Hz],q1,q2", "", None),
+        ("mode,frequency [kHz],q1,q2", "Hz", None),
+        ("mode,period [s],q1,q2", "", None),
+        ("mode,omega,q1,q2", "Hz", None),
+    ],
+)
+def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, factor):
+    path = written(tmp_path, f"{head}\n1,1.5,0.5,1\n2,4,-1,0.5\n")
+    if factor is None:
+        with pytest.raises(RefusedError):
+            read_modes(path, frequency_unit=unit)
+    else:
+        found = [mode.frequency.nominal for mode in read_modes(path, frequency_unit=unit)]
+        assert found == pytest.approx([1.5 * factor, 4 * factor])
+
+
+def test_a_wrong_unit_of_a_file_is_overridden(tmp_path):
+    path = written(tmp_path, "mode,frequency [kHz],q1,q2\n1,1.5,0.5,1\n2,4,-1,0.5\n")
+    modes = read_modes(path, frequency_unit="Hz", override=["frequency_unit"])
+    assert modes[0].frequency.nominal == 1.5

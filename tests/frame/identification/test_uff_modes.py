@@ -70,3 +70,17 @@ def test_an_id_line_of_minus_one_and_exponents_without_their_letter(tmp_path):
     lines[2] = "    -1\n"
     with refuses("modes.uff"):
         modes_of(tmp_path, "".join(lines))
+
+
+def test_modes_in_data_sets_2414_are_those_in_55(tmp_path):
+    mode = uff55(3, [*SHAPE, 9.0], frequency=2.5)
+    values = "".join(mode.splitlines(keepends=True)[10:-1])
+    head = f"    -1\n  2414\n{1:10d}\nMode\n{1:10d}\n" + "NONE\n" * 5
+    codes = "".join(f"{x:10d}" for x in (1, 2, 3, 8, 2, 3)) + "\n"
+    counts = "".join(f"{x:10d}" for x in (0, 0, 1, 0, 0, 3, 0, 0)) + "\n         0         0\n"
+    reals = "".join(f"{x:13.5E}" for x in (0, 2.5, 246.74, 0, 0.01, 0)) + "\n"
+    other = head + codes + counts + reals + f"{0:13.5E}" * 6 + "\n" + values + "    -1\n"
+    (found,), (expected,) = modes_of(tmp_path, other), modes_of(tmp_path, mode)
+    assert (found.mode, found.frequency.nominal) == (3, pytest.approx(2.5))
+    for floor, number in expected.shape.items():
+        assert found.shape[floor].nominal == pytest.approx(number.nominal)

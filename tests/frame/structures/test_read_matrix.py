@@ -223,3 +223,28 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
     monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
     with refuses("k.npz:k"):
         read_matrix(tmp_path / "k.npz")
+
+
+@pytest.mark.parametrize(
+    ("comment", "factor"),
+    [
+        ("# stiffness in kN/m", 1e3),
+        ("# units: MN, m, s", 1e6),
+        ("# mass matrix [t]", 1e3),
+        ("# mass matrix (kg)", 1.0),
+        ("# N/m", 1.0),
+        ("# units: N, mm, t", None),
+        ("# lbf/in", None),
+        ("# kN/m, masses (kg)", None),
+    ],
+)
+def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, comment, factor):
+    path = tmp_path / "k.csv"
+    path.write_text(f"{comment}\n2,-1\n-1,2\n")
+    if factor is None:
+        with pytest.raises(RefusedError):
+            read_matrix(path)
+        factor = 1.0
+        assert read_matrix(path, override=["unit"])[0].tolist() == [2, -1]
+    else:
+        assert read_matrix(path).tolist() == [[2 * factor, -factor], [-factor, 2 * factor]]

@@ -307,7 +307,8 @@ SPACED = {
     "OME in units": ("a.ome.tif", {"metadata": {"axes": "ZYX", "PhysicalSizeX": 1.0, "PhysicalSizeY": 1.0,
                      "PhysicalSizeZ": 0.005, "PhysicalSizeZUnit": "mm"}}),
 }  # fmt: skip
-RIGHT = {"ImageJ along x": (5, 5, 1), "TIFF": (1, 1, 5)}
+MICRO = (5e-6, 1e-6, 1e-6)
+RIGHT = {"ImageJ along x": (5, 5, 1), "TIFF": (1, 1, 5), "ImageJ": MICRO, "OME in units": MICRO}
 """Sides of a voxel along z, y, x; else (5, 1, 1)."""
 
 
@@ -400,3 +401,65 @@ def test_lengths_of_pixels_that_are_no_positive_numbers_are_refused(tmp_path, sp
 def test_a_missing_image_is_refused_by_its_name(tmp_path, key):
     with refuses(key):
         read_image(tmp_path / key, spacing=np.float32(1.0))
+
+
+NM = 1e-9
+
+
+def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    head = {"axes": "ZYX", "spacing": 0.025, "unit": "nm", "zunit": "\\u00B5m"}
+    path = tmp_path / "a.tif"
+    stack(path, values, imagej=True, resolution=(1 / 16.5, 1 / 16.5), metadata=head)
+    assert np.array_equal(voxels_of(path, (25 * NM, 16.5 * NM, 16.5 * NM)), values)
+    wrong = (16.5 * NM, 16.5 * NM, 0.025 * NM)  # along x, y, z
+    with refuses("a.tif"):
+        read_image(path, spacing=wrong)
+    assert read_image(path, spacing=wrong, override=["voxel"]).lengths == wrong[::-1]
+
+
+@pytest.mark.parametrize(
+    ("line", "micrometres"),
+    [
+        ('spacings: 2 2 5\nunits: "um" "um" "um"', (2, 2, 5)),
+        ('spacings: 2 2 0.005\nunits: "um" "um" "mm"', (2, 2, 5)),
+        ("# made up\nvoxel size:=2.5 um", (2.5, 2.5, 2.5)),
+        ("voxel:=2 x 2 x 5 um", (2, 2, 5)),
+        ('space units: "um" "um" "um"\nspace directions: (0,0,5) (0,2,0) (2,0,0)', (2, 2, 5)),
+    ],
+)
+def test_sides_that_nrrd_states_with_units_are_those_of_the_case(tmp_path, line, micrometres):
+    nrrd_with(tmp_path / "a.nrrd", line)
+    assert read_image(tmp_path / "a.nrrd", spacing=[x * 1e-6 for x in micrometres])
+    with refuses("a.nrrd"):
+        read_image(tmp_path / "a.nrrd", spacing=[x * 1e-3 for x in micrometres])
+
+
+@pytest.mark.parametrize(
+    "line", ["kinds: domain domain time", 'units: "um" "um" "s"\nspacings: 1 1 1']
+)
+def test_a_time_as_an_axis_is_no_volume(tmp_path, line):
+    nrrd_with(tmp_path / "a.nrrd", line)
+    with refuses("a.nrrd"):
+        voxels_of(tmp_path / "a.nrrd")
+    stack(tmp_path / "t.tif", np.zeros(SHAPE, "u1"), imagej=True, metadata={"axes": "TYX"})
+    with refuses("t.tif"):
+        voxels_of(tmp_path / "t.tif")
+
+
+@pytest.mark.parametrize("names", ["LIST", "s_%02d.raw 0 11 1"])
+def test_lists_and_patterns_of_slices_are_read_from_the_folder_of_the_head(tmp_path, rng, names):
+    values = rng.integers(0, 250, SHAPE).astype("u1")
+    for k, page in enumerate(values):
+        page.tofile(tmp_path / f"s_{k:02d}.raw")
+    listed = "".join(f"\ns_{k:02d}.raw" for k in range(12)) if names == "LIST" else ""
+    meta = f"{HEAD}ElementType = MET_UCHAR\nElementDataFile = {names}{listed}\n"
+    (tmp_path / "a.mhd").write_text(meta)
+    (tmp_path / "a.nhdr").write_text(NRRD.format("uchar", "raw") + f"data file: {names}{listed}\n")
+    for head in ("a.mhd", "a.nhdr"):
+        assert np.array_equal(voxels_of(tmp_path / head), values)
+        assert len(files_of(tmp_path / head)) == 13
+        text = (tmp_path / head).read_text()
+        (tmp_path / head).write_text(text.replace("s_", "../s_"))
+        with refuses(head):
+            voxels_of(tmp_path / head)
