@@ -44,8 +44,6 @@ from alphacut.frame.structures.linear import Assembly, LinearSystem
 
 MAX_RATIO = 0.9
 """Damping ratio of a mode up to which the bound by modes is used (tuned)."""
-ROUNDING = 1 + 1e-9
-"""Covers the rounding of some dozen operations on bounds."""
 
 
 def acceleration_gain(
@@ -73,11 +71,11 @@ def acceleration_gain(
         assembly = replace(assembly, pattern=influence)
     parts = _Parts.of(assembly)
     try:
-        return parts.by_modes() * ROUNDING
+        return parts.by_modes()
     except UnprovedError as reason:
         try:
             require_dissipation(system, boxes)
-            return parts.by_energy(duration) * ROUNDING
+            return parts.by_energy(duration)
         except UnprovedError as other:
             raise UnprovedError(f"{reason}; {other}") from None
 

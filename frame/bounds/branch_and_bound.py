@@ -30,7 +30,6 @@ from alphacut.frame.bounds.kernel import (
     BoxTables,
     Examination,
     Items,
-    RemainderBounds,
     call_examine,
     examine,
 )
@@ -80,7 +79,7 @@ def bound_problems(
     # Items that a thread examines together on average, tuned to limit the memory.
     max_items = 30_000
     n_problems = len(optima.value)
-    remainder = remainder_bounds(model, lower, upper)
+    third = remainder_bounds(model, lower, upper).third
     frontier = Frontier.whole_box(lower, upper, n_problems)
     examined = 0
     # Bounds over the undivided box: outputs at rest have 0 there, below optimum + gap.
@@ -89,7 +88,7 @@ def bound_problems(
         while len(frontier) and examined + len(frontier) <= budget * n_problems:
             is_undivided = examined == 0
             examined += len(frontier)
-            examine_piece = partial(examine_items, model, remainder, optima.value + gap, frontier)
+            examine_piece = partial(examine_items, model, third, optima.value + gap, frontier)
             pieces = pool.map(examine_piece, frontier.pieces(max_items))
             found = _joined(list(pieces))
             if is_undivided:
@@ -101,7 +100,7 @@ def bound_problems(
     bound = np.minimum(optima.value + gap, undivided)
     # Sub-boxes that are still open keep their own bounds.
     for piece in frontier.pieces(max_items):
-        found = examine_items(model, remainder, optima.value + gap, frontier, piece)
+        found = examine_items(model, third, optima.value + gap, frontier, piece)
         np.maximum.at(bound, frontier.problem[piece.items], found.bound)
     return bound, examined
 
@@ -154,7 +153,7 @@ class Piece(NamedTuple):
 
 
 def examine_items(
-    model: ModalModel, remainder: RemainderBounds, target: Array, frontier: Frontier, piece: Piece
+    model: ModalModel, third: Array, target: Array, frontier: Frontier, piece: Piece
 ) -> Examination:
     """Examine sub-boxes by the compiled kernel: which problems are closed, how others go on.
 
@@ -163,8 +162,8 @@ def examine_items(
 
     Args:
         model: The modal model of n modes and m outputs in d inputs.
-        remainder: Bounds of the third derivatives of the outputs over the whole box, and of
-            rounding.
+        third: Bounds of the third derivatives of the outputs over the whole box, shape (T, m, d, d,
+            d).
         target: Values of side × output below which problems are closed, shape (N,).
         frontier: All open items, ordered by sub-box and then by problem.
         piece: Which sub-boxes of the frontier, and which items, are examined; the items must be all
@@ -206,7 +205,7 @@ def examine_items(
     )
     waves = model.waves(eigenvalues[0, row_box], row_node)
     found = Examination.none(len(column))
-    examine(items, boxes, waves, remainder, target, found)
+    examine(items, boxes, waves, third, target, found)
     return found
 
 
@@ -389,7 +388,7 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, min_gain: float)
     best = np.stack([values.argmin(axis=0), values.argmax(axis=0)], axis=1).ravel()
     value = np.stack([-values.min(axis=0), values.max(axis=0)], axis=1).ravel()
     # These values choose points alone. Those that are returned come from the tables of the loads,
-    # as those of branch and bound do, whose rounding is bounded.
+    # as those of branch and bound do.
     optima = Optima(points[best], value)
     refine(model, optima, np.arange(len(best)), lower, upper, min_gain, has_values=False)
     return optima

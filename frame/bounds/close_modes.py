@@ -84,8 +84,7 @@ def by_fit(
         fit: κ and e.
     """
     spread = total * moments.second - moments.first * moments.first
-    # The factor covers the rounding.
-    error = fit.error * (1 - 1 / modes) * (1 + 1e-12) * magnitudes.magnitude()
+    error = fit.error * (1 - 1 / modes) * magnitudes.magnitude()
     centre = total * total - spread * (2 * fit.factor)
     return Squares(centre.widened(error), centre.widened(error))
 
@@ -114,7 +113,7 @@ def moments_of(
     low, high = displacement
     middle = (low + high) / 2
     # Peaks are those under the middle of the displacements, and differ by their radius at most.
-    error = (high - low) / 2 * (1 + 1e-12) * magnitude
+    error = (high - low) / 2 * magnitude
     outputs = subspace.output_modes.T
     first = (outputs @ weighted)[:, 0] * middle
     second = (outputs @ (y @ weighted))[:, 0] * middle

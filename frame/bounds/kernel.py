@@ -44,14 +44,6 @@ class BoxTables(NamedTuple):
     factors: Array
 
 
-class RemainderBounds(NamedTuple):
-    """Bounds of what quadratic Taylor models of the outputs leave out, over the whole box."""
-
-    third: Array  # of third derivatives, (T, m, d, d, d)
-    # what tables miss of the values, then of the slopes by the inputs, (T, m, 1 + d)
-    rounding: Array
-
-
 class Examination(NamedTuple):
     """What is done next with each item, and what is known of it, one entry each."""
 
@@ -216,31 +208,27 @@ def unpack_derivatives(jet: Array, side: float, g: Array, H: Array) -> None:
 
 
 @compiled
-def model_errors(
-    H: Array, third: Array, rounding: Array, r: Array, bend: Array, slope_error: Array
-) -> float:
+def model_errors(H: Array, third: Array, r: Array, bend: Array, slope_error: Array) -> float:
     """Return the error of a quadratic Taylor model over a sub-box, and write those of its slopes.
 
     With third derivatives of at most |T_ijk|, Taylor's theorem bounds the error of the model by
-    Σ |T_ijk| r_i r_j r_k / 6, and that of its slope along axis i by Σ |T_ijk| r_j r_k / 2. Rounding
-    is added.
+    Σ |T_ijk| r_i r_j r_k / 6, and that of its slope along axis i by Σ |T_ijk| r_j r_k / 2.
 
     Args:
         H: Hessian at the midpoint, shape (d, d).
         third: |T_ijk|, shape (d, d, d).
-        rounding: Rounding of the value and of the slopes, shape (1 + d,).
         r: Radii, shape (d,).
         bend: Overwritten with Σ_j |H_ij| r_j, by which the slopes of the model change, shape (d,).
         slope_error: Overwritten with the errors of the slopes, shape (d,).
     """
-    error = rounding[0]
+    error = 0.0
     for i in range(len(r)):
         third_change = bend[i] = 0.0
         for j in range(len(r)):
             bend[i] += abs(H[i, j]) * r[j]
             for k in range(len(r)):
                 third_change += third[i, j, k] * r[j] * r[k]
-        slope_error[i] = third_change / 2 + rounding[1 + i]
+        slope_error[i] = third_change / 2
         error += third_change * r[i] / 6
     return error
 
@@ -301,8 +289,7 @@ def bisection_code(bend: Array, slope_error: Array, r: Array) -> int:
 
 @compiled
 def examine(
-    items: Items, boxes: BoxTables, waves: Array, remainder: RemainderBounds, target: Array,
-    found: Examination,
+    items: Items, boxes: BoxTables, waves: Array, third: Array, target: Array, found: Examination,
 ) -> None:  # fmt: skip
     """Examine all items: what is done next with each, its value and its upper bound.
 
@@ -317,8 +304,8 @@ def examine(
             factors of the K terms in value, gradient and packed Hessian of each output (B, m, K,
             q).
         waves: Values in time of these terms, real and imaginary parts, at the rows, shape (R, K).
-        remainder: Bounds over the whole box of the third derivatives of each output (T, m, d, d,
-            d), and of the rounding of values and slopes (T, m, 1 + d).
+        third: Bounds over the whole box of the third derivatives of each output, shape (T, m, d, d,
+            d).
         target: Best known value plus the wanted gap of each problem, shape (2 T m,), in the order
             of nodes, outputs, sides.
         found: Receives for each item: `code`, 0 where it is closed (its bound is at most the
@@ -349,9 +336,7 @@ def examine(
                     output = column // 2
                     expand_output(waves[row], boxes.factors[b, output], jet)
                 unpack_derivatives(jet, side, g, H)
-                third = remainder.third[node, output]
-                rounding = remainder.rounding[node, output]
-                missing = model_errors(H, third, rounding, r, bend, slope_error)
+                missing = model_errors(H, third[node, output], r, bend, slope_error)
                 value[item] = side * jet[0]
                 bound[item] = value[item] + separable_bound(g, H, r) + missing
                 faces = rising_faces(g, bend, slope_error, r, boxes.is_outer[b])
@@ -379,5 +364,5 @@ def call_examine() -> None:
         is_outer=np.zeros((0, 2, 0), np.bool_),
         factors=np.zeros((0, 0, 0, 0)),
     )
-    remainder = RemainderBounds(third=np.zeros((0,) * 5), rounding=np.zeros((0,) * 3))
-    examine(items, boxes, np.zeros((0, 0)), remainder, np.zeros(0), Examination.none(0))
+    third = np.zeros((0,) * 5)
+    examine(items, boxes, np.zeros((0, 0)), third, np.zeros(0), Examination.none(0))

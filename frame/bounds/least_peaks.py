@@ -120,8 +120,9 @@ def _bound_cell(
         for s in range(data.participation.shape[1]):
             of_mode = data.table[k, s, :, row + (ends[k, 0] + ends[k, 1]) // 2]
             response += data.participation[k, s] * of_mode
-    magnitude = np.abs(response)
-    untried = np.abs(response)  # −1 at nodes that are no peak over time, or were tried
+    # with what truncated modes and forces add at the midpoint, which is constant in the bounds
+    magnitude = np.abs(response + (constants[1] - constants[0]) / 2)
+    untried = magnitude.copy()  # −1 at nodes that are no peak over time, or were tried
     for t in range(len(magnitude)):
         if magnitude[t] < max(magnitude[max(t - 1, 0)], magnitude[min(t + 1, len(magnitude) - 1)]):
             untried[t] = -1.0
@@ -135,7 +136,7 @@ def _bound_cell(
             break
         untried[node] = -1.0
         # A lower bound of the output where it is positive is an upper bound of −output, number 0.
-        s = int(response[node] < 0)
+        s = int(response[node] + (constants[1, node] - constants[0, node]) / 2 < 0)
         dual_bound = minimise(
             multipliers[node],
             ends,
@@ -145,7 +146,7 @@ def _bound_cell(
             effort.steps,
             effort.patience,
             -1e300,  # no target
-            -magnitude[node],
+            (2.0 * s - 1.0) * response[node],
             disagreement,
             u,
         )

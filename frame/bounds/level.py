@@ -62,10 +62,13 @@ def response_tables(
     """
     time, sources = excitation
     by_order: dict[int, list[list[ModalResponses]]] = {order: [] for order in orders}
+    deviations: dict[int, list[list[Array]]] = {order: [] for order in orders}
     for grid in grids:
         oscillators = Oscillators(grid, time, orders)
         for order, modes in by_order.items():
             modes.append([oscillators.responses(source, order) for source in sources])
+            of_mode = [oscillators.line_deviation(source, order) for source in sources]
+            deviations[order].append(of_mode)
     tables = {}
     for order, modes in by_order.items():
         value = np.array([[x.value.reshape(len(time), -1) for x in mode] for mode in modes])
@@ -76,7 +79,7 @@ def response_tables(
             value=value,
             max_magnitude=max_magnitude.max(axis=-1),
             error=error,
-            interpolation_error=np.array([[x.line_deviation for x in mode] for mode in modes]),
+            interpolation_error=np.array(deviations[order]),
         )
     return tables
 
@@ -349,7 +352,6 @@ def _dual_function_data(
     radius = np.maximum(variables.deviation(), 1e-9 * np.abs(variables.value))
     radius = np.maximum(radius, 1e-30)
     scaled = _scaled(variables, radius)
-    expected_cubic = numbers.EXPECTED_CUBIC * np.asarray(np.abs(scaled.cubic).sum(axis=1))
     midpoints = variables.value.reshape(len(modes), -1)
     radii = radius.reshape(len(modes), -1)
     grids = level.grids
@@ -376,8 +378,7 @@ def _dual_function_data(
         linear=scaled.linear,
         quadratic=scaled.quadratic,
         cubic=scaled.cubic,
-        expected_cubic=expected_cubic,
-        remainder=scaled.remainder + expected_cubic,
+        remainder=scaled.remainder,
         truncated_response=truncated.response,
         truncated_linear=truncated.linear,
         truncated_quadratic=truncated.quadratic,

@@ -9,15 +9,22 @@ Taylor models of the part leave out.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.bounds.kernel import RemainderBounds
 from alphacut.frame.calculus.monomials import count, exponents, product_part, product_places
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.modes.model_error import largest_growth, response_parts
+
+
+class Remainder(NamedTuple):
+    """Bounds of what is left out of the outputs over the whole box, for T time nodes."""
+
+    third: Array  # third derivatives by the inputs, (T, m, d, d, d)
+    tables: Array  # what tables of loads miss of the values, (T, m)
 
 
 def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
@@ -40,13 +47,16 @@ def majorant_parts(polynomials: TaylorModel, reach: Array) -> list[Array]:
     return parts[:4] + [magnitudes.homogeneous_part(degree) for degree in missing]
 
 
-def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> RemainderBounds:
+def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder:
     """Bound what quadratic Taylor models of a modal model's outputs leave out in a box.
 
     They may be expanded about any point of the box [lower, upper]. The bounds follow by majorants:
     derivatives by the inputs of C exp(λ t) over exp(λ₀ t) are at most those of Σ_p t^p C ρ^p / p!
     with majorants of C and of ρ = λ − λ₀, that is, with polynomials whose coefficients are positive
     and whose derivatives are at least as large.
+
+    The model is that of the tables of loads, whose series are functions of λ with derivatives of
+    their own. By what they miss its values differ from those of the modes.
 
     Args:
         model: The modal model with T time nodes, m outputs and d inputs.
@@ -55,8 +65,7 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
 
     Returns:
         `third`, bounds of the third derivatives by u_i, u_j, u_k, shape (T, m, d, d, d), symmetric
-        in the last three axes; and `rounding`, bounds of what the tables of loads truncate of an
-        output and of its slopes by the inputs, shape (T, m, 1 + d).
+        in the last three axes; and `tables`, what the tables of loads miss, shape (T, m).
     """
     d = len(lower)
     n = model.count
@@ -67,24 +76,16 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     eigenvalue = majorant_parts(model.eigenvalue, reach)  # by degree, (monomials, n)
     rho = [part[..., np.newaxis] for part in eigenvalue]
     cubic = np.zeros((len(time), count(d, 3), m))
-    of_tables = np.zeros((len(time), 1 + d, m))  # of values, then of slopes
+    of_tables = np.zeros((len(time), m))
     for part in response_parts(model, growth):
-        # What the tables of a load miss of R, R′ and R″. Values, slopes and Hessians of the outputs
-        # are made of these: C R; C_i R + C λ_i R′; and so on. Third derivatives, for which alone R‴
-        # is needed, are bounded and not computed.
-        table_errors: Array = np.zeros((4, len(time), n))
-        if part.load is not None:
-            table_errors[:3] = part.load.errors(part.waves)
+        waves = part.waves
         term = majorant_parts(part.coefficient, reach)  # of C ρ^p / p!, (monomials, n, m)
+        if part.load is not None:
+            missed = part.load.errors(waves)
+            of_tables += 2 * missed[0] @ term[0][0]
+            waves = waves + missed
         for p in range(4):
-            waves = 2 * part.waves[p]
-            cubic += np.tensordot(waves, term[3], (1, 1))
-            quadratic = TaylorModel(tuple(term[:3]), np.zeros((n, m)), d)
-            # A quadratic model with errors in its value, slopes and Hessian is off by these
-            # errors times 1, |x_i| and |x_i x_j|, and its slopes by those of slopes and Hessian
-            # times 1 and |x_j|. The first two degrees of the majorant bound both.
-            largest = np.concatenate(majorant_parts(quadratic, upper - lower)[:2])
-            of_tables += np.tensordot(2 * table_errors[p], largest, (1, 1))
+            cubic += np.tensordot(2 * waves[p], term[3], (1, 1))
             term = [
                 product_part(term, rho, k, d, np.multiply, lowest=(0, 1)) / (p + 1)
                 for k in range(4)
@@ -100,7 +101,4 @@ def remainder_bounds(model: ModalModel, lower: Array, upper: Array) -> Remainder
     of_exponents = factorials[exponents(d, 3)].prod(axis=1)
     third = (cubic * of_exponents[:, np.newaxis]).swapaxes(1, 2)
     places = product_places(d, 1, 2)[:, product_places(d, 1, 1)]  # of u_i u_j u_k, (d, d, d)
-    return RemainderBounds(
-        third=np.ascontiguousarray(third[..., places]),
-        rounding=np.ascontiguousarray(of_tables.swapaxes(1, 2)),
-    )
+    return Remainder(np.ascontiguousarray(third[..., places]), of_tables)

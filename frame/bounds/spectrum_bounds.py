@@ -18,6 +18,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame.bounds.box import parameters_over_box
+from alphacut.frame.bounds.box_proof import ROUNDING_MARGIN
 from alphacut.frame.bounds.close_modes import Moments, Squares, by_fit, by_signs, moments_of
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -73,13 +74,12 @@ def _cross_terms(
     first, second = np.triu_indices(len(groups), 1)
     low = correlations.smallest[first, second]
     high = correlations.largest[first, second]
-    # The factor covers the rounding of sum and difference. Of a group that is not whole no sum is
-    # known, and 0 stands for it.
+    # Of a group that is not whole no sum is known, and 0 stands for it.
     is_whole = np.array([group.is_whole for group in groups])
     are_whole = is_whole[first] & is_whole[second]
-    radius = np.where(are_whole, (high - low) * (1 + 1e-12) + 1e-15, 2 * high)
+    radius = np.where(are_whole, high - low, 2 * high)
     largest = np.array([peak.sum_of_magnitudes for peak in peaks])
-    error = radius @ (largest[first] * largest[second]) * (1 + 1e-12)
+    error = radius @ (largest[first] * largest[second])
     sums = concatenate([peak.sum[None] for peak in peaks], -2)
     return ((low + high) @ (sums[first] * sums[second])).widened(error)
 
@@ -190,15 +190,14 @@ class _Problem:
             acceleration = max_acceleration(self.combination.spectrum, shortest, longest)
             of_outputs = np.maximum(sums.output_squares_over_eigenvalue.bounds()[1], 0.0)
             of_ground = np.maximum(sums.source_squares_over_eigenvalue.bounds()[1], 0.0)
-            squared = acceleration**2 * of_outputs * of_ground * (1 + 1e-12)
+            squared = acceleration**2 * of_outputs * of_ground
             magnitudes = sums.products.like(squared)
-            return _Peaks(sums.products * 0.0, np.sqrt(squared) * (1 + 1e-15), magnitudes)
+            return _Peaks(sums.products * 0.0, np.sqrt(squared), magnitudes)
         # S(λ) = constant + slope/λ ± error
         chord = displacement_chord(self.combination.spectrum, shortest, longest)
         slope = 4 * np.pi**2 * chord.slope
         constant = chord.value - chord.slope * chord.midpoint
-        # The rounding of both numbers changes S by far less than this.
-        error = chord.error + 1e-14 * (abs(chord.value) + abs(chord.slope) * chord.midpoint)
+        error = chord.error
 
         def weighted(plain: TaylorModel, over_eigenvalue: TaylorModel) -> TaylorModel:
             """Return a sum with the weight S of the modes, but for the error of S."""
@@ -220,11 +219,11 @@ class _Problem:
                 chord.midpoint,
                 (chord.value - radius, chord.value + radius),
                 magnitude=unweighted,
-                largest=(longest**2 / chord.midpoint - 1) * (1 + 1e-9),
+                largest=longest**2 / chord.midpoint - 1,
             )
         return _Peaks(
-            sum=total.widened(error * unweighted * (1 + 1e-15)),
-            sum_of_magnitudes=np.sqrt(largest) * (1 + 1e-15),
+            sum=total.widened(error * unweighted),
+            sum_of_magnitudes=np.sqrt(largest),
             squared_magnitudes=squared_magnitudes,
             moments=moments,
         )
@@ -391,8 +390,9 @@ def _bounds(parts: Sequence[_Part]) -> Array:
             for part in parts
         ]
     )
-    # The factors cover the rounding of the root.
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) * [1 - 1e-15, 1 + 1e-15])
+    # The margin covers all rounding, as that of peaks over time does.
+    margin = ROUNDING_MARGIN * np.array([-1.0, 1.0]) * np.abs(squares[..., 1:])
+    return np.asarray(np.sqrt(np.maximum(squares + margin, 0.0)))
 
 
 def _halves(low: Array, high: Array, axis: int) -> Iterator[tuple[Array, Array]]:

@@ -37,18 +37,13 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import YIELDING_GAP, prove_yielding
 from alphacut.frame.modes.damped import require_dissipation
+from alphacut.frame.modes.damped_models import as_oscillators
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.modes.model_error import (
-    direct_error_in_steps,
-    error_between_nodes,
     error_fractions,
-    largest_growth,
     proved_error,
-    response_parts,
 )
-from alphacut.frame.response.chord_deviation import line_deviations, load_deviation
 from alphacut.frame.response.duhamel import call_with_load
-from alphacut.frame.response.load_tables import Direct
 from alphacut.frame.result import Envelope
 from alphacut.frame.verification.rounding import rounding_margin
 
@@ -306,20 +301,19 @@ def bound_levels(
         The bounds on each level, in the order of `model.boxes.alpha`.
 
     Raises:
-        BisectionError: The gap does not exceed twice the model error and rounding.
+        BisectionError: The gap does not exceed twice the model error.
     """
-    direct = direct_error_in_steps(model)
+    in_own_units = model
     model = model.in_units(scale)
     error = model_error / scale
     lower, upper = model.boxes.unit_ends(0)
-    # The first entry of the last axis is the rounding of values, the others that of slopes.
-    rounding = remainder_bounds(model, lower, upper).rounding[..., 0]
-    # Model error and rounding are added to the bounds on either side. The search has the rest of
-    # the gap, a little less so that rounding does not make the sum larger than the gap.
-    least_gap = float((2 * error + rounding).max())
+    error = error + remainder_bounds(model, lower, upper).tables
+    # The error is added to the bounds on either side. The search has the rest of the gap, a little
+    # less so that rounding does not make the sum larger than the gap.
+    least_gap = float(2 * error.max())
     search_gap = (1 - 1e-6) * gap - least_gap
     if search_gap <= 0:
-        what = f"rounding and errors of the modes, {least_gap:.3g}, pass the gap of {gap:.3g}"
+        what = f"errors of the modes, {least_gap:.3g}, pass the gap of {gap:.3g}"
         raise BisectionError(what, "take the method dual, a shorter duration or a wider gap")
 
     n_levels = len(model.boxes.alpha)
@@ -350,9 +344,7 @@ def bound_levels(
         all_proved.append(proved)
         n_boxes.append(count)
 
-    # Within the steps, the model and its error deviate from straight lines.
-    error_between = error_between_nodes(model, error, direct=direct / scale)
-    between = (_line_deviation(model) + error_between) * scale
+    between = as_oscillators(in_own_units, error * scale).interpolation_error(model.flow.time)
     facts = {
         "model_error": float(error.max()),
         "degree": model.degree,
@@ -361,83 +353,22 @@ def bound_levels(
     }
     shape = (*error.shape, 2)
     fractions = np.broadcast_to(error_fractions(model), (*shape[1:], len(model.boxes.names)))
-    attained_error = error + rounding
     bounds = []
     upper = np.full(2 * error.size, np.inf)
     for optima, proved in zip(reversed(all_optima), reversed(all_proved), strict=True):
         upper = np.minimum(upper, proved)  # a narrower box lies inside the wider ones
-        attained = optima.value.reshape(shape) - attained_error[..., np.newaxis]
+        attained = optima.value.reshape(shape) - error[..., np.newaxis]
         box_bounds = BoxBounds(
             upper=(upper.reshape(shape) + error[..., np.newaxis]) * scale[:, np.newaxis],
             attained=attained * scale[:, np.newaxis],
             attained_at=model.boxes.to_physical(optima.point.reshape(*shape, -1)),
             between_nodes=between,
             gap_fractions=fractions,
-            attained_error=2 * attained_error * scale,
+            attained_error=2 * error * scale,
             facts=facts,
         )
         bounds.append(box_bounds)
     return bounds
-
-
-def _line_deviation(model: ModalModel) -> Array:
-    """Return a bound of the distance of a modal model's outputs from straight lines within steps.
-
-    It holds for all inputs of the widest box; lines run between the values at both ends of a step.
-
-    Args:
-        model: Sum over modes of a coefficient times an exponential, or a Duhamel integral of a
-            load, with polynomials in the inputs as eigenvalues and coefficients.
-
-    Returns:
-        Bound for the step before each node, shape (times, outputs), in the units of the model.
-
-    Raises:
-        UnprovedError: A mode may not oscillate somewhere in the box.
-    """
-    # With the eigenvalue λ = -g ± iω of a mode, the ranges of g and ω over the box, shape (2,
-    # modes), and those of q = g/ω.
-    eigenvalue = model.eigenvalue
-    growth = largest_growth(eigenvalue, np.ones(len(model.boxes.names)))
-    decay = np.stack([-growth, eigenvalue.real.deviation() - eigenvalue.value.real])
-    radius = eigenvalue.imag.deviation()
-    midpoint = np.abs(eigenvalue.value.imag)
-    omega = np.stack([midpoint - radius, midpoint + radius])
-    # The grids need the phase ω t of each mode.
-    if (omega[0] <= 0).any():
-        raise UnprovedError("a mode may not oscillate", "take less damping")
-    q_lower = (decay[0] / omega).min(axis=0)
-    q_upper = (decay[1] / omega).max(axis=0)
-    # The response of a mode depends on σ = (-q + i) ω alone, which these grids sample; what lies
-    # between their points is bounded by the responses themselves.
-    grids = []  # for each mode, shape (3, points along ω)
-    for k in range(model.count):
-        along_omega = np.linspace(omega[0, k], omega[1, k], numbers.DEVIATION_POINTS)
-        along_q = np.linspace(q_lower[k], q_upper[k], 3)
-        grids.append(np.multiply.outer(-along_q + 1j, along_omega))
-
-    time = model.flow.time
-    deviation = np.zeros((len(time), len(model.flow.outputs)))
-    for part in response_parts(model, growth):
-        # A mode and its conjugate add twice the real part of one of them, 2 Re C w.
-        real = 2 * part.coefficient.real.magnitude()
-        imag = 2 * part.coefficient.imag.magnitude()
-        load = None
-        if part.load is not None:
-            load = part.load.history
-        # What a force adds at once is the force itself times the first coefficient.
-        if isinstance(part.load, Direct):
-            deviation += np.outer(load_deviation(part.load.history, time), real[0])
-            continue
-        for k, sigma in enumerate(grids):
-            of_modulus, of_imaginary = line_deviations(sigma, load, time, (0,))[0]
-            # With H, which is the wave w less its chord, |Re C H| ≤ |C| |H|, and also
-            # |Re C H| ≤ |Re C| |H| + |ω Im C| |Im H/ω|.
-            by_parts = np.outer(of_modulus, real[k])
-            by_parts += np.outer(of_imaginary, sigma.imag.max() * imag[k])
-            by_modulus = np.outer(of_modulus, np.hypot(real[k], imag[k]))
-            deviation += np.minimum(by_modulus, by_parts)
-    return deviation
 
 
 def _max_degree(n_inputs: int) -> int:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints, Mask
-from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import (
@@ -67,8 +66,8 @@ def enclose_subspaces(
     mass_decrease, stiffness_decrease = _decreases(centre, steepest_input)
     # Rayleigh quotients φᵀKφ / φᵀMφ, with K between (1 ± κ) K(0) and M between (1 ± μ) M(0), and
     # Courant's minimum principle.
-    low_factor = (1 - gamma(4)) * (1 - stiffness_decrease) / (1 + mass_decrease)
-    high_factor = (1 + gamma(4)) * (1 + stiffness_decrease) / (1 - mass_decrease)
+    low_factor = (1 - stiffness_decrease) / (1 + mass_decrease)
+    high_factor = (1 + stiffness_decrease) / (1 - mass_decrease)
 
     nearness = _nearness(centre, couplings)
     # From a nearness of 2 on modes are one block without an attempt to enclose them alone, which

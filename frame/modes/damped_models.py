@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
+from alphacut.frame import numbers
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.taylor_model import ORDER, TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -30,11 +31,10 @@ from alphacut.frame.modes.intervening import Oscillator, range_of
 from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.modes.model_error import error_between_nodes, error_fractions, proved_error
 from alphacut.frame.modes.models import ModalResponseModels
-from alphacut.frame.modes.truncated_modes import TruncatedModes
+from alphacut.frame.modes.truncated_modes import TruncatedModes, feedthroughs
 from alphacut.frame.records.history import History
-from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.load_tables import Direct
-from alphacut.frame.response.oscillators import Source
+from alphacut.frame.response.oscillators import Oscillators, Source, grid_over
 from alphacut.frame.structures.loads import distinct_histories
 
 
@@ -58,6 +58,28 @@ class DampedModels(NamedTuple):
             interpolation_error=self.models.interpolation_error[nodes][:, outputs],
         )
         return DampedModels(models, self.sources)
+
+    def interpolation_error(self, time: Array) -> Array:
+        """Bound the distance of outputs from a straight line within each time step, shape (T, m).
+
+        Row j belongs to the step that ends at node j.
+
+        Args:
+            time: All time nodes, shape (T,), in s.
+
+        Raises:
+            UnprovedError: A mode turns too far within a sample interval of a load.
+        """
+        error: Array = self.models.interpolation_error + sum(
+            x.interpolation_error for x in self.models.truncated
+        )
+        for mode in self.models.oscillators:
+            points = (numbers.DEVIATION_POINTS, 3)
+            grid = grid_over(mode.omega_range, mode.quotient_range, points)
+            oscillators = Oscillators(grid, time, (0,))
+            of_sources = [oscillators.line_deviation(source, 0) for source in self.sources]
+            error += np.transpose(of_sources) @ mode.participation.magnitude()
+        return error
 
 
 def damped_models(
@@ -95,7 +117,7 @@ def damped_models(
     if not excess <= 20:
         what = f"the proved error of the modes is {excess:.2g} times what it may be"
         raise UnprovedError(what, "take narrower inputs", int(error_fractions(best).argmax()))
-    return _as_oscillators(best, best_error)
+    return as_oscillators(best, best_error)
 
 
 def _model_of_degree(
@@ -108,20 +130,23 @@ def _model_of_degree(
     return model, proved_error(model)
 
 
-def _as_oscillators(model: ModalModel, error: Array) -> DampedModels:
+def as_oscillators(model: ModalModel, error: Array) -> DampedModels:
     """Return a modal model with its error, shape (T, m), as oscillators and what they leave open.
+
+    What forces add at once stands beside the oscillators.
 
     Raises:
         UnprovedError: A mode may not oscillate somewhere in the box.
     """
-    coefficients = model.coefficients
-    loads: list[History | None] = [load.history for load in model.loads]
+    parts: list[tuple[History | None, TaylorModel]] = [
+        (load.history, load.share) for load in model.loads if not isinstance(load, Direct)
+    ]
     if model.has_free_response:
-        loads = [None, *loads]
+        parts = [(None, model.coefficient), *parts]
     sources = list[Source]()
-    for k, load in enumerate(loads):
-        sources.append(Source(f"displacement{k}", load, is_displacement=True))
-        sources.append(Source(f"velocity{k}", load))
+    for k, (history, _) in enumerate(parts):
+        sources.append(Source(f"displacement{k}", history, is_displacement=True))
+        sources.append(Source(f"velocity{k}", history))
 
     oscillators = []
     for k in range(model.count):
@@ -131,7 +156,7 @@ def _as_oscillators(model: ModalModel, error: Array) -> DampedModels:
         if not omega_range[0] > 0:
             raise UnprovedError("a mode may not oscillate", "take less damping, or narrower inputs")
         participation = list[TaylorModel]()
-        for coefficient in coefficients:
+        for _, coefficient in parts:
             a = coefficient.real[k]
             b = coefficient.imag[k]
             participation.append(a * 2.0)
@@ -148,33 +173,15 @@ def _as_oscillators(model: ModalModel, error: Array) -> DampedModels:
             quotient_range=(low, max(high, -low)),
         )
         oscillators.append(oscillator)
+    truncated = list[TruncatedModes]()
+    if model.structure.feeds is not None:
+        forces = distinct_histories(model.flow.system.loads)
+        factors = model.structure.feeds.truncated(ORDER).T
+        truncated.append(feedthroughs(factors, forces, model.flow.time))
     models = ModalResponseModels(
         oscillators=oscillators,
-        truncated=_feedthroughs(model),
+        truncated=truncated,
         coupling=error,
         interpolation_error=error_between_nodes(model, error),
     )
     return DampedModels(models, sources)
-
-
-def _feedthroughs(model: ModalModel) -> list[TruncatedModes]:
-    """Return what forces add to accelerations at once, M⁻¹ b f, as sums of known responses f."""
-    feeds = model.structure.feeds
-    if feeds is None:
-        return []
-    time = model.flow.time
-    histories = distinct_histories(model.flow.system.loads)
-    feeds = feeds.truncated(ORDER)
-    values = np.stack([history.values(time) for history in histories])
-    deviations = np.stack([load_deviation(history, time) for history in histories])
-    shape = (len(histories), len(model.flow.outputs), len(time))
-    response = np.broadcast_to(values[:, np.newaxis], shape)
-    return [
-        TruncatedModes(
-            participation=feeds.T,
-            amplitude=feeds.T * 0.0,
-            response_midpoint=response,
-            response_radius=np.zeros(shape),
-            interpolation_error=deviations.T @ feeds.T.magnitude(),
-        )
-    ]

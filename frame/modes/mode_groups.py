@@ -18,7 +18,6 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
 from alphacut.frame.modes.intervening import BlockParticipation, Ends
-from alphacut.frame.modes.models import inverse_with_rounding
 from alphacut.frame.modes.structure import with_classical_damping
 from alphacut.frame.modes.truncated_modes import (
     ModalSums,
@@ -89,8 +88,7 @@ class ModeGroup:
         j = np.arange(len(self.eigenvalue_block.remainder))
         low, high = self.eigenvalue_block[j, j].bounds()
         off_diagonal = self.eigenvalue_block.magnitude() * (1.0 - np.eye(len(j)))
-        # The factor covers the rounding.
-        radius = off_diagonal.sum(axis=1) * (1 + 1e-12)
+        radius = off_diagonal.sum(axis=1)
         return low - radius, high + radius
 
     @property
@@ -111,9 +109,7 @@ class ModeGroup:
         low, high = self.eigenvalue_discs
         if low.min() <= 0:
             raise UnprovedError("the structure may lose its stiffness", "take narrower inputs")
-        # The factors cover the rounding.
-        shortest = float(2 * np.pi / np.sqrt(high.max()) * (1 - 1e-15))
-        return shortest, float(2 * np.pi / np.sqrt(low.min()) * (1 + 1e-15))
+        return float(2 * np.pi / np.sqrt(high.max())), float(2 * np.pi / np.sqrt(low.min()))
 
     @property
     def ratio_range(self) -> Ends:
@@ -196,8 +192,7 @@ def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
     centre, used = centred_matrices(structure.mass, structure.stiffness)
     count = min(count or centre.mode_count, centre.mode_count)
     found = enclose_subspaces(centre, used, count)
-    to_centred = inverse_with_rounding(centre.basis, like=structure.mass)
-    patterns = structure.mass.like(structure.ground_pattern[np.newaxis]) @ to_centred.T
+    patterns = structure.mass.like(structure.ground_pattern @ np.linalg.inv(centre.basis).T)[None]
     rows = structure.output_rows @ centre.basis
 
     groups = []
@@ -222,8 +217,7 @@ def mode_groups(structure: UndampedStructure, count: int | None) -> ModeGroups:
             others = ModalSums(*(x - y for x, y in zip(others, sums, strict=True)))
         low = found.eigenvalue_low[remaining].min()
         high = found.eigenvalue_high[remaining].max()
-        # The factor covers the rounding.
-        radius = (high - low) / 2 * (1 + 1e-12)
+        radius = (high - low) / 2
         eigenvalues = centre.mass.like([[(low + high) / 2]]).widened([[radius]])
         rough = _group(structure, used, remaining, eigenvalues, others)
         groups.append(replace(rough, is_whole=False))

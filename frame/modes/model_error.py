@@ -25,10 +25,6 @@ from alphacut.frame.modes.modal_model import ModalModel
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.response.load_tables import Direct, LoadTables
 
-ROUNDING = 1e-9
-"""Bound of the relative rounding of norms and of integrals over a load: a million terms of some
-operations each have less."""
-
 
 def proved_error(model: ModalModel) -> Array:
     """Bound |modal model − true response| over the box of the inputs, in the units of the outputs.
@@ -75,56 +71,27 @@ def proved_error(model: ModalModel) -> Array:
         deviation += part.impulse * start_errors[s] + 2 * part.elapsed @ energy_rates[s]
         coefficient_error = (coefficients[s] - part.coefficient).magnitude()
         output_error += 2 * part.waves[0] @ coefficient_error
-    return (1 + ROUNDING) * (deviation[:, np.newaxis] * norms.outputs + output_error)
+    return deviation[:, np.newaxis] * norms.outputs + output_error
 
 
-def direct_error_in_steps(model: ModalModel) -> Array:
-    """Bound the error of what forces add to outputs at once, within the step to each time node.
-
-    A force acts on accelerations at once, by a factor that the model takes as a polynomial of the
-    inputs. Its error over the box is multiplied by the largest |f| in the step, since f may be zero
-    at both ends of it.
-
-    Args:
-        model: The modal model, with T time nodes and m outputs.
-
-    Returns:
-        Shape (T, m), in units of the outputs; zeros where no force acts on an output at once.
-    """
-    structure = model.structure
-    error = np.zeros((len(model.flow.time), len(model.flow.outputs)))
-    n_sources = structure.impulses.shape[1]
-    for number, load in enumerate(model.loads):
-        if isinstance(load, Direct):
-            assert structure.feeds is not None
-            feedthrough = structure.feeds[:, number + 1 - n_sources]
-            of_unit = (feedthrough - load.share.real[0] * 2.0).magnitude()
-            error += np.outer(load.history.largest_in_steps(model.flow.time), of_unit)
-    return (1 + ROUNDING) * error
-
-
-def error_between_nodes(model: ModalModel, error: Array, *, direct: Array | None = None) -> Array:
+def error_between_nodes(model: ModalModel, error: Array) -> Array:
     """Return by how much a model's error within a step may exceed the smaller one at its ends.
 
     Args:
         model: The model, which tells the growth rates of its modes and the step.
         error: Bound of its error at the nodes, 0 or more, shape (times, outputs).
-        direct: Bound of that part of the error, within the step before each node, by which forces
-            act on accelerations at once, same shape; it may be zero at the nodes. None for none.
 
     Returns:
         Bound of the error in the step before each node minus the smaller one of the bounds at both
         its ends, same shape; 0 for the first node.
     """
-    # Without `direct` the bound of the error is a sum of functions of time that either rise or are
-    # in proportion to bounds of a mode's response, which decay no faster than exp(g t) with the
-    # upper bound g of its growth rate. With the most negative g of all modes, the bound within a
+    # The bound of the error is a sum of functions of time that either rise or are in proportion to
+    # bounds of a mode's response, which decay no faster than exp(g t) with the upper bound g of its
+    # growth rate. With the most negative g of all modes, the bound within a
     # step of the length h is at most exp(-g h) times its value at the end.
     rate = largest_growth(model.eigenvalue, np.ones(model.eigenvalue.inputs))
     swell = float(np.exp(np.maximum(-rate, 0.0).max() * model.flow.step))
     within = swell * np.maximum(error[1:], error[:-1])
-    if direct is not None:
-        within = within + direct[1:]
     added = np.zeros_like(error)
     added[1:] = within - np.minimum(error[1:], error[:-1])
     return added
@@ -314,7 +281,7 @@ def _forced_part(model: ModalModel, growth: Array, load: LoadTables) -> Response
 
     def moments(decay: float) -> Array:
         """Bounds of ∫ τ^r exp(−decay τ) |a(t − τ)| dτ, (5, T)."""
-        return (1 + ROUNDING) * absolute_moments(decay, load.history, time)
+        return absolute_moments(decay, load.history, time)
 
     undamped = moments(0.0)
     of_modes = np.stack([moments(-float(g)) for g in growth], axis=-1)  # (5, T, n)

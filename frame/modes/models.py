@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.frame.calculus.rounding import gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox
+from alphacut.frame.calculus.taylor_model import TaylorModel, all_on_subbox, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.blocks import CentredMatrices
 from alphacut.frame.modes.clusters import centred_matrices, enclose_subspaces
@@ -21,16 +20,15 @@ from alphacut.frame.modes.intervening import (
 )
 from alphacut.frame.modes.structure import ClassicalStructure
 from alphacut.frame.modes.truncated_modes import (
-    POWER_SQRT,
     TruncatedModes,
     coupling_bounds,
+    feedthroughs,
     modal_sums_of_block,
     response_of_truncated_modes,
     truncated_modes,
 )
-from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.oscillators import POWERS, Source
+from alphacut.frame.response.oscillators import POWERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +88,11 @@ class ModalResponseModels:
                 modes are enclosed, as precisely as possible, unless it is given.
 
         Raises:
-            UnprovedError: None of its modes can be enclosed, or the mode shapes at the midpoint of
-                the box are ill conditioned.
+            UnprovedError: None of its modes can be enclosed.
+            numpy.linalg.LinAlgError: The mode shapes at the midpoint of the box are singular.
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
-        to_centred = inverse_with_rounding(centre.basis, like=structure.initial_state)
-        patterns = source_patterns(structure, excitation.sources) @ to_centred.T
+        patterns = source_patterns(structure, excitation.sources) @ np.linalg.inv(centre.basis).T
         selection = ModeSelection(centre.mode_count, np.zeros(centre.mode_count))
         if truncation_tolerance is not None:
             selection = required_modes(
@@ -139,66 +136,35 @@ class ModalResponseModels:
         others = truncated_modes(structure, found, participations, rows, patterns, excitation)
         if others is not None:
             truncated.append(others)
-        # The tables of oscillators contain what forces add at once through these.
-        for s, source in enumerate(excitation.sources):
-            if source.is_force and source.load:
-                of_others = _feedthrough_of_others(structure, source, all_oscillators, s)
-                deviation = load_deviation(source.load, excitation.time)
-                interpolation_error = interpolation_error + np.outer(deviation, of_others)
+        if (structure.derivative_orders == 2).any():
+            truncated += _feedthroughs_of_forces(structure, excitation)
         return cls(all_oscillators, truncated, coupling, interpolation_error)
 
 
-def _feedthrough_of_others(
-    structure: ClassicalStructure, source: Source, enclosed: list[Oscillator], index: int
-) -> Array:
-    """Bound what a unit of a force adds to outputs at once by modes not enclosed one by one, (m,).
+def _feedthroughs_of_forces(
+    structure: ClassicalStructure, excitation: Excitation
+) -> list[TruncatedModes]:
+    """Return what forces add to accelerations at once, M⁻¹ b f; nothing without a force.
 
-    A force acts on accelerations at once, by M⁻¹ b f, of which the participation factors of the
-    oscillators are a part. Bounds of outputs that are no accelerations are 0.
+    Inertia forces of further components of the ground motion add nothing to absolute accelerations.
 
     Args:
         structure: The structure over the box.
-        source: The force.
-        enclosed: The oscillators.
-        index: Index of the force among the sources.
+        excitation: T time nodes and the sources.
     """
-    coefficient = structure.force_accelerations[source.name][None] @ structure.output_rows.T
-    feedthrough = coefficient[0] * structure.output_factors
-    midpoint: Array = feedthrough.value
-    radius = feedthrough.deviation()
-    for mode in enclosed:
-        participation = mode.participation[index]
-        midpoint = midpoint - participation.value
-        radius = radius + participation.deviation()
-    return np.where(structure.derivative_orders == 2, np.abs(midpoint) + radius, 0.0)
-
-
-def inverse_with_rounding(basis: Array, *, like: TaylorModel) -> TaylorModel:
-    """Return the inverse of a matrix of numbers with a bound of its rounding, shape (n, n).
-
-    Args:
-        basis: Shape (n, n).
-        like: A Taylor model of the inputs that the result, a constant, is given as a function of.
-
-    Raises:
-        UnprovedError: The matrix is so ill conditioned that the error is not bounded.
-        numpy.linalg.LinAlgError: The matrix is singular.
-    """
-    found = np.linalg.inv(basis)
-    n = len(basis)
-    residual = np.abs(np.eye(n) - basis @ found)
-    residual += gamma(n + 1) * (np.abs(basis) @ np.abs(found))
-    # With the computed inverse C and R = I − B C, B⁻¹ − C = C R + C R² + …. If ρ, the largest sum
-    # of a row of |R|, is below 1, the series converges. Entries of |x R| for a row x add up to at
-    # most ρ times those of |x|, so that the terms beyond the first are at most ρ/(1 − ρ) times the
-    # sum of a row of |C| |R|.
-    rho = float(residual.sum(axis=1).max())
-    if not rho < 1:
-        what = "the mode shapes at the midpoint of the box are ill conditioned"
-        raise UnprovedError(what, "take masses of less different magnitudes")
-    first = np.abs(found) @ residual
-    others = first.sum(axis=1, keepdims=True) * rho / (1 - rho)
-    return like.like(found).widened((1 + gamma(8 * n + 8)) * (first + others))
+    forces = [source for source in excitation.sources if source.name.startswith("force")]
+    if not forces:
+        return []
+    accelerations = [structure.force_accelerations[source.name][None] for source in forces]
+    takes_acceleration = (structure.derivative_orders == 2).astype(float)
+    factors = concatenate(accelerations, -2) @ structure.output_rows.T
+    return [
+        feedthroughs(
+            factors * structure.output_factors * takes_acceleration,
+            [source.load for source in forces if source.load],
+            excitation.time,
+        )
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +219,6 @@ def required_modes(
             rho = np.stack([np.exp(sigma * time), time * np.exp(sigma * time)])
         for o, order in enumerate(structure.derivative_orders):
             response = source.read(sigma, sigma**order * rho[0])
-            response = response + source.feedthrough(int(order), time)
             # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
             largest = np.abs(rho[1]).max(axis=1)
             slope = largest * omega**order / 2
@@ -268,7 +233,7 @@ def required_modes(
             ]
             # The power 0 needs Σ a², which is unknown where outputs take massless unknowns.
             if takes_massless[o]:
-                errors = errors[POWER_SQRT:]
+                errors = errors[1:]
             error[:, o] += np.min(errors, axis=0)
     sufficient = np.flatnonzero((error <= tolerance).all(axis=1))
     count = max(int(sufficient[0]), 1) if len(sufficient) else n
@@ -282,26 +247,23 @@ def _truncation_error(
     """Estimate the error of an output without the modes from k on, for each k, shape (n,).
 
     By Cauchy and Schwarz it is √(Σ a² Σ β²) times the radius of the range of λ^κ e over these
-    modes. At κ = ½ each a² is divided by λ, and at κ = 1 each a² and each β². It is an estimate at
-    the midpoint of the box, and no bound.
+    modes. At κ = 1 each a² and each β² is divided by λ. It is an estimate at the midpoint of the
+    box, and no bound.
 
     Args:
         output_modes: Output row times mode shape a of n modes by rising frequency, shape (n,).
         participation: Participation factors β, shape (n,).
         response: Responses e of the modes at T times, shape (n, T).
         eigenvalues: λ, shape (n,), positive.
-        power: κ: 0, ½ or 1.
+        power: κ: 0 or 1.
     """
-    output_terms = output_modes**2 / eigenvalues ** float(power > 0)
-    source_terms = participation**2 / eigenvalues ** float(power == 1)
-    output_sums = np.cumsum(output_terms[::-1])[::-1]  # over modes k and above
-    source_sums = np.cumsum(source_terms[::-1])[::-1]
+    weights = eigenvalues**-power
+    output_sums = np.cumsum((output_modes**2 * weights)[::-1])[::-1]  # over modes k and above
+    source_sums = np.cumsum((participation**2 * weights)[::-1])[::-1]
     scaled = response * eigenvalues[:, np.newaxis] ** power
     high = np.maximum.accumulate(scaled[::-1])[::-1]
     minus_low = np.maximum.accumulate(-scaled[::-1])[::-1]
-    if power == POWERS[POWER_SQRT]:  # the range must be centred at zero
-        radius = np.maximum(high, minus_low)
-    else:  # ranges reach down to the mode below, as frequencies vary
-        mode_below = np.maximum(np.arange(len(high)) - 1, 0)
-        radius = (high + minus_low)[mode_below] / 2
+    # ranges reach down to the mode below, as frequencies vary
+    mode_below = np.maximum(np.arange(len(high)) - 1, 0)
+    radius = (high + minus_low)[mode_below] / 2
     return np.asarray(np.sqrt(output_sums * source_sums) * radius.max(axis=1))

@@ -7,25 +7,18 @@ and B = Σ β² over the truncated modes, with or without λ in the denominator.
 response of an oscillator with λ_k. By Cauchy and Schwarz the truncated modes add
 
     C m ± √(A B) r          with C, A and B without λ: m ± r contains e_k of all truncated modes;
-    ± √(A B) sup |λ^½ e|    with A over λ and B without λ;
     C m ± √(A B) r          with C, A and B over λ: m ± r contains λ_k e_k, and C m is the static
                             response.
 
-The smallest of the three is taken. √(A B) is replaced by (A t + B/t)/2 with a number t, which is
+The smaller of both is taken. √(A B) is replaced by (A t + B/t)/2 with a number t, which is
 not smaller and a Taylor model: at inputs where A is large, B is often small.
 
 Coupling in a block. A block contributes a e(L) β with a = r X and β = N⁻¹ Xᵀ M v, of which the
 diagonal of L gives Σ_j a_j β_j e(L_jj). Let V be the eigenvectors of L, with N^½ V orthogonal, and
 F = L off its diagonal. Then V⁻¹ (e(L) − e(diag L)) has the entries e[λ_i, L_jj] (V⁻¹ F)_ij with
 divided differences of e (Daleckii, Krein 1965). So the coupling is at most |a N^-½| Σ_j |β_j| |N^½
-F_j| sup |de/dλ|. Let the range of e over the λ_i and L_jj have the midpoint m and the radius r.
-Then a (e(L) − m) β is at most |a N^-½| |N^½ β| r, and Σ_j a_j β_j (e(L_jj) − m) at most Σ_j |a_j
-β_j| r. With δ = ‖N − 1‖₂ < 1 the eigenvalues of N lie in [1 − δ, 1 + δ], so that
-
-    Σ_j |a_j β_j| ≤ |a| |β| ≤ √(1 + δ) |a N^-½| |N^½ β| / √(1 − δ),
-
-and the coupling is also at most 2 r √((1 + δ)/(1 − δ)) |a N^-½| |N^½ β|. The eigenvalues λ_i lie in
-the discs of Gershgorin about L_jj.
+F_j| sup |de/dλ|. With δ = ‖N − 1‖₂ < 1 the eigenvalues of N lie in [1 − δ, 1 + δ], so that |N^½ x|
+≤ √(1 + δ) |x|. The eigenvalues λ_i lie in the discs of Gershgorin about L_jj.
 """
 
 from __future__ import annotations
@@ -37,7 +30,6 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.base.arrays import Array, Ints
-from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solution_series, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modes.clusters import Subspaces
@@ -49,17 +41,15 @@ from alphacut.frame.modes.intervening import (
     damped_ranges,
 )
 from alphacut.frame.modes.structure import ClassicalStructure
+from alphacut.frame.records.history import History
+from alphacut.frame.response.chord_deviation import load_deviation
 from alphacut.frame.response.oscillators import (
-    POWERS,
     Oscillators,
     Ranges,
     Source,
     grid_over,
     response_ranges,
 )
-
-POWER_SQRT = POWERS.index(0.5)
-"""Position of the weight √λ among the weights λ^κ with the exponents κ of `POWERS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +60,7 @@ class TruncatedModes:
     amplitude: TaylorModel  # R, (sources, m)
     response_midpoint: Array  # m, (sources, m, T)
     response_radius: Array  # r, (sources, m, T)
-    # bound of the distance of the response from straight lines between nodes, without what forces
-    # add to accelerations at once, (T, m)
+    # bound of the distance of the response from straight lines between nodes, (T, m)
     interpolation_error: Array
 
     def at(self, nodes: Ints | slice, outputs: Ints | slice) -> TruncatedModes:
@@ -91,6 +80,26 @@ class TruncatedModes:
         return np.asarray(products.max(axis=-1).sum(axis=0))
 
 
+def feedthroughs(factors: TaylorModel, histories: Sequence[History], time: Array) -> TruncatedModes:
+    """Return what forces add to accelerations at once as a sum of known responses f(t).
+
+    Args:
+        factors: What a unit of each force adds to the m outputs, shape (forces, m).
+        histories: The forces f over time.
+        time: T time nodes, in s.
+    """
+    values = np.stack([history.values(time) for history in histories])
+    deviations = np.stack([load_deviation(history, time) for history in histories])
+    response = np.repeat(values[:, np.newaxis], factors.remainder.shape[1], axis=1)
+    return TruncatedModes(
+        participation=factors,
+        amplitude=factors * 0.0,
+        response_midpoint=response,
+        response_radius=0.0 * response,
+        interpolation_error=deviations.T @ factors.magnitude(),
+    )
+
+
 class ModalSums(NamedTuple):
     """Sums over modes, without the factors of the outputs; m outputs."""
 
@@ -105,7 +114,7 @@ class ModalSums(NamedTuple):
 class WeightedSums(NamedTuple):
     """Sums over truncated modes with a weight λ^-κ, with the factors of the outputs."""
 
-    participation: TaylorModel  # C = Σ a β λ^-κ, (sources, m); 0 where it is not known
+    participation: TaylorModel  # C = Σ a β λ^-κ, (sources, m)
     amplitude: TaylorModel  # R ≥ Σ |a β| λ^-κ, (sources, m)
 
 
@@ -319,11 +328,10 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
 def _weighted_sums(
     sums: ModalSums, structure: ClassicalStructure, found: Subspaces
 ) -> list[WeightedSums]:
-    """Return C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ for the exponents κ = 0, ½, 1, over the box.
+    """Return C = Σ a β λ^-κ and R ≥ Σ |a β| λ^-κ for the exponents κ = 0 and 1, over the box.
 
-    By Cauchy and Schwarz R = √(A B) with A = Σ a² and B = Σ β². At κ = ½ each a² is divided by λ,
-    and at κ = 1 each a² and each β². R is replaced by (A t + B/t)/2 with a number t > 0, which is
-    not smaller and a Taylor model. C is not known for ½, where 0 stands in its place.
+    By Cauchy and Schwarz R = √(A B) with A = Σ a² and B = Σ β², each divided by λ at κ = 1. R is
+    replaced by (A t + B/t)/2 with a number t > 0, which is not smaller and a Taylor model.
 
     Args:
         sums: The sums over modes with eigenvalues λ, as functions of the inputs of mass and
@@ -340,13 +348,11 @@ def _weighted_sums(
     all_sums = ModalSums(*(x.truncated(order).embedded(found.used, inputs) for x in sums))
     factors = structure.output_factors
     without = _root_of_product(all_sums.output_squares, all_sums.source_squares)
-    mixed = _root_of_product(all_sums.output_squares_over_eigenvalue, all_sums.source_squares)
     over_eigenvalue = _root_of_product(
         all_sums.output_squares_over_eigenvalue, all_sums.source_squares_over_eigenvalue
     )
     return [
         WeightedSums(all_sums.products * factors, without * factors),
-        WeightedSums(all_sums.products * 0.0 * factors, mixed * factors),
         WeightedSums(all_sums.products_over_eigenvalue * factors, over_eigenvalue * factors),
     ]
 
@@ -374,7 +380,7 @@ def _with_best_weights(
     Args:
         structure: Structure whose outputs take the derivatives by time `derivative_orders`, shape
             (m,).
-        sums: C and R for κ = 0, ½, 1, shape (sources, m) each; C is not known for ½, where it is 0.
+        sums: C and R for κ = 0 and 1, shape (sources, m) each.
         ranges: Lower and upper bounds of λ_k^κ e_k(t), and of its distance from straight lines
             between time nodes, shape (exponents, sources, T) each, by the order of the derivative.
 
@@ -390,11 +396,6 @@ def _with_best_weights(
     line_errors = np.stack([x.line_deviation for x in by_output], axis=2)
     midpoint = (low + high) / 2
     radius = (high - low) / 2
-
-    # With the weight √λ the sum C is not known, so the midpoint cannot be used. The interval is
-    # replaced by one that contains it and is centred at zero.
-    radius[POWER_SQRT] = np.abs(midpoint[POWER_SQRT]) + radius[POWER_SQRT]
-    midpoint[POWER_SQRT] = 0.0
 
     # The best exponent is the one with the smallest largest R r(t), shape (sources, outputs).
     max_amplitudes = np.stack([x.amplitude.magnitude() for x in sums])
@@ -440,8 +441,8 @@ def coupling_bounds(
     """Bound what couples the oscillators of a block of several modes.
 
     The block spans an invariant subspace K X = M X L; its oscillators are the diagonal entries of
-    L, and F, the rest of L, couples them. The smaller of two bounds is taken: |F| times the slope
-    of responses by their eigenvalue, and a bound by twice the radius of the range of responses.
+    L, and F, the rest of L, couples them: by at most |F| times the slope of responses by their
+    eigenvalue.
 
     Args:
         structure: The structure over the box, with m outputs.
@@ -481,25 +482,20 @@ def coupling_bounds(
         outputs = np.flatnonzero(structure.derivative_orders == order)
         for s, source in enumerate(sources):
             by_slope = factors.by_slope[s, outputs]
-            by_range = factors.by_range[s, outputs]
-            response = table.responses(source, order)
-            G, G_slope = response.largest
-            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
-            radius = np.ptp(response.value, axis=(1, 2)) / 2 + response.error
-            at_nodes[:, outputs] += np.minimum(
-                np.outer(slope, by_slope), 2 * np.outer(radius, by_range)
-            )
+            largest = table.responses(source, order).largest
+            slope = response_slopes(source, *largest, low_omega, max_quotient)
+            at_nodes[:, outputs] += np.outer(slope, by_slope)
             # The coupling is the block's response a e(L) β less that of its oscillators, Σ a_j β_j
             # e(L_jj). With the interpolation error of e, its distance ℓ from a straight line, the
             # first is off a line by |a N^-½| |N^½ β| ℓ at most and the second by Σ |a_j β_j| ℓ,
-            # hence the coupling by twice `by_range` ℓ; or by twice its own largest value within the
+            # hence the coupling by twice `by_line` ℓ; or by twice its own largest value within the
             # step.
             max_force = source.load.extremes[0] if source.load else 0.0
-            G, G_slope = _largest_within_steps(
-                response.largest, time, max_force=max_force, max_sigma=max_sigma, order=order
+            within = _largest_within_steps(
+                largest, time, max_force=max_force, max_sigma=max_sigma, order=order
             )
-            slope = response_slopes(source, G, G_slope, low_omega, max_quotient)
-            by_line = np.outer(response.line_deviation, by_range)
+            slope = response_slopes(source, *within, low_omega, max_quotient)
+            by_line = np.outer(table.line_deviation(source, order), factors.by_line[s, outputs])
             interpolation_error[:, outputs] += 2 * np.minimum(by_line, np.outer(slope, by_slope))
     return CouplingBounds(at_nodes, interpolation_error, ranges)
 
@@ -509,7 +505,7 @@ class _CouplingFactors(NamedTuple):
 
     by_slope: Array  # bound of the coupling over sup |de/dλ|, (sources, m)
     # bound of |a N^-½| |N^½ β|, and of Σ |a_j β_j|, which may be larger, (sources, m)
-    by_range: Array
+    by_line: Array
     off_diagonal: Array  # bound of |F|, L off its diagonal, (p, p)
 
 
@@ -525,7 +521,7 @@ def _coupling_factors(
 
     Returns:
         `by_slope`, a bound of the coupling divided by sup |de/dλ| of responses e, shape (sources,
-        m); `by_range`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
+        m); `by_line`, a bound of |a N^-½| |N^½ β| and of Σ |a_j β_j|, shape (sources, m); and
         `off_diagonal`, a bound of |L| off its diagonal, with zeros on it, shape (p, p), transposed
         as the block holds L.
 
@@ -535,10 +531,9 @@ def _coupling_factors(
     block = participation.block
     off_diagonal = block.eigenvalue_block.magnitude() * (1.0 - np.eye(len(block.modes)))
     p = len(block.modes)
-    # δ ≥ ‖N − 1‖₂ over the box. The norm of a matrix of magnitudes bounds that of the matrix; it is
-    # computed with an error of a few p roundings, for which 64 p are added.
+    # δ ≥ ‖N − 1‖₂ over the box. The norm of a matrix of magnitudes bounds that of the matrix.
     mass_change = (block.modal_mass - np.eye(p)).magnitude()
-    delta = (1 + gamma(64 * p)) * float(np.linalg.norm(mass_change, 2))
+    delta = float(np.linalg.norm(mass_change, 2))
     if not delta < 1:
         raise UnprovedError("modal masses of a block may be singular", "take narrower inputs")
     outputs = np.sqrt(participation.output_sums.magnitude()) * structure.output_factors.magnitude()
@@ -547,11 +542,11 @@ def _coupling_factors(
     by_source = participation.source_participation.magnitude().T @ of_columns
     # Σ |a_j β_j| ≤ |a| |β| with |a| ≤ √(1 + δ) |a N^-½| and |β| ≤ |N^½ β| / √(1 − δ). The bound is
     # not less than |a N^-½| |N^½ β| itself.
-    of_masses = (1 + gamma(8)) * np.sqrt((1 + delta) / (1 - delta))
+    of_masses = np.sqrt((1 + delta) / (1 - delta))
     of_sources = of_masses * np.sqrt(participation.source_sums.magnitude())
     return _CouplingFactors(
         by_slope=by_source[:, np.newaxis] * outputs,
-        by_range=of_sources[:, np.newaxis] * outputs,
+        by_line=of_sources[:, np.newaxis] * outputs,
         off_diagonal=off_diagonal,
     )
 

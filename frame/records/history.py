@@ -123,34 +123,6 @@ class History:
         times = np.asarray(time, float)
         return self.envelope(times) * self.wave(times)
 
-    def largest_in_steps(self, time: Array) -> Array:
-        """Return an upper bound of |f| in the step before each of rising times.
-
-        The history is f(t) = g(t) sin(Ω (t - start) + phase), where g is linear between its samples
-        and zero outside them, or f = g where Ω = 0. If f jumps at the beginning of a step, the
-        value after the jump counts; at the end of a step the value before it; inside both count.
-
-        Args:
-            time: Times in s in strictly rising order, shape (T,), with T ≥ 1.
-
-        Returns:
-            Bounds in the unit of the samples, shape (T,). Entry k bounds |f| from time k - 1 to
-            time k. The first one, which has no step, is 0.
-        """
-        # |f| ≤ |g|, since the sine is at most 1. As g is piecewise linear, |g| is largest at an end
-        # of the step or at a sample inside. A step is divided at these samples; within each
-        # interval g runs from its value after a jump at the start to its value before one at the
-        # end, which is what the side -1 of the envelope gives.
-        samples = self.start + np.arange(len(self.samples)) * self.step
-        inside = samples[(samples > time[0]) & (samples < time[-1])]
-        times = np.union1d(time, inside)
-        at_start = np.abs(self.envelope(times)[:-1])
-        at_end = np.abs(self.envelope(times, -1.0)[1:])
-        largest = np.zeros(len(time))
-        first_intervals = np.searchsorted(times, time[:-1])
-        largest[1:] = np.maximum.reduceat(np.maximum(at_start, at_end), first_intervals)
-        return largest
-
     def before(self, time: Array) -> Array:
         """Return f at times in s, in the same shape; where it jumps, its value before the jump."""
         return self.envelope(time, -1.0) * self.wave(time)

@@ -205,13 +205,13 @@ class _Largest:
 
     Attributes:
         amplitude: |F| and |F″| of F = σ^order A, shape (2, P) for P segments.
-        off: Of H, which is σ^order ρ less the chord of the step: |H|, |H″|, |Im H/ω|, and
-            |Im H/ω + f| with the load f, less its chord, before and after each end, shape (5, N).
+        off: Of H, which is σ^order ρ less the chord of the step: |H|, |H″| and |Im H/ω|, shape (3,
+            N).
     """
 
     def __init__(self, segments: int) -> None:
         self.amplitude = np.zeros((2, segments))
-        self.off = np.zeros((5, segments + 1))
+        self.off = np.zeros((3, segments + 1))
 
 
 def line_deviations(
@@ -220,7 +220,6 @@ def line_deviations(
     time: Array,
     orders: Collection[int],
     *,
-    is_force: bool = False,
     at_nodes: tuple[Array, Array] | None = None,
 ) -> dict[int, Array]:
     """Return bounds of the distance of σ^order ρ, and of its imaginary part over ω, from chords.
@@ -231,8 +230,6 @@ def line_deviations(
         load: The load; None for ρ = exp(σ t).
         time: Time nodes, shape (T,), in s.
         orders: Powers of σ.
-        is_force: Whether the load itself is added to the imaginary part of order 2, as a force is
-            part of the relative acceleration.
         at_nodes: ρ with two derivatives, and bounds of its derivatives, where they are known: (3,
             T, S) and (5, T).
 
@@ -258,14 +255,7 @@ def line_deviations(
     else:
         bounds = at_nodes[1]
 
-    # The load that is added, less its chord, before and after each end. Even where it vanishes at
-    # all these ends, the load differs from lines by `pieces.bend`.
-    off_line = np.stack([np.append(0.0, pieces.off[1]), np.append(pieces.off[0], 0.0)])
-    is_added = {order: is_force and order == 2 for order in orders}
-    added = {order: off_line if is_added[order] else 0.0 * off_line for order in orders}
     largest = {order: _Largest(len(d)) for order in orders}
-    for order in orders:
-        largest[order].off[3:] = np.where(is_inside, 0.0, np.abs(added[order]))
     for batch in _batches(len(times), sigma.size):
         points = sigma.ravel()[batch]
         if at_nodes is None:
@@ -283,9 +273,7 @@ def line_deviations(
         off_chords = chords.deviations(rho)
         for order in orders:
             H, _, H2 = with_power(points, off_chords, order)
-            imaginary = H.imag / points.imag
-            before, after = added[order][..., None]
-            _raise_to(largest[order].off, H, H2, imaginary, imaginary + before, imaginary + after)
+            _raise_to(largest[order].off, H, H2, H.imag / points.imag)
 
     # between the points of the grid F differs from bilinear interpolation by `between` |F″|
     h_omega = float(np.diff(np.sort(omega)).max(initial=0.0))
@@ -303,20 +291,15 @@ def line_deviations(
         curved = growth * np.minimum((fast * d) ** 2 / 8, 2.0) * amplitude
         curved += growth * fast**order * 2 * d * pieces.bend
         # at the ends of segments: H, and its imaginary part
-        modulus, second, imaginary, *with_load = largest[order].off
+        modulus, second, imaginary = largest[order].off
         of_steps = _fourth_off_chords(order, decay, fast, load, bounds[:, node[:-1]], np.diff(time))
         of_chords = np.append(np.repeat(of_steps, np.diff(node)), 0.0)
         fourth_off = np.minimum(chords.with_ends(fourth), of_chords)
         missed = is_inside * between * (second + between * fourth_off)
-        missed_imaginary = (missed + is_inside * h_omega * imaginary) / low
-        curved_imaginary = curved / low + 0.0 * pieces.bend
-        if is_added[order]:
-            curved_imaginary = curved / low + pieces.bend
-        before = with_load[0] + missed_imaginary
-        after = with_load[1] + missed_imaginary
+        imaginary_at_ends = imaginary + (missed + is_inside * h_omega * imaginary) / low
         at_ends = modulus + missed
         of_modulus = curved + np.maximum(at_ends[:-1], at_ends[1:])
-        of_imaginary = curved_imaginary + np.maximum(after[:-1], before[1:])
+        of_imaginary = curved / low + np.maximum(imaginary_at_ends[:-1], imaginary_at_ends[1:])
         # the largest bound of the segments of each step
         total = np.stack([of_modulus, of_imaginary])
         found[order] = np.zeros((2, len(time)))

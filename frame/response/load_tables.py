@@ -61,8 +61,8 @@ class LoadTable:
         deviation: Largest |λ − midpoint|, in 1/s.
 
     Attributes:
-        truncation: Relative truncation errors of R and of its first two derivatives by λ, shape
-            (3,): in a window of the length L the series miss the q-th derivative by at most
+        truncation: Relative truncation errors of R and of its first three derivatives by λ, shape
+            (4,): in a window of the length L the series miss the q-th derivative by at most
             truncation[q] L^q ∫ |a(s)| exp(g (t − s)) ds, the integral being over the window, for
             each g ≥ Re midpoint.
 
@@ -86,27 +86,26 @@ class LoadTable:
         self.scale = 1 / (length * h)
         self.time = time
         self.ends = np.arange(length, steps, length)
-        self.truncation = np.array([2 * _exponential_tail(radius, order - q) for q in range(3)])
+        self.truncation = np.array([2 * _exponential_tail(radius, order - q) for q in range(4)])
         # Taylor coefficients, (T, order), by Cauchy's integral over that circle (a Fourier series)
         rate = midpoint + radius * self.scale * np.exp(2j * np.pi / order * np.arange(order))
         (values,) = responses_at_nodes(rate, history, time, window=length)
         self.moment = np.fft.fft(values, axis=1) / order / radius ** np.arange(order)
 
     def errors(self, waves: Array) -> Array:
-        """Bound what the series miss of R, dR/dλ and d²R/dλ² in `response`, shape (3, T).
+        """Bound what the series miss of R and its first three derivatives by λ, shape (4, T).
 
         Args:
             waves: Bounds of |∂^r R/∂λ^r|, ∫ τ^r exp(g τ) |a(t − τ)| dτ with an upper bound g of Re
-                λ over the eigenvalues and of Re midpoint, in row r = 0, 1, 2; further rows are not
-                used. Shape (3 or more, T).
+                λ over the eigenvalues and of Re midpoint, in row r, shape (4, T).
         """
         # What the series of a window leave out is multiplied by exp(λ τ) later. The time since the
         # end of the window is less than t − s for each a(s) in it, so that all windows together
         # leave out at most Σ_q binomial(p, q) truncation[q] L^q ∫ (t − s)^(p − q) |a(s)| exp(g (t −
         # s)) ds.
         length = 1 / self.scale
-        errors: Array = np.zeros((3, len(self.time)))
-        for p in range(3):
+        errors: Array = np.zeros((4, len(self.time)))
+        for p in range(4):
             for q in range(p + 1):
                 truncated = self.truncation[q] * length**q * waves[p - q]
                 errors[p] += comb(p, q) * truncated
@@ -165,11 +164,10 @@ class LoadTables:
         return tables
 
     def errors(self, waves: Array) -> Array:
-        """Bound the errors of R, dR/dλ and d²R/dλ² as `response` returns them, shape (3, T, n).
+        """Bound what the tables miss of R and its first three derivatives by λ, shape (4, T, n).
 
         Args:
-            waves: Bounds of |∂^r R/∂λ^r| at T nodes for n modes, r = 0, 1, 2, shape (3 or more, T,
-                n).
+            waves: Bounds of |∂^r R/∂λ^r| at T nodes for n modes, r = 0 … 3, shape (4, T, n).
         """
         of_modes = [table.errors(waves[:, :, k]) for k, table in enumerate(self.tables)]
         return np.stack(of_modes, axis=-1)
@@ -209,8 +207,8 @@ class Direct(LoadTables):
     """
 
     def errors(self, waves: Array) -> Array:
-        """Return zeros, shape (3, T, n): a(t) has no error."""
-        return np.zeros((3, *waves.shape[1:]))
+        """Return zeros, shape (4, T, n): a(t) has no error."""
+        return np.zeros_like(waves)
 
     def at_nodes(self, rate: Array) -> Array:
         """Return these R at all T nodes for S sets of eigenvalues: shape (S, T, n)."""

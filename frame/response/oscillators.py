@@ -3,7 +3,7 @@
 An oscillator with decay g and frequency ω, σ = −g + iω, responds to a unit of a source by
 
     load       e = −Im(σ^ν ρ) / ω,   ρ(σ; t) = ∫₀ᵗ exp(σ τ) a(t − τ) dτ,
-    force      e = Im(σ^ν ρ) / ω, and f(t) besides where ν = 2, of the relative acceleration,
+    force      e = Im(σ^ν ρ) / ω; with ν = 2 without what the force adds to accelerations at once,
     velocity   e = Im(σ^ν exp(σ t)) / ω,
     start      e = Re(σ^ν exp(σ t)) + (g/ω) Im(σ^ν exp(σ t)),
 
@@ -40,7 +40,7 @@ from alphacut.frame.response.chord_deviation import (
 )
 from alphacut.frame.response.duhamel import require_in_range
 
-POWERS = (0.0, 0.5, 1.0)
+POWERS = (0.0, 1.0)
 """Powers κ of λ in `response_ranges`."""
 
 
@@ -54,14 +54,12 @@ class Source:
         is_displacement: Whether e is Re G + (g/ω) Im G, as after an initial displacement; if not,
             it is sign · Im G/ω.
         sign: −1 for an acceleration a of the ground, which acts as −M ι a; else 1.
-        is_force: Whether f itself is part of the response with ν = 2.
     """
 
     name: str
     load: History | None = None
     is_displacement: bool = False
     sign: float = 1.0
-    is_force: bool = False
 
     @classmethod
     def named(cls, name: str, load: History | None = None) -> Source:
@@ -71,11 +69,10 @@ class Source:
             load,
             is_displacement=name == "start",
             sign=-1.0 if name == "load" else 1.0,
-            is_force=name.startswith("force"),
         )
 
     def read(self, sigma: Array, G: Array) -> Array:
-        """Return the responses e of oscillators from G = σ^ν ρ, without feedthrough.
+        """Return the responses e of oscillators from G = σ^ν ρ.
 
         Args:
             sigma: σ = −g + iω of the oscillators, ω > 0, of any shape S.
@@ -88,12 +85,6 @@ class Source:
             return np.asarray(G.real - sigma.real / sigma.imag * G.imag)
         return np.asarray(self.sign * G.imag / sigma.imag)
 
-    def feedthrough(self, order: int, time: Array) -> Array:
-        """Return the direct feedthrough f(t) of a force to accelerations, else zeros, (T,)."""
-        if self.is_force and order == 2 and self.load is not None:
-            return self.load.values(time)
-        return np.zeros_like(time)
-
 
 @dataclass(frozen=True, eq=False)
 class ModalResponses:
@@ -102,14 +93,11 @@ class ModalResponses:
     Args:
         value: Responses at the points of the grid, shape (T, Q, W).
         error: Bound of their distance from bilinear interpolation in the grid's cells, shape (T,).
-        line_deviation: Bound of their distance, between two nodes, from the chord of the step that
-            ends at each node, shape (T,).
         largest: Bounds of |G| and |G′| over the whole grid, shape (2, T).
     """
 
     value: Array
     error: Array
-    line_deviation: Array
     largest: Array
 
 
@@ -180,7 +168,7 @@ class Oscillators:
         self.grid = grid
         self.time = time
         self.orders = orders
-        self._deviations = dict[tuple[History | None, bool], dict[int, Array]]()
+        self._deviations = dict[History | None, dict[int, Array]]()
         sigma = grid.sigma.ravel()
         duration = float(time[-1])
         require_in_range(sigma, duration, duration)
@@ -213,30 +201,21 @@ class Oscillators:
             order: ν, among the orders given at the construction.
 
         Returns:
-            `value` of e at the points, shape (T, Q, W), with what a force adds at once; `error`, a
-            bound of the distance of e from bilinear interpolation between them, shape (T,);
-            `line_deviation`, of its distance from a straight line in the step before each node,
-            shape (T,); and `largest`, bounds of |G| and |dG/dσ| over the grid, G = σ^ν ρ, shape (2,
-            T).
-
-        Raises:
-            KeyError: `order` is none of those given.
+            `value` of e at the points, shape (T, Q, W); `error`, a bound of the distance of e from
+            bilinear interpolation between them, shape (T,); and `largest`, bounds of |G| and
+            |dG/dσ| over the grid, G = σ^ν ρ, shape (2, T).
         """
         grid = self.grid
         is_start = source.is_displacement
         sigma = grid.sigma.ravel()
         table = self._table(source.load)
         G = with_power(sigma, table.rho, order)
-        direct = source.feedthrough(order, self.time)
         value = source.read(sigma, G[0])
-        if direct.any():
-            value += direct[:, None]
         magnitudes = np.abs(G).max(-1)
         error, largest = self._error(magnitudes, table.bounds, order, start=is_start)
         return ModalResponses(
             value=value.reshape(-1, *grid.sigma.shape),
             error=error,
-            line_deviation=self._line_deviation(source, order),
             largest=largest,
         )
 
@@ -280,7 +259,7 @@ class Oscillators:
             across = high * second
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
-    def _line_deviation(self, source: Source, order: int) -> Array:
+    def line_deviation(self, source: Source, order: int) -> Array:
         """Return a bound of the distance of responses from their chord in each step, shape (T,).
 
         The chord is the straight line between the values at both nodes. Row j belongs to the step
@@ -290,40 +269,19 @@ class Oscillators:
             source: The source.
             order: Order of the derivative by time, among those given at the construction.
         """
-        key = source.load, source.is_force
-        if key not in self._deviations:
-            self._deviations[key] = line_deviations(
+        if source.load not in self._deviations:
+            self._deviations[source.load] = line_deviations(
                 self.grid.sigma,
                 source.load,
                 self.time,
                 self.orders,
-                is_force=source.is_force,
                 at_nodes=self._table(source.load),
             )
-        of_modulus, of_response = self._deviations[key][order]
+        of_modulus, of_response = self._deviations[source.load][order]
         if source.is_displacement:
             # |Re G + q Im G| ≤ (1 + q) |G|
             return np.asarray(of_modulus * (1 + self.grid.quotient[-1]))
         return np.asarray(of_response)
-
-    def deviation_without_feedthrough(self, source: Source, order: int) -> Array:
-        """Return a bound of the distance of responses from straight lines in each step, shape (T,).
-
-        Row j belongs to the step that ends at node j. What a force adds to accelerations at once,
-        its feedthrough f(t), is left out of the responses.
-
-        Args:
-            source: The source.
-            order: Order of the derivative by time, among those given at the construction.
-
-        Raises:
-            KeyError: `order` is none of these.
-        """
-        deviation = self._line_deviation(source, order)
-        if not (source.is_force and order == 2):
-            return deviation
-        of_modulus, _ = self._deviations[source.load, True][order]
-        return np.asarray(of_modulus / self.grid.omega[0])  # |Im G/ω| ≤ |G|/ω
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,8 +291,8 @@ class Ranges:
     Args:
         low: Lower bounds.
         high: Upper bounds.
-        line_deviation: Bounds of the distance of λ^κ e, without the feedthrough of a force, from
-            its chord in the step that ends at a node.
+        line_deviation: Bounds of the distance of λ^κ e from its chord in the step that ends at a
+            node.
     """
 
     low: Array
@@ -362,9 +320,9 @@ def response_ranges(
         orders: Orders ν of the derivatives of e by time, from 0 to 2.
 
     Returns:
-        For each order `low` and `high`, bounds of λ^κ e for κ = 0, ½, 1, and `line_deviation`,
-        bounds of its distance from a straight line in the step before each node, without what a
-        force adds at once; shape (3, sources, T) each.
+        For each order `low` and `high`, bounds of λ^κ e for κ = 0 and 1, and `line_deviation`,
+        bounds of its distance from a straight line in the step before each node, shape (2, sources,
+        T) each.
 
     Raises:
         UnprovedError: An oscillator is out of the range in which responses are computed to
@@ -398,7 +356,7 @@ def _widen_by_piece(
     Args:
         found: By the order of a derivative of the response e by time: `low`, `high` and
             `line_deviation`, bounds of λ^κ e and of its distance from straight lines in steps,
-            shape (3 exponents κ, sources, T) each; changed in place.
+            shape (2 exponents κ, sources, T) each; changed in place.
         omega: Smallest and largest frequency ω of the piece, in rad/s.
         quotient: Smallest and largest g/ω.
         time: Time nodes, shape (T,), in s.
@@ -429,8 +387,7 @@ def _widen_by_piece(
                 factor = largest_sigma**order * (1 + quotient[1])
             else:
                 factor = largest_sigma**order * (1 / slowest)
-            direct = np.abs(source.feedthrough(order, time))
-            high = scale * (factor * rho + direct)
+            high = scale * factor * rho
             low = -high
             # A response of at most r in the step is no farther than 2 r from its chord.
             deviation = 2 * scale * factor * rho_in_step
@@ -441,7 +398,7 @@ def _widen_by_piece(
                     min_bound, max_bound = _bounds_over_cells(table.value, table.error, weights)
                     low[row] = np.maximum(low[row], min_bound)
                     high[row] = np.minimum(high[row], max_bound)
-                by_table = tables.deviation_without_feedthrough(source, order)
+                by_table = tables.line_deviation(source, order)
                 deviation = np.minimum(deviation, scale * by_table)
             np.minimum(ranges.low[:, s], low, out=ranges.low[:, s])
             np.maximum(ranges.high[:, s], high, out=ranges.high[:, s])

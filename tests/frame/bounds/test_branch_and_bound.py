@@ -40,7 +40,6 @@ from alphacut.frame.bounds.kernel import (
     BoxTables,
     Examination,
     Items,
-    RemainderBounds,
     examine,
     stays_below,
 )
@@ -380,7 +379,7 @@ def test_what_a_series_of_a_load_leaves_out_is_in_the_errors_of_the_model() -> N
     table.truncation[0] = (np.abs(missed[:, 1:]) / largest[1:]).max()
     truth = UnitFlow(model.flow, model.boxes).values(unit)[..., 0]
     off = np.abs(model.at(*at, 0 * at[1])[0].reshape(21, 61) - truth).max(0)
-    of_values = remainder_bounds(model, np.ones(1), np.ones(1)).rounding[:, 0, 0]
+    of_values = remainder_bounds(model, np.ones(1), np.ones(1)).tables[:, 0]
     assert 0.5 < (off / (proved_error(model)[:, 0] + of_values))[1:].max() <= 1
 
 
@@ -460,11 +459,11 @@ def least_closed(model):
     ends, count = np.ones(1), 2 * len(model.flow.time)
     frontier = Frontier.whole_box(-ends, ends, count)
     piece = Piece(slice(0, 1), slice(0, count))
-    remainder = remainder_bounds(model, -ends, ends)
+    third = remainder_bounds(model, -ends, ends).third
     low, high = np.full(count, -2.5), np.full(count, 2.5)
     for _ in range(30):
         target = (low + high) / 2
-        code = examine_items(model, remainder, target, frontier, piece).code
+        code = examine_items(model, third, target, frontier, piece).code
         low, high = np.where(code, target, low), np.where(code, high, target)
     return high
 
@@ -497,11 +496,11 @@ def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
         assert not shown(g, H, r, 0.49, work, L)
 
 
-def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
+def code_of_box(*, slope, bend, third, radius, target, is_at_ends):
     """Code of one box |x| ≤ `radius` of one input, of one output at one node, on its upper side.
 
     About its centre the output is slope · x + bend · x²/2, with a third derivative of at most
-    `third` in size, and a slope that is wrong by `slope_error` at most.
+    `third` in size.
     """
     table = np.array([0.0, slope, bend]).reshape(1, 1, 1, 3)
     found = Examination.none(1)
@@ -509,36 +508,30 @@ def code_of_box(*, slope, bend, third, slope_error, radius, target, is_at_ends):
         Items(np.array([0, 1]), np.array([0, 1]), node=np.array([0]), column=np.array([1])),
         BoxTables(np.full((1, 1), radius), np.full((1, 2, 1), is_at_ends), table),
         np.ones((1, 1)),
-        RemainderBounds(
-            third=np.full((1, 1, 1, 1, 1), third),
-            rounding=np.array([0.0, slope_error]).reshape(1, 1, 2),
-        ),
+        np.full((1, 1, 1, 1, 1), third),
         np.array([np.inf, target]),
         found,
     )
     return found.code[0]
 
 
-@pytest.mark.parametrize("part", ["bend", "third", "slope_error"])
+@pytest.mark.parametrize("part", ["bend", "third"])
 @pytest.mark.parametrize("is_at_ends", [False, True])
 def test_a_box_whose_highest_point_lies_inside_is_bisected(part, is_at_ends, rng):
     """It is neither left to its neighbour nor confined to its end, though it rises at its centre.
 
     The slope falls from the centre to the upper end, by one part of what it may change by, to less
-    than zero; half of that part would not suffice. So the output is highest inside, or at the lower
-    end where its slope is wrong throughout.
+    than zero; half of that part would not suffice. So the output is highest inside.
     """
     radius, fall = rng.uniform(0.1, 10, 2)
     slope = fall * rng.uniform(0.55, 0.95)
     x = radius * np.linspace(-1, 1, 20001)
     # by each part the slope at `radius` is smaller than that at the centre by `fall`
     parts = {
-        "bend": {"bend": -fall / radius, "third": 0.0, "slope_error": 0.0},
-        "third": {"bend": 0.0, "third": 2 * fall / radius**2, "slope_error": 0.0},
-        "slope_error": {"bend": 0.0, "third": 0.0, "slope_error": fall},
+        "bend": {"bend": -fall / radius, "third": 0.0},
+        "third": {"bend": 0.0, "third": 2 * fall / radius**2},
     }[part]
-    output = (slope - parts["slope_error"]) * x
-    output += parts["bend"] * x**2 / 2 - parts["third"] * x**3 / 6
+    output = slope * x + parts["bend"] * x**2 / 2 - parts["third"] * x**3 / 6
     target = (output.max() + max(output[-1], 0.0)) / 2
     code = code_of_box(slope=slope, radius=radius, target=target, is_at_ends=is_at_ends, **parts)
     assert code == 1

@@ -5,7 +5,6 @@ and what is known of the truncated modes by sums alone, each also hardly wider t
 """
 
 from dataclasses import replace
-from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,11 +31,7 @@ from alphacut.frame.modes.intervening import (
     oscillators,
     source_patterns,
 )
-from alphacut.frame.modes.models import (
-    ModalResponseModels,
-    ModeSelection,
-    inverse_with_rounding,
-)
+from alphacut.frame.modes.models import ModalResponseModels, ModeSelection
 from alphacut.frame.modes.structure import classical_structure
 from alphacut.frame.modes.truncated_modes import (
     WeightedSums,
@@ -309,7 +304,7 @@ def coupled(own, structure, time):
     middle, used = centred_matrices(structure.mass, structure.stiffness)
     found = enclose_subspaces(middle, used, 2)
     excitation = Excitation(time, sources(own, structure))
-    to_modal = inverse_with_rounding(middle.basis, like=structure.initial_state)
+    to_modal = np.linalg.inv(middle.basis)
     patterns = source_patterns(structure, excitation.sources) @ to_modal.T
     rows = structure.initial_state.like(structure.output_rows) @ middle.basis
     of_block = BlockParticipation.from_block(found.blocks[0], rows, patterns, used)
@@ -328,11 +323,10 @@ NARROW, WIDE = (1.0, 1.0, 0.2), (12.0, 12.0, 10.0)
         (0.02, "start", NARROW, 0),
         (0.3, "velocity", NARROW, 0),
         (0.3, "start", NARROW, 0),
-        (0.002, "velocity", WIDE, 1),  # bounded by the range of the responses, late
     ],
 )
 def test_what_couples_a_block_holds_and_half_would_not_do(ratio, source, widths, read):
-    time = np.linspace(0, {0.3: 1, 0.02: 4, 0.002: 8}[ratio], 81)
+    time = np.linspace(0, {0.3: 1, 0.02: 4}[ratio], 81)
     own, (structure, centre, radius) = crossing_pair(widths, ratio, source, read)
     single, added, _ = coupled(own, structure, time)
     assert len(single) == 2
@@ -393,8 +387,8 @@ def test_a_block_strays_from_lines_between_nodes_as_far_as_stated():
 RECORD = Accelerogram(0.02, np.sin(np.arange(150) * 0.21) * np.sin(np.arange(150) * 0.047))
 
 
-@pytest.mark.parametrize("power", [0, 1, 2])
-def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch):
+@pytest.mark.parametrize("power", [0, 1])
+def test_modes_known_by_sums_stay_within_both_norms(power, monkeypatch):
     own = matrices(
         [("a", 100 * np.array([[2.0, -1], [-1, 1]])), ("b", np.diag([0, 60.0]))],
         {"a": 1.0, "b": 1.0},
@@ -447,7 +441,7 @@ def test_ranges_hold_all_responses_times_powers_of_frequency(order):
     squared = np.abs(fine.sigma) ** 2
     for s, source in enumerate(sources):
         value = Oscillators(fine, time, {order}).responses(source, order).value
-        for k, power in enumerate((0.0, 0.5, 1.0)):
+        for k, power in enumerate((0.0, 1.0)):
             scaled = (value * squared**power).reshape(len(time), -1)
             assert (scaled.max(1) <= found.high[k, s] + 1e-9).all()
             assert (scaled.min(1) >= found.low[k, s] - 1e-9).all()
@@ -504,43 +498,6 @@ def test_right_sides_of_a_subspace_are_bounded_and_so_is_how_fast_they_change(ki
         assert (largest >= 0.8 * bound).all()
 
 
-def exact_inverse(matrix):
-    """The inverse by Gauss and Jordan with fractions, rows of fractions."""
-    n = len(matrix)
-    rows = [
-        [Fraction(float(x)) for x in row] + [Fraction(i == j) for j in range(n)]
-        for i, row in enumerate(matrix)
-    ]
-    for i in range(n):
-        pivot = max(range(i, n), key=lambda k: abs(rows[k][i]))
-        rows[i], rows[pivot] = rows[pivot], rows[i]
-        rows[i] = [x / rows[i][i] for x in rows[i]]
-        for k in range(n):
-            if k != i:
-                rows[k] = [x - rows[k][i] * y for x, y in zip(rows[k], rows[i], strict=True)]
-    return [row[n:] for row in rows]
-
-
-@pytest.mark.parametrize("factor", [1.0, 0.7])
-def test_an_inverse_is_off_by_its_rounding_or_by_what_it_is_wrong(factor, rng, monkeypatch):
-    """Of an inverse that is too small by 30 %, the residual and its powers give the error."""
-    matrix, inverse = rng.normal(size=(4, 4)) + 4 * np.eye(4), np.linalg.inv
-    monkeypatch.setattr(np.linalg, "inv", lambda x: factor * inverse(x))
-    found = inverse_with_rounding(matrix, like=TaylorModel.constant(np.zeros(1), 1))
-    off = [
-        [abs(float(Fraction(float(x)) - y)) for x, y in zip(*rows, strict=True)]
-        for rows in zip(found.value, exact_inverse(matrix), strict=True)
-    ]
-    shares = np.array(off) / found.remainder
-    assert 1e-3 <= shares.max() <= 1
-
-
-def test_an_ill_conditioned_basis_is_refused():
-    hilbert = 1 / (np.arange(12)[:, np.newaxis] + np.arange(12) + 1.0)
-    with pytest.raises(UnprovedError, match="ill conditioned"):
-        inverse_with_rounding(hilbert, like=TaylorModel.constant(np.zeros(1), 1))
-
-
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_remainders_of_a_mode_are_nearly_attained(degree, rng):
     """Of a mode that the other one approaches, so that all terms beyond the degree add up.
@@ -589,17 +546,21 @@ def test_eigenvalues_drop_by_all_parts_of_a_model(sign, rng):
     assert drop == pytest.approx(scale**2 * (slope + abs(bend) + remainder), rel=1e-9)
 
 
-def test_solutions_are_bounded_by_those_of_the_comparison_matrix(rng):
-    """All solutions of A y = r, and that of the matrix whose entries all hinder the most."""
+def test_solutions_are_bounded_in_the_norm_and_row_by_row(rng):
+    """Of A = D + F with |F_ij| ≤ S, hence |D^-½ r| ≥ (1 − ‖D^-½ S D^-½‖) |D^½ y|."""
     distance, spread = rng.uniform(1.0, 3.0, 3), rng.uniform(0.0, 0.3, (3, 3))
-    hindering = np.diag(distance) - spread
-    comparison = SolutionBounds(distance, spread, np.linalg.inv(hindering), min_eigenvalue=0.0)
+    spread = (spread + spread.T) / 2
+    scaled = spread / np.sqrt(np.outer(distance, distance))
     right = rng.uniform(0.5, 2.0, 3)
-    bound = comparison.solution_bounds(right)
-    np.testing.assert_allclose(bound, np.linalg.solve(hindering, right), rtol=1e-9)
+    smallest = 1 - np.linalg.norm(scaled, 2)
+    bound = SolutionBounds(distance, spread, smallest).solution_bounds(right)
+    hindered = np.linalg.solve(np.diag(distance) - spread, right)
+    assert (hindered <= bound * (1 + 1e-12)).all()
+    assert (bound <= 1.5 * hindered).all()
     signs = rng.choice([-1.0, 1.0], (200, 3, 3))
+    signs = np.triu(signs) + np.triu(signs, 1).swapaxes(1, 2)
     for A in np.diag(distance) + signs * spread:
-        y = np.linalg.solve(A, right * signs[0, 0])
+        y = np.linalg.solve(A, right * rng.choice([-1.0, 1.0], 3))
         assert (np.abs(y) <= bound * (1 + 1e-9)).all()
 
 
@@ -698,32 +659,6 @@ def block_with_modal_masses(masses, outputs, sources):
         modal_forces=modal_mass @ participation,
         source_participation=participation,
     )
-
-
-@pytest.mark.parametrize("delta", [0.0, 0.1, 0.5, 0.8, 0.95])
-def test_products_of_shapes_and_sources_are_bounded_by_their_sums(delta):
-    """Σ |a_j β_j| reaches √((1 + δ)/(1 − δ)) times √(a N⁻¹ aᵀ β·N β) with δ = ‖N − 1‖₂.
-
-    a belongs to the largest eigenvalue of N, 1 + δ, and β to the smallest one, 1 − δ.
-    """
-    masses = np.array([[1.0, delta], [delta, 1.0]])
-    outputs = np.sqrt((1 + delta) / 2) * np.array([1.0, 1.0])
-    sources = np.array([1.0, -1.0]) / np.sqrt(2 * (1 - delta))
-    assert outputs @ np.linalg.solve(masses, outputs) == pytest.approx(1)
-    assert sources @ masses @ sources == pytest.approx(1)
-    of_block = block_with_modal_masses(masses, outputs, sources)
-    of_sums = SimpleNamespace(  # the sums at u = 1, and not bounds over the box
-        block=of_block.block,
-        source_participation=of_block.source_participation,
-        output_sums=TaylorModel.constant(np.ones(1), 1),
-        source_sums=TaylorModel.constant(np.ones(1), 1),
-    )
-    structure = SimpleNamespace(output_factors=TaylorModel.constant(np.ones(1), 1))
-    of_products = np.abs(outputs * sources).sum()
-    by_range = _coupling_factors(structure, of_sums).by_range[0, 0]
-    assert of_products <= by_range <= (1 + 1e-12) * of_products
-    # Σ |a_j β_j| is bounded with the sums of the whole box, too.
-    assert _coupling_factors(structure, of_block).by_range[0, 0] >= of_products
 
 
 def test_a_block_whose_modal_masses_may_be_singular_is_refused():
