@@ -1,4 +1,4 @@
-"""Commands on runs: ``run`` computes all stages, ``report`` makes a page or compares two runs.
+"""Commands on runs: ``run`` computes all stages, ``report`` makes a page or compares several.
 
 ``microstructure``, ``modulus`` and ``identify`` compute one stage each.
 """
@@ -25,7 +25,9 @@ from alphacut.io.typed_json import to_document
 from alphacut.report import tables
 from alphacut.report.page import comparison_page, render_page
 from alphacut.report.results import (
+    compared,
     comparison,
+    comparison_records,
     fractions_text,
     guaranteed_of,
     material,
@@ -105,10 +107,10 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
-    """Write the HTML page of a run, and the tables requested; or compare two runs.
+    """Write the HTML page of a run, and the tables requested; or compare several runs.
 
     Args:
-        options: Of the command line: `folder`, a list with one folder of results, or two to
+        options: Of the command line: `folder`, a list with one folder of results, or more to
             compare; the file `out` of the page or None; the folders `csv` and `tables` or None;
             `json` and `quiet`.
         out: Takes the names of the files, or the JSON document with ``--json -``.
@@ -121,7 +123,6 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
             into the folder.
         OSError: A file cannot be written.
     """
-    # With two folders the page compares them; `compare` refuses more.
     if len(options.folder) > 1:
         return compare(options, out)
     folder = ResultsFolder.read(Path(options.folder[0]))
@@ -149,31 +150,29 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def compare(options: argparse.Namespace, out: TextIO) -> int:
-    """Show two runs side by side, and write the files requested.
+    """Show several runs side by side, and write the files requested.
 
     Args:
-        options: Of the command line: `folder`, a list that must have two folders of results; the
-            file `out` of an HTML page, and the folders `csv` and `tables`, or None; `json` and
-            `quiet`.
+        options: Of the command line: `folder`, a list of two folders of results or more; the file
+            `out` of an HTML page, and the folders `csv` and `tables`, or None; `json` and `quiet`.
         out: Takes the table and the names of the files, or the JSON document with ``--json -``.
 
     Returns:
         Exit status 0.
 
     Raises:
-        RefusedError: There are more than two folders, their results are missing or damaged, or they
-            have no quantity in common.
+        RefusedError: Results are missing or damaged, or have no quantity in common.
         OSError: A file cannot be written.
     """
     folders = options.folder
-    require(len(folders) == 2, "FOLDER", f"{len(folders)} folders", "one or two")
-    first, second = (Summary.read(ResultsFolder.read(Path(name))) for name in folders)
-    table = comparison(first, second)
-    require(bool(table.rows), "FOLDER", " and ".join(folders), "two runs with a quantity in common")
-    rows = [dict(zip(table.head, row, strict=True)) for row in table.rows]
+    runs = [Summary.read(ResultsFolder.read(Path(name))) for name in folders]
+    quantities = compared(runs)
+    require(bool(quantities), "FOLDER", " and ".join(folders), "runs with a quantity in common")
+    table = comparison(quantities)
+    rows = comparison_records(quantities)
     files = list[Path]()
     if options.out:
-        write_text(Path(options.out), comparison_page(first, second, table))
+        write_text(Path(options.out), comparison_page(runs, table))
         files.append(Path(options.out))
     if options.csv:
         files += tables.write_csv({"comparison": pd.DataFrame(rows)}, Path(options.csv))

@@ -46,7 +46,7 @@ def add_page(parser: argparse.ArgumentParser) -> None:
     are None by default, `json` and `quiet`.
     """
     parser.add_argument(
-        "folder", metavar="FOLDER", nargs="+", help="results of a run; of two to compare them"
+        "folder", metavar="FOLDER", nargs="+", help="results of a run; of several to compare them"
     )
     parser.add_argument(
         "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"

@@ -9,7 +9,7 @@ import base64
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
@@ -91,10 +91,10 @@ def render_page(folder: ResultsFolder) -> str:
     )
 
 
-def comparison_page(first: Summary, second: Summary, comparison: Table) -> str:
-    """Return the page of two runs with the table of both side by side."""
-    title = f"{first.title} and {second.title}"
-    name = f"{first.case} and {second.case}"
+def comparison_page(runs: Sequence[Summary], comparison: Table) -> str:
+    """Return the page of several runs with the table of all side by side."""
+    title = " and ".join(run.title for run in runs)
+    name = " and ".join(run.case for run in runs)
     return render_template(
         "comparison.html", title=title, name=name, about="", comparison=comparison
     )

@@ -30,7 +30,7 @@ from alphacut.frame import (
     SuitePeaks,
     Tolerances,
 )
-from alphacut.frame.analyses.answer import enclosing_box_words
+from alphacut.frame.analyses.answer import Record, enclosing_box_words
 from alphacut.frame.structures.quantities import output_of
 from alphacut.fuzzy.result import Ends, Nature, rounded
 from alphacut.rve.image.bounds import is_positive_definite
@@ -668,32 +668,70 @@ def _driver_sentence(what: str, fractions: Mapping[str, float], *, count: int) -
     return sentence
 
 
-def comparison(first: Parts, second: Parts) -> Table:
-    """Return a table of the quantities that two runs have in common, on their lowest levels.
+class Compared(NamedTuple):
+    """A quantity that runs have in common, on their lowest levels.
 
     Args:
-        first: Numbers of the first run, whose order and units the table has.
-        second: Numbers of the second run.
-
-    Returns:
-        Row of each quantity with both values and their ratio, second over first, which is empty for
-        texts and where the first value is zero. Without a common quantity there is no row.
+        what: Its name.
+        unit: Unit of the first run.
+        values: Number in SI or text of each run, in their order.
     """
-    rows: list[Row] = []
+
+    what: str
+    unit: ShownUnit
+    values: tuple[float | str, ...]
+
+    @property
+    def ratios(self) -> tuple[float | None, ...]:
+        """Values of all runs but the first over that of the first, or None of texts and of 0."""
+        first, *others = self.values
+        return tuple(
+            other / first
+            if isinstance(other, float) and isinstance(first, float) and first
+            else None
+            for other in others
+        )
+
+
+def compared(runs: Sequence[Parts]) -> list[Compared]:
+    """Return the quantities that all runs have in common, in the order of the first run."""
     # Runs are compared by the names of quantities, whatever their cases have besides.
-    second_values = {entry.what: entry.value for entry in _compared_entries(second)}
-    for what, unit, value in _compared_entries(first):
-        if what not in second_values:
-            continue
-        second_value = second_values[what]
-        if isinstance(value, str) or isinstance(second_value, str):
-            rows.append((what, str(value), str(second_value), ""))
-            continue
-        ratio = ""
-        if value:
-            ratio = f"{second_value / value:.3f}"
-        rows.append((what, unit.text(value), unit.text(second_value), ratio))
-    return Table(("at the lowest α", "first", "second", "second over first"), rows)
+    first = {entry.what: entry.unit for entry in _compared_entries(runs[0])}
+    values = [{entry.what: entry.value for entry in _compared_entries(run)} for run in runs]
+    return [
+        Compared(what, unit, tuple(of_run[what] for of_run in values))
+        for what, unit in first.items()
+        if all(what in of_run for of_run in values)
+    ]
+
+
+def comparison(quantities: Sequence[Compared]) -> Table:
+    """Return a table of quantities as texts, with a column for each run and each ratio."""
+    rows: list[Row] = []
+    for quantity in quantities:
+        texts = [x if isinstance(x, str) else quantity.unit.text(x) for x in quantity.values]
+        ratios = ["" if ratio is None else f"{ratio:.3f}" for ratio in quantity.ratios]
+        rows.append((quantity.what, *texts, *ratios))
+    return Table(("at the lowest α", *_runs(quantities)), rows)
+
+
+def comparison_records(quantities: Sequence[Compared]) -> list[Record]:
+    """Return a row of numbers in a stated unit for each quantity, with all digits."""
+    rows: list[Record] = []
+    for quantity in quantities:
+        unit = quantity.unit
+        values = [x if isinstance(x, str) else x * unit.factor for x in quantity.values]
+        columns = zip(_runs(quantities), [*values, *quantity.ratios], strict=True)
+        row: Record = {"at the lowest α": quantity.what, "unit": unit.label}
+        rows.append(row | dict(columns))
+    return rows
+
+
+def _runs(quantities: Sequence[Compared]) -> list[str]:
+    """Return the titles of the columns of runs, and of the ratios of all but the first."""
+    count = len(quantities[0].values) if quantities else 0
+    names = ["first", "second", "third", *(f"{number}th" for number in range(4, count + 1))][:count]
+    return [*names, *(f"{name} over first" for name in names[1:])]
 
 
 def _compared_entries(parts: Parts) -> Iterator[ComparedEntry]:

@@ -146,7 +146,7 @@ class EnvelopeTask:
         peak_bounds = self._peaks(structure, result, subprogress(context.tick, end, 1.0))
         # α-cuts are nested: the lowest level contains all others, so that its extremes and its
         # largest error are those of the whole envelope.
-        data = result.to_dataset()
+        data = result.to_dataset().sel(output=list(map(str, structure.outputs)))
         lowest = data.isel(alpha=0)
         names = [str(name) for name in data["output"].values]
 
@@ -173,6 +173,8 @@ class EnvelopeTask:
     def _envelope(self, structure: Structure, progress: Progress) -> frame.Envelope:
         """Return the envelope: of the learned set if the inputs are its parameters, else of a box.
 
+        The former has all limited outputs, whose bounds over the box around the set are wider.
+
         Args:
             structure: The structure with its fuzzy parameters.
             progress: Called with the completed fraction of the envelope of a box.
@@ -182,8 +184,10 @@ class EnvelopeTask:
         linear = structure.linear
         is_proof = self.section.method in PROOFS
         if learned and linear and is_proof and set(arguments["inputs"]) == set(learned.names):
+            outputs = dict.fromkeys((*structure.outputs, *outputs_of(self.limited)))
+            structure.require_quantities("limits", tuple(outputs))
             return frame.learned_envelope(
-                linear,
+                linear.with_outputs(tuple(outputs)),
                 learned,
                 self.section.method,
                 duration=self.duration,

@@ -1,4 +1,4 @@
-"""Two runs side by side, and tables in LaTeX."""
+"""Several runs side by side, and tables in LaTeX."""
 
 import csv
 import re
@@ -29,6 +29,18 @@ def test_two_runs_stand_side_by_side(runs, capsys):
     assert "width of the peak of drift1" in rows
 
 
+def test_more_runs_have_a_column_and_a_ratio_each(runs, capsys):
+    a, b = map(str, runs)
+    assert main(["report", a, b, a, b]) == 0
+    head, *lines = (re.split(" {2,}", x) for x in capsys.readouterr().out.splitlines())
+    assert head[1:5] == ["first", "second", "third", "4th"]
+    row = next(x for x in lines if x[0] == "greatest peak of q2")
+    values = dict(zip(head, row, strict=True))
+    assert values["third"] == values["first"] != values["4th"] == values["second"]
+    assert values["third over first"] == "1.000"
+    assert values["4th over first"] == values["second over first"]
+
+
 def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     a, b = runs
     page = tmp_path / "both.html"
@@ -37,7 +49,16 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     assert "greatest peak of q2" in page.read_text(encoding="utf-8")
     assert "greatest peak of q2" in (tmp_path / "comparison.tex").read_text(encoding="utf-8")
     with (tmp_path / "comparison.csv").open(encoding="utf-8") as file:
-        assert len(list(csv.reader(file))) > 5
+        rows = {row["at the lowest α"]: row for row in csv.DictReader(file)}
+    assert len(rows) > 4
+    peaks = [summary_of(x)["envelopes"]["all"]["peak"]["q2"]["upper"][0] for x in runs]
+    row = rows["greatest peak of q2"]
+    assert [float(row[x]) for x in ("first", "second")] == pytest.approx(
+        [peak * 1e3 for peak in peaks], rel=1e-9
+    )
+    assert row["unit"] == "mm"
+    assert float(row["second over first"]) == pytest.approx(peaks[1] / peaks[0], rel=1e-9)
+    assert rows["|q2| ≤ 300 mm"]["first"] == "not exceeded"
     assert main(["report", str(a), "--quiet", "--tables", str(tmp_path)]) == 0
     names = {path.stem for path in tmp_path.glob("*.tex")}
     assert names >= {"decision", "peaks"}

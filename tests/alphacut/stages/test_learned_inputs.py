@@ -88,3 +88,23 @@ def test_an_envelope_of_the_learned_inputs_alone_is_that_of_the_learned_set(tmp_
     assert not any(BOX in title for title in tables["envelope_all-drift1"])
     assert main(["verify", str(tmp_path / "out")]) == 0
     assert "exact motions agree with what is guaranteed" in capfd.readouterr().out
+
+
+def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(tmp_path, capfd):
+    text = CASE.replace('fuzzy = ["k", "zeta"]', 'fuzzy = ["k"]').replace("[0.05, 1]", "[0.05]")
+    text = text.replace("[4, 5, 6] %", "5 %")
+    upper, members = [], []
+    for name, outputs in (("unlisted", ["drift1"]), ("listed", ["drift1", "drift2"])):
+        folder = tmp_path / name
+        folder.mkdir()
+        case = text.replace('["drift1"]', str(outputs).replace("'", '"'))
+        case += '[decision]\nlimits = ["drift2 <= 12 mm"]\n'
+        summary, told, _, tables = run_with(folder, case, capfd)
+        peak = summary["envelopes"]["all"]["peak"]["drift2"]
+        assert BOX not in told
+        upper.append(peak["upper"][0])
+        members.append(peak["reached"][0])
+        # What is drawn and tabulated over time are the outputs that the case lists.
+        assert ("envelope_all-drift2" in tables) == (name == "listed")
+    assert upper[0] == upper[1]
+    assert members[0] == members[1] <= upper[0]
