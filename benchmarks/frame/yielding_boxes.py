@@ -25,7 +25,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array
 from alphacut.frame import Accelerogram, Force, History, StoreyFrame
-from alphacut.frame.bounds import yielding_box
+from alphacut.frame.bounds import interpolated_box
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.fuzzy.sets.boxes import corners
@@ -129,7 +129,7 @@ def found_of(box: Box, rng: np.random.Generator) -> Found:
     points = np.vstack([corners(box.low, box.high), box.low + unit * (box.high - box.low)])
     points = np.clip(points, box.low, box.high)
     try:
-        bounds = yielding_box.YieldingStorey(flow, active).bounds(box.low, box.high)
+        bounds = interpolated_box.InterpolatedFrame(flow, active).bounds(box.low, box.high)
     except UnprovedError:
         return Found(False, 0.0, np.full((2, len(flow.outputs)), np.inf))
     values, peaks = flow.values_and_peaks(points)
@@ -148,8 +148,7 @@ def found_of(box: Box, rng: np.random.Generator) -> Found:
 
 def found_in(count: int, seed: int) -> Iterator[Found]:
     """Yield what is found of `count` boxes, without what is added for rounding."""
-    if hasattr(yielding_box, "ROUNDING"):
-        yielding_box.ROUNDING = 0.0
+    interpolated_box.ROUNDING = 0.0
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         yield found_of(random_box(rng), rng)

@@ -12,11 +12,12 @@ from scipy.linalg import eigh
 from alphacut.base.arrays import Array, Ints
 from alphacut.frame.bounds.interpolated_defects import (
     BoxModel,
+    Defects,
     Interpolant,
     defects,
     drifts,
-    drifts_bound,
     interpolate,
+    ranges,
 )
 from alphacut.frame.bounds.interpolated_motions import (
     DONE,
@@ -35,7 +36,7 @@ from alphacut.frame.bounds.interpolated_outputs import (
     part_peaks,
     polygons,
 )
-from alphacut.frame.calculus.interpolation import coefficients, grid
+from alphacut.frame.calculus.interpolation import bernstein_matrix, coefficients, grid
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import SAME
@@ -65,6 +66,8 @@ CHUNK = 400_000
 # How far the slider may be moved by events that are left out if nothing else is known, and by one
 # that all motions have, as multiples of the yield drift (tuned).
 MAX_MOVED = 3.0
+# Parts of an element's time on which the side of the slider's force is sought (tuned).
+SIDE_PARTS = 8
 SMALL_EVENT = 1e-8
 # Largest difference of the times of an event at the parameter sets of a box, as a fraction of the
 # elastic period (tuned: far below the time between two events with one side).
@@ -116,7 +119,8 @@ class _Properties:
         softening: Weight over height, shape (N,), in N/m.
         hardening: Shape (N,).
         yield_drift: Shape (N,), in m.
-        force: Yield force of the slider of the yielding storey, in N.
+        yield_force: Of the yielding storey, in N.
+        force: Its slider's part of this, in N.
         damping: C, shape (N, N), in N s/m.
         heights: Shape (N,), in m; None if they are not given.
         q0: Initial displacements, shape (N,), in m.
@@ -129,6 +133,7 @@ class _Properties:
     softening: TaylorModel
     hardening: TaylorModel
     yield_drift: TaylorModel
+    yield_force: TaylorModel
     force: TaylorModel
     damping: TaylorModel
     heights: TaylorModel | None
@@ -230,15 +235,6 @@ class InterpolatedFrame:
         powers[1:, :, 0] = np.cumsum(added, axis=0)[:-1]
         return LoadIntegrals(edges, powers), last
 
-    @cached_property
-    def max_acceleration(self) -> Array:
-        """Largest magnitude of each load in each of its intervals, shape (E, L)."""
-        integrals, _ = self.loads
-        width = np.diff(integrals.edges)[:, np.newaxis]
-        first = 2 * integrals.powers[:, :, 2]
-        last = first + 6 * integrals.powers[:, :, 3] * width
-        return np.asarray(np.maximum(np.abs(first), np.abs(last)))
-
     def bounds(self, low: Array, high: Array, room: Array | None = None) -> BoxBounds:
         """Return guaranteed bounds of the outputs over a box of the inputs.
 
@@ -313,10 +309,7 @@ class InterpolatedFrame:
         hardening = system.hardenings(p)
         z = self.place
         y = system.yield_drifts(p)
-        if system.yield_force:
-            force = (1.0 - hardening[z]) * p[f"fy{z + 1}"]
-        else:
-            force = (1.0 - hardening[z]) * k[z] * y[z]
+        yield_force = p[f"fy{z + 1}"] if system.yield_force else k[z] * y[z]
         floors = np.arange(system.floors)
         mass = full.mass[floors, floors]
         damping = full.dashpots
@@ -336,7 +329,8 @@ class InterpolatedFrame:
             softening=system.softening(p) if system.gravity else k * 0.0,
             hardening=hardening,
             yield_drift=y,
-            force=force,
+            yield_force=yield_force,
+            force=(1.0 - hardening[z]) * yield_force,
             damping=damping,
             heights=system.heights(p) if len(system.lengths) else None,
             q0=full.q0,
@@ -378,9 +372,11 @@ class InterpolatedFrame:
             what = f"{stiffness_words}, less weight over height, may be negative"
             raise UnprovedError(what, "take more hardening, or less weight")
         slider_ends = _ends(slider)
-        by_factors = (1 - found.hardening[z].bounds()[1]) * found.columns[z].bounds()[0]
-        slider_ends[0] = max(slider_ends[0], by_factors)
         force_ends = _ends(found.force)
+        least_part = 1 - found.hardening[z].bounds()[1]
+        if least_part > 0:
+            slider_ends[0] = max(slider_ends[0], least_part * found.columns[z].bounds()[0])
+            force_ends[0] = max(force_ends[0], least_part * found.yield_force.bounds()[0])
         mass_ends = _ends(found.mass)
         if not min(slider_ends[0], force_ends[0], mass_ends[0].min()) > 0:
             what = "positive masses, hardening below 1 and a positive yield drift are needed"
@@ -598,7 +594,7 @@ class InterpolatedFrame:
             degrees.append(model.degree + _degree(row) if model.inputs else 0)
             # (hᵀ K_p⁻¹ h + jᵀ M⁻¹ j + g² / K_z)^½ of an output hᵀ q + jᵀ v + g z
             drift_factor = factors_of.drifts.magnitude()
-            soft = np.maximum(model.stiffness_ends[0], 1e-300)
+            soft = np.maximum(model.stiffness_ends[0], 1e-150)
             by_drift = np.where(drift_factor > 0, drift_factor**2 / soft, 0.0)
             others = (factors_of.velocities.magnitude() ** 2 / model.mass_ends[0]).sum()
             others += float(factors_of.slider.magnitude()[0]) ** 2 * model.slider_ends[1]
@@ -648,8 +644,10 @@ class _Sweep:
     Attributes:
         norm: Bounds of S at the end of the elements that are done, on parts of the box, (parts,).
         drift: Bound of ∫ (‖b‖ S + |bᵀ δ_q|) dt, in m.
-        path: What the length of the plastic path lacks, in m.
-        work: By how much the works of load, damping and defects are off, in J.
+        path: By how much that of the plastic path is off by defects and changes of side, in m.
+        has_yielded: Whether the storey may have yielded.
+        side: Side of zero on which the slider's force was known to be last; 0 at the start.
+        path_error: Bound of the error of the plastic path's length, in m.
     """
 
     def __init__(
@@ -667,7 +665,9 @@ class _Sweep:
         self.count = count
         self.drift = 0.0
         self.path = 0.0
-        self.work = 0.0
+        self.side = 0
+        self.has_yielded = False
+        self.path_error = 0.0
         m = len(rows.by_norm)
         nodes = len(frame.flow.time)
         self.upper = np.full((nodes, m, 2), -np.inf)
@@ -685,7 +685,6 @@ class _Sweep:
         model = self.model
         rows = self.rows
         self.norm = np.full(model.parts**model.inputs, start)
-        self.norm_at_start = start
         size = MAX_TERMS * 3 * model.floors * model.mass.shape[1]
         chunk = max(CHUNK // size, 4)
         for first in range(0, self.count, chunk):
@@ -695,18 +694,20 @@ class _Sweep:
         widening = ROUNDING * np.abs(self.known).max(axis=1, initial=0.0)[:, np.newaxis]
         for values in (self.upper, self.steps, self.peaks):
             values += widening
-        # The error of a drift without hardening is bounded by the integral of S alone.
+        # The error of a drift without hardening is bounded by the integral of S alone, and that of
+        # the plastic path by changes of side.
         end = self.frame.flow.time[-1]
         by_drift = rows.of_drift * model.direction_norm * end + rows.without_drift
+        by_path = rows.of_path * self.path_error / max(float(self.norm.max()), 1e-300)
         history = PeakHistory(
             begin=self.elements.begin[: self.count].mean(axis=1),
             peaks=self.largest,
-            by_norm=np.minimum(rows.by_norm, by_drift),
+            by_norm=np.minimum(rows.by_norm, by_drift) + by_path,
         )
         return BoxBounds(self.upper, self.steps, self.peaks, float(self.norm.max()), history)
 
     def _add(self, chosen: slice) -> bool:
-        """Add some elements to all bounds; False where times go astray."""
+        """Add some elements to all bounds; False where times, or the slider's side, go astray."""
         model = self.model
         rows = self.rows
         found = interpolate(model, self.elements, chosen, with_rates=rows.uses_rates)
@@ -718,12 +719,16 @@ class _Sweep:
         self.norm = norms[-1]
         most = norms.max(axis=1)
         by_norm = self._drift_errors(found, missed.drift, most)
-        path = self._path_errors(found, missed.path, growth.max(axis=1), most)
+        off = np.minimum(by_norm, most / np.sqrt(max(model.stiffness_ends[0, model.place], 1e-300)))
+        path = self._path_errors(found, missed, off, most)
+        self.path_error = float(path[-1])
+        if self.path_error == np.inf:
+            return False
         values, series_error = output_series(found, rows, missed.level)
         # What the error of the motion adds: on each part by S, everywhere by the slider's force
         # beyond its yield force and by the path.
         common = series_error + missed.beyond.max(axis=1)[:, np.newaxis] * rows.of_slider
-        common += path[:, np.newaxis] * rows.of_path
+        common += np.outer(path, rows.of_path)
         by_drift = by_norm[:, np.newaxis] * rows.of_drift + most[:, np.newaxis] * rows.without_drift
         by_state = np.minimum(most[:, np.newaxis] * rows.by_norm, by_drift)
         upper = polygons(found, values)
@@ -763,57 +768,50 @@ class _Sweep:
         self.drift = float(errors[-1])
         return errors
 
-    def _path_errors(self, found: Interpolant, moved: Array, growth: Array, most: Array) -> Array:
+    def _path_errors(self, found: Interpolant, missed: Defects, drift: Array, most: Array) -> Array:
         """Return bounds of the error of the plastic path's length at the ends of elements, (e,).
 
-        The yield force times the path is the work of the load less that of damping and less the
-        energy, which is half the square of the norm N of the motion. So it is off by at most the
-        work of the defects, at most N times the growth of S; by S (|p f| + ‖C‖ (2 N + S)) over
-        time; and by S (N + S / 2) at the end.
+        The theory is in docs/theory/proofs.md, "A yielding storey", with the sides ± of the slider.
 
         Args:
             found: The motions.
-            moved: See `Defects.path`, shape (e,).
-            growth: Growth of S on each element, shape (e,).
+            missed: Their defects.
+            drift: Bounds of the error of the yielding storey's drift, shape (e,), in m.
             most: Bounds of S, shape (e,).
         """
         if not self.rows.uses_path:
             return np.zeros(len(most))
         model = self.model
-        q = found.max_relative.sum(axis=1)
-        rates = np.abs(found.load_rate).max(axis=-1).sum(axis=1) * 2.0**model.inputs
-        momentum = 3.0**model.inputs * np.abs(found.momentum).max(axis=-1).sum(axis=1)
-        speed = (momentum + q @ model.max_damping) / model.mass_ends[0]
-        speed += (rates + found.rate_error) @ np.abs(model.follow)
-        drift = drifts_bound(q)
-        squared = (speed**2 * model.mass_ends[1]).sum(axis=1)
-        squared += (drift**2 * model.stiffness_ends[1]).sum(axis=1)
-        norm = np.sqrt(squared + model.force_ends[1] ** 2 / model.slider_ends[0])
-        push = np.sqrt(
-            ((self._loads(found) @ np.abs(model.follow)) ** 2 * model.mass_ends[1]).sum(axis=1)
-        )
-        root = np.sqrt(model.mass_ends[0])
-        damping = float((model.max_damping / np.outer(root, root)).sum(axis=1).max())
-        if not self.path and not self.work:  # at the start
-            start = float(self.norm_at_start)
-            self.work = start * (norm[0] + start / 2)
-        work: Array = norm * growth + most * found.max_length * (push + damping * (2 * norm + most))
-        works = self.work + np.cumsum(work)
-        path = self.path + np.cumsum(moved)
-        self.work = float(works[-1])
+        # The plastic drift is off by the errors of the drift and of the slider, and by how far
+        # defects move this.
+        plastic = drift + 2 * most / np.sqrt(model.slider_ends[0])
+        # On each part of an element's time: may the slider's force lie beyond ∓ F / 2?
+        force = found.slider_force
+        control = np.einsum("ik,ekf->eif", bernstein_matrix(found.terms - 1, SIDE_PARTS), force)
+        middle, radius = (x.reshape(len(most), SIDE_PARTS, -1) for x in ranges(model, control))
+        half = model.force_ends[0] / 2 - missed.level[:, np.newaxis]
+        is_elastic = (found.phase == 0)[:, np.newaxis]
+        phase = found.phase[:, np.newaxis]
+        may_be_low = np.where(is_elastic, (middle - radius).min(axis=2) <= -half, phase < 0)
+        may_be_high = np.where(is_elastic, (middle + radius).max(axis=2) >= half, phase > 0)
+        if (may_be_low & may_be_high).any():
+            return np.full(len(most), np.inf)
+        side = may_be_high.astype(int) - may_be_low
+        element, _ = np.nonzero(side)
+        sides = np.append(self.side, side[side != 0])
+        changes = np.diff(sides) != 0
+        switched = np.zeros(len(most))
+        np.add.at(switched, element, 2 * plastic[element] * changes)
+        self.side = int(sides[-1])
+        path = self.path + np.cumsum(switched + missed.path)
         self.path = float(path[-1])
-        return np.asarray((works + most * (norm + most / 2)) / model.force_ends[0] + path)
-
-    def _loads(self, found: Interpolant) -> Array:
-        """Return the largest magnitude of each load over each element, shape (e, L)."""
-        edges = self.frame.loads[0].edges
-        values = self.frame.max_acceleration
-        most = np.zeros((len(found.times), values.shape[1]))
-        for e in range(len(most)):
-            first = max(int(np.searchsorted(edges, found.times[e, 0] - 1e-9)) - 1, 0)
-            last = int(np.searchsorted(edges, found.times[e, 3] + 1e-9))
-            most[e] = values[first : max(last, first + 1)].max(axis=0)
-        return most
+        # Up to here no motion has yielded if none can have come to the yield force.
+        force_bound = (np.abs(middle) + radius).max(axis=(1, 2)) + missed.level
+        force_bound += most * np.sqrt(model.slider_ends[1])
+        yields = (found.phase != 0) | (force_bound >= model.force_ends[0])
+        has_yielded = np.logical_or.accumulate(np.append(self.has_yielded, yields))[1:]
+        self.has_yielded = bool(has_yielded[-1])
+        return np.where(has_yielded, path + plastic + 2 * most**2 / model.force_ends[0], 0.0)
 
 
 def _edges(loads: Sequence[History], end: float, *, longest: float) -> tuple[Array, int]:

@@ -31,6 +31,8 @@ PARTS = {0: 1, 1: 8, 2: 4, 3: 2}
 # excess is below a fraction of the yield force, or does not become smaller by half (tuned).
 TIME_PARTS = (2, 8, 32, 128)
 SMALL_VIOLATION = 1e-9
+# The same of the velocity of a yielding storey.
+REVERSAL_PARTS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +150,7 @@ class Interpolant:
         constant: c of an elastic storey, before an element or behind it, shape (e, F), in N.
         path: See `Elements`, shape (e, F), in m.
         load_error: Bounds of |g − the polynomials in τ and inputs that stand for it|, (e, L), in m.
-        load_variation: Bounds of the integrals of |g − these|' over an element, shape (e, L).
+        load_variation: Bounds of the derivative by τ of g − these, shape (e, L), in m.
         load_rate: What interpolates g' at the inputs, shape (e, LOAD_TERMS, L, F), in m/s.
         rate_error: Bounds of |g' − this|, shape (e, L).
         max_relative: Bounds of |q| by powers of τ, shape (e, K, N).
@@ -268,6 +270,7 @@ def interpolate(
     if with_rates:
         missed_rate = _composition_errors(model, begin, length, span, rate, rates)
     fit_error = elements.fit_error[chosen]
+    powers = np.arange(LOAD_TERMS)[:, np.newaxis]
     max_length = times[:, 5]
     # At the end of yielding the constant of the elastic storey that follows counts.
     constant = elements.constant[chosen].copy()
@@ -285,7 +288,8 @@ def interpolate(
         constant=model.refined(constant),
         path=model.refined(elements.path[chosen]),
         load_error=fit_error[..., 0] + missed.sum(axis=1),
-        load_variation=fit_error[..., 1] * max_length[:, np.newaxis] + missed[:, 1:].sum(axis=1),
+        load_variation=fit_error[..., 1] * max_length[:, np.newaxis]
+        + (powers * missed).sum(axis=1),
         load_rate=model.refined(rates),
         rate_error=fit_error[..., 1] + missed_rate.sum(axis=1),
         max_relative=model.largest(relative),
@@ -481,7 +485,7 @@ def _slider_errors(found: Interpolant) -> tuple[Array, Array]:
     """Bound what polynomials of the slider's force less its yield force miss, in N.
 
     Returns:
-        Bounds of the error and of its variation over an element, shape (e,) each.
+        Bounds of the error and of its derivative by τ, shape (e,) each.
     """
     model = found.model
     stiffest = model.slider_ends[1]
@@ -489,7 +493,7 @@ def _slider_errors(found: Interpolant) -> tuple[Array, Array]:
     level = stiffest * (found.load_error @ model.following_drift) + model.force_remainder
     level += model.slider_remainder * largest.sum(axis=1)
     variation = stiffest * (found.load_variation @ model.following_drift)
-    variation += model.slider_remainder * largest[:, 1:].sum(axis=1)
+    variation += model.slider_remainder * (largest @ np.arange(found.terms))
     return level, variation
 
 
@@ -506,12 +510,12 @@ def _elastic_violations(found: Interpolant, force: Array, level: Array) -> Ints:
     # Mostly the sum of all magnitudes shows that the force is small enough.
     matrix = bernstein_matrix(found.terms - 1)
     control = np.einsum("ik,ekf->eif", matrix, force[at])
-    middle, radius = _ranges(model, control)
+    middle, radius = ranges(model, control)
     most = np.abs(middle) + radius
     return np.asarray(at[most.max(axis=1, initial=0.0) + level[at] > model.force_ends[0]])
 
 
-def _ranges(model: BoxModel, values: Array) -> tuple[Array, Array]:
+def ranges(model: BoxModel, values: Array) -> tuple[Array, Array]:
     """Return midpoints and radii of intervals of polynomials over the box, shape (…) each."""
     found = coefficients(values, model.inputs, model.fine)
     return found[..., 0], np.abs(found[..., 1:]).sum(axis=-1)
@@ -531,7 +535,7 @@ def _elastic_violation(
         model: The frame.
         force: The slider's force by powers of τ, shape (K, F), in N.
         level: Bound of what it misses, in N.
-        variation: Bound of the variation of what it misses over the element, in N.
+        variation: Bound of the derivative by τ of what it misses, in N.
 
     Returns:
         On each part of the box: bounds of what the force falls beyond the yield force, in N; of by
@@ -562,7 +566,7 @@ def _elastic_violation_on(
     degree = model.of_slider
     for side in (-1.0, 1.0):
         excess = side * control - model.force
-        middle, radius = _ranges(model, excess)
+        middle, radius = ranges(model, excess)
         may_pass = middle + radius + level > 0
         if not may_pass.any():
             continue
@@ -581,9 +585,11 @@ def _elastic_violation_on(
         change = excess[near[inner]] - excess[near[inner] - 1]
         rises[inner] = np.minimum(rises[inner], np.maximum(model.part_maxima(change, degree), 0.0))
         rises[~inner] = 0.0
-        is_beyond = above.max(axis=0) > 0
-        moved += falls.sum(axis=0) + variation * is_beyond
-        rise += float((rises.sum(axis=0) + variation * is_beyond).max())
+        # What the force misses rises and falls on those parts of the time alone.
+        is_beyond = above.reshape(pieces, -1, parts).max(axis=1) > 0
+        varied = variation * is_beyond.mean(axis=0)
+        moved += falls.sum(axis=0) + varied
+        rise += float((rises.sum(axis=0) + varied).max())
         most = np.maximum(most, above.max(axis=0))
         integral += above.mean(axis=0)
     return moved, most, integral, rise
@@ -600,15 +606,16 @@ def _reversals(found: Interpolant) -> list[tuple[int, Array]]:
     if not len(at):
         return []
     order = np.arange(1, found.terms)[:, np.newaxis]
-    matrix = bernstein_matrix(found.terms - 2)
-    # h times the velocity of the drift against the direction
+    # h times the velocity of the drift against the direction, at control points
     backward = -found.phase[at, np.newaxis, np.newaxis] * order * found.drift[at, 1:]
-    control = np.einsum("ik,ekf->eif", matrix, backward)
-    found_coefficients = coefficients(control, model.inputs, model.fine)
-    most = found_coefficients[..., 0] + np.abs(found_coefficients[..., 1:]).sum(axis=-1)
+    middle, radius = ranges(
+        model, np.einsum("ik,ekf->eif", bernstein_matrix(len(order) - 1), backward)
+    )
     variation = found.load_variation[at] @ model.following_drift
+    control_matrix = bernstein_matrix(len(order) - 1, REVERSAL_PARTS)
     results: list[tuple[int, Array]] = []
-    for number in np.flatnonzero(most.max(axis=1) + variation > 0):
-        above = np.maximum(model.part_maxima(control[number], model.degree), 0.0)
-        results.append((int(at[number]), above.mean(axis=0) + variation[number]))
+    for number in np.flatnonzero((middle + radius).max(axis=1) + variation > 0):
+        control = control_matrix @ backward[number]
+        above = model.part_maxima(control, model.degree) + variation[number]
+        results.append((int(at[number]), np.maximum(above, 0.0).mean(axis=0)))
     return results

@@ -462,7 +462,9 @@ def march(
             if event_time[f] >= loads.edges[last]:  # none that counts before the end
                 event_time[:] = NEVER
                 break
-            chosen = (event_time < event_time[f] + window) & (side == side[f])
+            # What begins when the first event has ended is another event.
+            chosen = event_time < min(event_time[f] + window, end_time[f])
+            chosen &= side == side[f]
             can_skip = True
             most = 0.0
             latest = event_time[f]

@@ -16,7 +16,6 @@ from alphacut.base.arrays import Array
 from alphacut.base.errors import FailedError
 from alphacut.base.progress_bar import Progress
 from alphacut.frame.bounds.interpolated_box import InterpolatedFrame
-from alphacut.frame.bounds.yielding_box import MAX_ERROR, YieldingStorey
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import MAX_IMBALANCE, YieldingFlow
@@ -110,11 +109,8 @@ def prove_yielding(
     return _envelope(flow, name, levels[::-1], influence)
 
 
-def provable_frame(flow: YieldingFlow, boxes: Boxes) -> InterpolatedFrame | YieldingStorey:
+def provable_frame(flow: YieldingFlow, boxes: Boxes) -> InterpolatedFrame:
     """Return the frame whose peaks can be proved, with the way to bound it over a box.
-
-    A frame of one storey is bounded by a march of polynomials (`yielding_element`), others by
-    interpolated motions (`interpolated_box`).
 
     Raises:
         UnprovedError: More or less than one storey yields, or the frame is such that nothing is
@@ -122,11 +118,7 @@ def provable_frame(flow: YieldingFlow, boxes: Boxes) -> InterpolatedFrame | Yiel
             moves the response least.
     """
     active = np.flatnonzero(boxes.upper[0] > boxes.lower[0])
-    frame: InterpolatedFrame | YieldingStorey
-    if flow.system.floors == 1:
-        frame = YieldingStorey(flow, active)
-    else:
-        frame = InterpolatedFrame(flow, active)
+    frame = InterpolatedFrame(flow, active)
     if len(active) > MAX_INPUTS:
         influence = _influence(flow, boxes)
         weakest = boxes.names[active[influence[active].argmin()]]
@@ -134,9 +126,8 @@ def provable_frame(flow: YieldingFlow, boxes: Boxes) -> InterpolatedFrame | Yiel
             f"{MAX_INPUTS} inputs of a storey that yields can be proved, not {len(active)}",
             f"take {weakest} as a crisp number: it moves the response least",
         )
-    if isinstance(frame, InterpolatedFrame):
-        for point in _probes(boxes.lower[0], boxes.upper[0]):
-            frame.require_provable(point)
+    for point in _probes(boxes.lower[0], boxes.upper[0]):
+        frame.require_provable(point)
     return frame
 
 
@@ -161,15 +152,13 @@ class _SubBox:
 
     `low` and `high` are its ends in SI units, shape (d,). `upper` has the largest values of
     (−output, output) at time nodes and over the steps before them, shape (2, T, m, 2), and `peaks`
-    the same over all times, shape (m, 2). `error` is above 1 where an error of the motion makes the
-    bounds at time nodes wide.
+    the same over all times, shape (m, 2).
     """
 
     low: Array
     high: Array
     upper: Array
     peaks: Array
-    error: float = 0.0
 
     @property
     def least(self) -> Array:
@@ -201,7 +190,7 @@ class _Search:
 
     def __init__(
         self,
-        frame: InterpolatedFrame | YieldingStorey,
+        frame: InterpolatedFrame,
         influence: Array,
         low: Array,
         high: Array,
@@ -352,8 +341,6 @@ class _Search:
         Before the time of a peak it is a fraction of the wanted gap, or of the distance to the
         threshold; behind it a fraction of the distance of what follows below the peak.
         """
-        if isinstance(self.frame, YieldingStorey):
-            return None
         history = self.frame.bounds(*_centre(self.low, self.high)).history
         if history is None:
             return None
@@ -364,7 +351,7 @@ class _Search:
             for column, threshold in self.thresholds:
                 beyond = np.abs(threshold.value - later[:, column])
                 allowed[:, column] = np.minimum(allowed[:, column], ROOM * beyond)
-        # Outputs on which S has no influence of its own, such as dissipated energy, do not count.
+        # Outputs that stay at rest, on which S has no influence, do not count.
         by_norm = np.where(history.by_norm > 0, history.by_norm, 1e-300)
         room = (allowed / by_norm).min(axis=1)
         edges = self.frame.loads[0].edges
@@ -373,24 +360,16 @@ class _Search:
     def _bounded(self, low: Array, high: Array, parent: _SubBox | None) -> _SubBox:
         """Return a sub-box with its bounds, which are at most those of its parent."""
         self.count += 1
-        upper, peaks, error = self._bounds_over(low, high)
-        if parent is not None:
-            upper = np.minimum(upper, parent.upper)
-            peaks = np.minimum(peaks, parent.peaks)
-        return _SubBox(low, high, upper, peaks, error)
-
-    def _bounds_over(self, low: Array, high: Array) -> tuple[Array, Array, float]:
-        """Return `upper`, `peaks` and `error` of a sub-box, see there."""
-        if isinstance(self.frame, YieldingStorey):
-            marched = self.frame.bounds(low, high)
-            # A large error makes bounds at time nodes wide, even where no peak lies.
-            error = marched.error / (0.1 * MAX_ERROR * self.frame.yield_velocity)
-            return np.stack([marched.upper, marched.steps]), marched.peaks, error
         try:
             found = self.frame.bounds(low, high, self.room)
         except UnprovedError:  # what must be positive may be so on narrower boxes
             found = self.frame.infinite
-        return np.stack([found.upper, found.steps]), found.peaks, 0.0
+        upper = np.stack([found.upper, found.steps])
+        peaks = found.peaks
+        if parent is not None:
+            upper = np.minimum(upper, parent.upper)
+            peaks = np.minimum(peaks, parent.peaks)
+        return _SubBox(low, high, upper, peaks)
 
     def _add(self, heap: list[tuple[float, int, _SubBox]], box: _SubBox) -> None:
         """Close a sub-box if its bounds suffice, and else add it to the heap."""
@@ -407,7 +386,7 @@ class _Search:
             return np.inf
         if not self.thresholds:
             gaps = (box.peaks.max(axis=1) - self.peak) / self.gap
-            return float(max(gaps.max(initial=0.0), box.error))
+            return float(gaps.max(initial=0.0))
         score = 0.0
         for (column, threshold), (least, most) in zip(self.thresholds, self.seen, strict=True):
             limit = threshold.value

