@@ -6,7 +6,7 @@
 #   along two sides are drawn out. Mesh.IgnorePeriodicity (1 unless told otherwise) holds for MSH 2.2 alone, which is
 #   read right; meshio reads the nodes of both as they were written.
 # Why it matters here: a cell is periodic and often drawn in another unit than it is solved in: such a file is
-#   read here without Gmsh.
+#   handed to Gmsh here without its section $Periodic.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -21,15 +21,7 @@ from alphacut.base.memory import require_text
 from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.columns import grid_of
-from alphacut.rve.mesh.msh import (
-    REWRITE,
-    SURFACE,
-    VOLUME,
-    DamagedMeshError,
-    MshFile,
-    element_name,
-    parse_msh,
-)
+from alphacut.rve.mesh.msh import SURFACE, MshFile, read_msh
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, unknowns
 from alphacut.rve.mesh.plane import PlaneMesh
 from alphacut.rve.mesh.prism_grid import Elements, PrismGrid, Prisms
@@ -56,7 +48,7 @@ def read_grid(
     nodes, whose materials are physical groups of surfaces; they are extruded along θ.
 
     Args:
-        path: The file, MSH 2.x or 4.1, text or binary.
+        path: The file, of any version of MSH, text or binary.
         theta: Lowest and highest level of θ of extruded triangles.
         layers: Layers of extruded triangles, at least 1.
 
@@ -68,16 +60,15 @@ def read_grid(
         MeshError: It is no mesh of a cell, as `checked_grid` says, or has other elements, or a
             volume or surface without a group or in two.
     """
+    content = mesh_content(path)
     try:
-        content = mesh_content(path)
-        mesh = parse_msh(content)
-        is_plane = not mesh.entities
-        if is_plane:
-            mesh = parse_msh(content, SURFACE)
-    except DamagedMeshError as error:
-        cure = "" if REWRITE in str(error) else "copy the file anew, or write it anew by Gmsh"
-        raise RefusedError("mesh.file", f"{path}, {error}", MESH_FILES, cure) from None
-    prisms = read_plane(mesh).prisms(theta, layers) if is_plane else read_prisms(mesh)
+        mesh = read_msh(content)
+    except RefusedError as error:
+        cure = error.cure or "write it anew by Gmsh"
+        raise RefusedError("mesh.file", f"{path}, {error.value}", MESH_FILES, cure) from None
+    if mesh.dimension == SURFACE:
+        return checked_grid(read_plane(mesh).prisms(theta, layers))
+    prisms = read_prisms(mesh)
     return checked_grid(prisms)
 
 
@@ -139,32 +130,31 @@ def mesh_content(path: Path | str) -> bytes:
 
 
 def read_prisms(mesh: MshFile) -> Prisms:
-    """Collect all prisms of a file parsed for volumes; see `_elements`."""
+    """Collect all prisms of a file; see `_elements`."""
     # Gmsh's order of the nodes of "Prism 15" is Basix's: vertices, then midpoints of edges.
-    return _elements(mesh, Prisms, PRISM_15, VOLUME, f"mesh with Prism 15: {PRISM_15_BY_GMSH}")
+    return _elements(mesh, Prisms, PRISM_15, f"mesh with Prism 15: {PRISM_15_BY_GMSH}")
 
 
 def read_plane(mesh: MshFile) -> PlaneMesh:
-    """Collect all triangles of a file parsed for surfaces, all of three nodes or all of six.
+    """Collect all triangles of a file without volumes, all of three nodes or all of six.
 
     See `_elements`.
     """
     is_quadratic = any(kind == TRIANGLE_6 for _, kind in mesh.elements)
     kind = TRIANGLE_6 if is_quadratic else TRIANGLE_3
     cure = "mesh with triangles of order 1 or 2, all alike"
-    plane = _elements(mesh, PlaneMesh, kind, SURFACE, cure)
+    plane = _elements(mesh, PlaneMesh, kind, cure)
     # Gmsh has the middles of the edges 01, 12 and 02 behind the vertices.
     return replace(plane, cells=plane.cells[:, [0, 1, 2, 3, 5, 4]]) if is_quadratic else plane
 
 
-def _elements(mesh: MshFile, made: type[T], kind: int, dimension: int, cure: str) -> T:
-    """Collect the elements of a parsed file; each physical group becomes a phase.
+def _elements(mesh: MshFile, made: type[T], kind: int, cure: str) -> T:
+    """Collect the elements of a file; each physical group becomes a phase.
 
     Args:
         mesh: What the file says: points, elements by entity and type, groups and names.
         made: Class of what is returned.
         kind: Gmsh's number of the only type that is allowed.
-        dimension: 3 where the file was read for volumes, 2 for surfaces.
         cure: Says how to mesh with that type.
 
     Returns:
@@ -175,7 +165,7 @@ def _elements(mesh: MshFile, made: type[T], kind: int, dimension: int, cure: str
         MeshError: The mesh is divided into partitions; a volume (or surface) is in no physical
             group or in two; or it has no elements or others than those of `kind`.
     """
-    entity = {VOLUME: "volume", SURFACE: "surface"}[dimension]
+    entity = "surface" if mesh.dimension == SURFACE else "volume"
     if mesh.partitions:
         whole = "write the mesh before it is divided among processes"
         raise MeshError(f"the mesh is partitioned into {mesh.partitions} parts", whole)
@@ -195,7 +185,7 @@ def _elements(mesh: MshFile, made: type[T], kind: int, dimension: int, cure: str
         for tag in tags:
             kinds = [of_element for place, of_element in mesh.elements if place == tag]
             if kinds != [kind]:
-                listed = ", ".join(element_name(k) for k in kinds) or "no elements"
+                listed = ", ".join(mesh.kinds[k] for k in kinds) or "no elements"
                 raise MeshError(f"the physical group {name!r} holds {listed}", cure)
             cells.append(mesh.elements[tag, kind])
             phases.append(np.full(len(cells[-1]), len(names)))
@@ -203,7 +193,7 @@ def _elements(mesh: MshFile, made: type[T], kind: int, dimension: int, cure: str
     ungrouped = sorted(mesh.entities - grouped)
     if ungrouped or not names:
         what = f"{entity} {ungrouped[0]}" if ungrouped else "the mesh"
-        name_it = f'gmsh.model.addPhysicalGroup({dimension}, {entity}s, name="matrix")'
+        name_it = f'gmsh.model.addPhysicalGroup({mesh.dimension}, {entity}s, name="matrix")'
         raise MeshError(
             f"{what} has no physical group that names its phase", f"name each phase: {name_it}"
         )
