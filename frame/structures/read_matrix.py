@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.base.array_files import ArrayArchive, Numbers, read_npy
+from alphacut.base.array_files import Numbers, names_in_npz, read_npy, read_npz
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, cure_of, path_of, printable, require
+from alphacut.base.csv_columns import NUMBER
+from alphacut.base.errors import RefusedError, path_of, printable, require
 from alphacut.base.memory import require_free_memory, require_text
 from alphacut.base.stated import Stated, require_overrides, settled
 from alphacut.frame.structures.entry_lists import (
@@ -232,7 +233,7 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
     if ending == ".npy":
         return NamedMatrix(read_npy(path))
     if ending == ".npz":
-        return NamedMatrix(_read_archive(ArrayArchive(path), name, max_rows=max_rows))
+        return NamedMatrix(_read_archive(path, name, max_rows=max_rows))
     if ending in (".mtx", ".sti", ".mas"):
         require_text(path)
         content = path.read_bytes()
@@ -256,16 +257,7 @@ def _read_by_ending(path: Path, name: str, *, max_rows: int) -> NamedMatrix:
     if ending == ".csv":
         require_text(path)
         return NamedMatrix(_read_csv(path.name, path.read_text(encoding="utf-8-sig")))
-    numbers_alone = "rename a file of numbers alone to NAME.csv"
-    sheet = "save the sheet as CSV, numbers alone"
-    cures = {
-        **dict.fromkeys((".txt", ".dat", ".tsv", ".out", ".asc"), numbers_alone),
-        **dict.fromkeys((".xlsx", ".xls", ".ods"), sheet),
-        **dict.fromkeys((".pkl", ".pickle"), "write it by numpy.save"),
-        ".mat": "write it by numpy.save of an array of scipy.io.loadmat",
-        ".mm": "rename a file of Matrix Market to NAME.mtx",
-    }
-    cure = cures.get(ending, "")
+    cure = "rename numbers alone to NAME.csv, Matrix Market to NAME.mtx; write others by numpy.save"
     raise RefusedError(path.name, f"of type {path.suffix or 'none'}", ALLOWED, cure)
 
 
@@ -298,7 +290,7 @@ def _read_csv(name: str, text: str) -> Array:
 
 
 def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
-    """Return, without raising it, the error about the first row that is unlike the others.
+    """Return, without raising it, the error about the first row that is unlike most others.
 
     A row is wrong if a cell is no number, or if it has another count of cells than most rows have;
     if all counts differ, the first row counts as right. Text behind # and empty lines do not count.
@@ -307,58 +299,24 @@ def _wrong_row(name: str, text: str, delimiter: str | None) -> RefusedError:
         name: Name of the file.
         text: The text of the file, with one row at least.
         delimiter: What separates the numbers; None for blanks.
-
-    Returns:
-        The error, which names the line and has a hint; if no row is wrong, an error about the whole
-        file.
     """
-    number = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|(?i:[-+]?(?:nan|inf))"
-    lines = dict(enumerate(text.splitlines(), 1))
-    rows = {k: x.partition("#")[0] for k, x in lines.items() if x.partition("#")[0].strip()}
-    cells = {k: [cell.strip() for cell in row.split(delimiter)] for k, row in rows.items()}
-    counts = [len(row) for row in cells.values()]
-    count, n_rows = Counter(counts).most_common(1)[0]
-    if n_rows == 1:  # all rows differ
-        count = counts[0]
+    lines = {k: x.partition("#")[0] for k, x in enumerate(text.splitlines(), 1)}
+    cells = {k: x.split(delimiter) for k, x in lines.items() if x.strip()}
+    count, _ = Counter(len(row) for row in cells.values()).most_common(1)[0]
     for line, row in cells.items():
-        are_numbers = all(re.fullmatch(number, cell) for cell in row)
-        if are_numbers and len(row) == count:
-            continue
-        if not are_numbers:
-            cure = _cure_of_row(lines[line])
-        else:
-            cure = f"it has {len(row)} numbers, and {n_rows} of {len(cells)} rows have {count}"
-            if delimiter == "," and "." not in text:
-                cure += "; if commas are decimal ones, part the numbers by semicolons"
-        allowed = "rows of as many numbers, as 1.5,0,2e6"
-        return RefusedError(f"{name}, line {line}", lines[line].strip()[:60], allowed, cure)
+        are_numbers = all(NUMBER.fullmatch(cell.strip()) for cell in row)
+        if not are_numbers or len(row) != count:
+            allowed = f"rows of {count} numbers, as 1.5,0,2e6, without a head or names of rows"
+            cure = "write numbers alone, in SI units; beside decimal commas part them by semicolons"
+            return RefusedError(f"{name}, line {line}", lines[line].strip()[:60], allowed, cure)
     return RefusedError(name, "no matrix", ALLOWED)
 
 
-def _cure_of_row(row: str) -> str:
-    """Return what to mend in a row of a CSV file that is not of numbers alone."""
-    # The first pattern that is found gives the hint: commas before blanks are looked for before
-    # empty cells, and names of units last, since many texts contain their letters.
-    cures = {
-        r"\d[.,]\d{3}[.,]\d{3}\b": "write thousands without separators",
-        r"[\[\]()]": "write numbers without brackets",
-        r"\d,\d+[ \t]+[-+\d]": "write decimal points, or semicolons beside decimal commas",
-        r"^\s*%%": "a file of Matrix Market is NAME.mtx",
-        r",\s*(,|$)|;\s*(;|$)": "cells are empty: write 0, and nothing behind the last number",
-        r"\d['’_]\d{3}": "write thousands without separators",
-        r'"': "write numbers without quotes",
-        r"\d\.?[dD][-+]?\d": "write 1e3 in place of 1D3",
-        r"\d\s*[-+]?\s*\d*\.?\d*[ij]\b": "a matrix is real: damping has a matrix of its own",
-        r"\d\s*(?:[kMG]?N|kg|t)\b": "matrices are in SI units: write numbers alone",
-    }
-    return cure_of(row, cures, default="a matrix has no head and no names of rows")
-
-
-def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers:
+def _read_archive(path: Path, name: str, *, max_rows: int) -> Numbers:
     """Return an array in a .npz file, or the sparse matrix in it, dense.
 
     Args:
-        archive: The file.
+        path: The file.
         name: Name of the array; empty for the only one.
         max_rows: Largest number of rows and of columns of a sparse matrix.
 
@@ -366,13 +324,13 @@ def _read_archive(archive: ArrayArchive, name: str, *, max_rows: int) -> Numbers
         RefusedError: There is no such array, or none is named and there are several; or an array is
             damaged.
     """
-    names = archive.names
+    names = names_in_npz(path)
     if set(names) >= {"format", "shape", "data"}:  # as scipy.sparse.save_npz writes it
-        return _read_sparse(archive, max_rows=max_rows)
-    return archive.read(names[chosen_place(archive.path.name, names, name)])
+        return _read_sparse(path, max_rows=max_rows)
+    return read_npz(path, names[chosen_place(path.name, names, name)])
 
 
-def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:
+def _read_sparse(path: Path, *, max_rows: int) -> Array:
     """Return the matrix in a file of `scipy.sparse.save_npz`, dense, shape (rows, columns).
 
     The file has the arrays "format" (one text: "coo", "csr" or "csc"), "shape" and "data", and two
@@ -381,25 +339,25 @@ def _read_sparse(archive: ArrayArchive, *, max_rows: int) -> Array:
     of damaged arrays misses some.
 
     Args:
-        archive: The file.
+        path: The file.
         max_rows: Largest number of rows and of columns.
 
     Raises:
         RefusedError: The matrix is larger than allowed or of another format, or its arrays are
             damaged or contradict one another.
     """
-    name = archive.path.name
-    letters = archive.read("format", kinds="SU").item()
+    name = path.name
+    letters = read_npz(path, "format", kinds="SU").item()
     form = letters.decode("latin-1") if isinstance(letters, bytes) else str(letters)
-    shape = archive.read("shape", kinds="iu")
+    shape = read_npz(path, "shape", kinds="iu")
     require(shape.shape == (2,), name, f"of {shape.size} sides", "rows and columns")
     n_rows, n_columns = (int(n) for n in shape)
     require_size(name, (n_rows, n_columns), max_rows)
     keys = {"coo": ("row", "col"), "csr": ("indptr", "indices"), "csc": ("indptr", "indices")}
     cure = "save it as scipy.sparse.save_npz(NAME, matrix.tocsr())"
     require(form in keys, name, f"sparse of form {form}", "csr, csc or coo", cure)
-    values = np.asarray(archive.read("data", kinds="iuf"), float)
-    first, second = (np.asarray(archive.read(key, kinds="iu"), float) for key in keys[form])
+    values = np.asarray(read_npz(path, "data", kinds="iuf"), float)
+    first, second = (np.asarray(read_npz(path, key, kinds="iu"), float) for key in keys[form])
     # In csr the pointers are over rows and in csc over columns; the other array has the other
     # index.
     if form != "coo":

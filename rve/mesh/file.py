@@ -17,6 +17,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
+from alphacut.base.extras import MissingLibraryError
 from alphacut.base.memory import require_text
 from alphacut.rve.cell.lattice import SQUARE, Lattice
 from alphacut.rve.mesh import square
@@ -63,6 +64,8 @@ def read_grid(
     content = mesh_content(path)
     try:
         mesh = read_msh(content)
+    except MissingLibraryError:
+        raise
     except RefusedError as error:
         cure = error.cure or "write it anew by Gmsh"
         raise RefusedError("mesh.file", f"{path}, {error.value}", MESH_FILES, cure) from None
