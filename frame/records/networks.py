@@ -415,7 +415,7 @@ FORMATS = (
     RecordFormat(
         "PEER AT2",
         re.compile(
-            r".*(?:\bNPTS\b|\bDT\s*=?\s*-?[0-9]*[.,]?[0-9]|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
+            r".*(?:\bNPTS\b.*\bDT\b|\bPEER\b.*\b(?:DATABASE|RECORD)\b)",
             re.IGNORECASE,
         ),
         _PeerHead.max_lines,

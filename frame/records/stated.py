@@ -28,7 +28,11 @@ _SPELLED = {
         "/s^2"
     ),
     r"\s+per\s+": "/",
-    r"\b(?:standard|fractions?\s+of|units\s+of)\s+gravity": "(g)",
+    r"\b(?:standard|fractions?\s+of|units?\s*[:=]?(?:\s*of)?)\s+gravity": "(g)",
+    # The acceleration of gravity, as "g = 9.81 m/s2".
+    r"(?:\bg\s*=\s*)?\b(?:9\.8\d*\s*\(?m|98[01]\.?\d*\s*\(?(?:cm|gal)|386\.\d*\s*in"
+    r"|32\.\d*\s*ft)\S*": "",
+    r"(?<=\bacc)(\w*\.?)\s*/\s*\(": r"\1 (",
 }
 # A unit of acceleration that cannot be something else; not part of a quotient such as V/(m/s^2).
 _UNIT = (
@@ -38,12 +42,13 @@ _UNIT = (
 # The letter g is the unit in brackets, behind "units" or "in", or at the end of such a line.
 _G = (
     r"[\[(]\s*(g'?s?)\s*[\])]|\bunits?\b[^a-z]*(?:(?:of|are|is|in)\b)?\W*(g'?s?)\b(?!\s*/|\w)"
-    r"|\bin\s+\W?(g'?s?)\b(?!\s*/)|\b(?:acc\w*|ordinates?|amplitudes?|values?|data)\W+(g'?s?)\W*$"
+    r"|\bin\s+[(\"']?(g'?s?)\b(?!\s*/)|\b(g)\s+units?\b|\b(?:acc\w*|ordinates?|amplitudes?|values?|data)\W+(g'?s?)\W*$"
 )
 _OTHER_UNIT = r"\bunits?\b\s*(?:(?:of|are|is|in)\b)?[\s:=]*[\[(]?([^\s,;\])]+)"
 _FACTOR = (
     r"(?:[x×*·]\s*|\b)10\s*(?:\^|\*\*|[-−⁻])\s*\(?[-−⁻]?\s*[\d¹²³⁴⁵⁶⁷⁸⁹]|\b1\.?0*e[-+]?\d"
-    r"|[x×]\s*1000*\b"
+    r"|[x×]\s*(?:1000*\b|0?\.0)|\b(?:scal\w*|multipl\w*|conversion)[\s_]*(?:factor)?[\s:=]*(?:by\s+)?"
+    r"(?!1\.?0*\b)[\d.]"
 )
 _INTERVAL = (
     r"(?:\b(?:sampl\w*|time|data|digiti[sz]\w*)[\s_-]*(?:interval|step|period|spacing|increment)s?"
@@ -51,7 +56,7 @@ _INTERVAL = (
 )
 _RATE = (
     r"(?:\b(?:sampl\w*|digiti[sz]\w*|acquisition|data)[\s_-]*(?:rate|freq\w*)|(?<![a-z])fs\b"
-    r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps|\bsampled)"
+    r"|\bsamples?/s(?:ec(?:ond)?)?|\bsps|\bsampled|\bsampling(?=[\s:=]*[\d.]+\s*k?hz))"
 )
 _BEHIND = r"[\s_]*(?:[\[(](?P<before>[^\])]*)[\])])?[\s:=@\"]*(?:(?:is|of|at)\s+)?"
 
@@ -99,31 +104,40 @@ class TextStatements:
     def _add_units(self, text: str, row: int, place: str) -> None:
         """Add the units, the factors and the other quantities that a line names."""
         is_of_sensor = re.search(
-            r"sensitiv|full.?scale|\brange|clip|trigger|thresh|noise|resolution|\bgain|gravity"
-            r"|\bg\s*=\s*9|1\s*g\s*=",
+            r"sensitiv|full.?scale|\brange|clip|trigger|thresh|noise|resolution|\bgain|1\s*g\s*=",
             text,
             re.IGNORECASE,
         )
         if is_of_sensor and not re.search(r"\bunits?\b", text, re.IGNORECASE):
+            if re.search(r"\bcounts\b", text, re.IGNORECASE):
+                self.quantities.append(("a number of counts", row))
             return
         is_peak = re.search(r"\b(?:peak|pg[avd]|pk|max\w*|min\w*)\b", text, re.IGNORECASE)
-        units = [match[0] for match in re.finditer(_UNIT, text, re.IGNORECASE)]
+        found_units = list(re.finditer(_UNIT, text, re.IGNORECASE))
+        units = [match[0] for match in found_units]
+        is_multiple = any(re.search(r"\d\s*$", text[: match.start()]) for match in found_units)
         for match in re.finditer(_G, text, re.IGNORECASE):
             units += filter(None, match.groups())
         into = self.peak_units if is_peak else self.units
         for unit in units:
             into.append(Stated(acceleration_factor(unit) or 0.0, unit, place))
-        if units and not is_peak and re.search(_FACTOR, text, re.IGNORECASE):
+        if not is_peak and (is_multiple or re.search(_FACTOR, text, re.IGNORECASE)):
             self.factors.append(row)
-        of_times = r"\b(?:time|abscissa)s?\b[^,;]*?(?:\bin\b|[\[(:=])\s*([a-zµμ]+)"
-        found = re.search(of_times, text, re.IGNORECASE)
-        if found and seconds_of(found[1]):
-            self.time_units.append(Stated(seconds_of(found[1]), found[1], place))
-        other = re.search(_OTHER_UNIT, text, re.IGNORECASE)
-        if not units and other and (name := other_quantity(other[1].strip('"'))):
-            is_of_times = re.search(r"\btime|altitude|height|elevation|depth|angle", text, re.I)
-            if not is_of_times:
-                self.quantities.append((f"{name} by its unit {other[1]}", row))
+        of_times = r"\b(?:time|abscissa)s?\b[\s,:=(\[]*(?:in\s+)?([a-zµμ]+)"
+        for found in re.finditer(of_times, text, re.IGNORECASE):
+            if seconds_of(found[1]):
+                self.time_units.append(Stated(seconds_of(found[1]), found[1], place))
+        # A unit of another quantity, behind the word "unit", or in brackets if it is no length or
+        # angle, which are those of the site.
+        others = re.findall(_OTHER_UNIT, text, re.IGNORECASE)
+        is_of_site = r"(?i)altitude|height|elevation|depth|coordinate|vs_?30|\bwave|peak|pg[vd]"
+        others += [x for x in re.findall(r"[\[(]([^\])]*)[\])]", text) if not seconds_of(x)]
+        for unit in others:
+            name = other_quantity(unit.strip('"'))
+            is_length = "displacement" in name or "angle" in name
+            is_named = re.search(r"\bunits?\b", text, re.IGNORECASE) is not None
+            if name and (is_named or not is_length) and not re.search(is_of_site, text):
+                self.quantities.append((f"{name} by its unit {unit}", row))
         if not is_peak and (name := named_quantity(text)):
             self.quantities.append((name, row))
 
@@ -159,10 +173,10 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
     for match in re.finditer(interval, text, re.IGNORECASE):
         unit = (match["before"] or match["unit"] or "").strip()
         is_bare = match["before"] is None and not match["unit"]
-        # A word without a unit is "dt" or has the word interval or step: "time 12" is a time.
-        is_step = re.match(r"\W*(?:time|sampl\w*)\W", match[0], re.IGNORECASE) is None or re.search(
-            r"interval|step|period|spacing|increment", match[0], re.IGNORECASE
-        )
+        # "time 12 s" is a time, and "sampling 100" has no unit.
+        words = r"(?i)interval|step|period|spacing|increment|d(?:elta)?_?\s?t|Δt|delta"
+        is_step = re.search(words, match[0])
+        is_step = is_step or (not is_bare and re.match(r"(?i)sampl", match[0]))
         factor = 1.0 if is_bare else seconds_of(unit)
         if factor and is_step:
             yield _step(match["number"], factor, f"{match['number']} {unit or 's'}", place)

@@ -79,7 +79,7 @@ class _Column:
     @property
     def is_time(self) -> bool:
         """Whether the head has times: by their name, or by their unit of time beside no period."""
-        if re.match(r"\W*(?:time|t)(?![a-z])", self.name):
+        if re.match(r"\W*(?:time|t)(?![a-z])(?!.*histor)", self.name):
             return True
         return seconds_of(self.unit) > 0 and not self.is_abscissa_of_spectrum
 
@@ -255,7 +255,8 @@ def _cells_of_head(text: str, count: int) -> list[str]:
     """
     words = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", text)
     for cells in (next(csv.reader([text])), re.split("[,;\t]", text), words):
-        if text and len(cells) == count:
+        are_names = not any(NUMBER.fullmatch(x.strip()) or re.search("=|:$", x) for x in cells)
+        if count > 1 and len(cells) == count and are_names:
             return cells
     return []
 
@@ -285,7 +286,7 @@ def _columns_of(lines: Sequence[str], count: int) -> list[_Column]:
         return [_Column(n.strip(' "').lower(), u) for n, u in zip(names, units, strict=True)]
     columns = [_Column.of(cell) for cell in cells]
     is_known = columns[0].is_time or any(x.unit for x in columns) or count > 2
-    is_known = is_known or bool(re.search("[,;\t]", lines[-1])) or count == 1
+    is_known = is_known or bool(re.search("[,;\t]", lines[-1]))
     return columns if is_known else []
 
 

@@ -23,7 +23,7 @@ _SECOND = r"s(?:ec(?:onds?)?)?"
 _SQUARE = r"(?:\^|\*\*)?\s*[-−]?\{?[2²]\}?"
 PER_SECOND_SQUARED = (
     rf"(?P<length>{'|'.join(sorted(METRES, key=len, reverse=True))})\s*(?:/\s*{_SECOND}\s*/\s*"
-    rf"{_SECOND}|(?:/\s*\(?\s*{_SECOND}|[\s*·.]\s*s)\s*{_SQUARE}\)?)"
+    rf"{_SECOND}|_?p?s\^?2|(?:/\s*\(?\s*{_SECOND}|[\s*·.]\s*s)\s*{_SQUARE}\)?)"
 )
 GALS = {"gal": 1e-2, "gals": 1e-2, "mgal": 1e-5, "mgals": 1e-5}
 

@@ -228,8 +228,9 @@ def _records() -> list[Format]:
 
     found = [
         Format(name, bytes_to("record.txt", lambda name=name: variant(name)),
-               lambda path: read_record(path, step=samples.STEP, unit="g"))
-        for name in samples.FORMATS
+               lambda path, unit=unit: read_record(
+                   path, step=samples.STEP if unit else None, unit=unit))
+        for name in samples.FORMATS for unit in [samples.variant(name, 0)[1]]
     ]  # fmt: skip
     wave = np.sin(np.arange(400) / 20)
     for order in ("<", ">"):

@@ -127,3 +127,107 @@ def test_statements_are_settled_by_one_rule():
         with refuses("f"):
             settled("f", "unit", stated, said)
     assert settled("f", "step", [Stated(0.0049, "")], Stated(0.005, ""), tolerance=0.05)
+
+
+COLUMN = 1
+HEADS = [
+    ("# ACCELERATION TIME HISTORY\n# DT = 0.01 sec   Units: cm/sec/sec\n", COLUMN, 0.01, 0.01),
+    ("Station: ABC\nSample rate (Hz): 100\nAcceleration units: mg\nDATA\n", COLUMN, 0.01, G / 1000),
+    ("date 2020-01-01\nsampling period = 10 ms\nvalues in g\n", COLUMN, 0.01, G),
+    ("Time (s)\tAcc (milli-g)\n", ("\t", 1), 0.01, G / 1000),
+    ("t_ms,acc_gal\n", (",", 1000), 0.01, 0.01),
+    (
+        "% time in milliseconds, acceleration in meters per second squared\ntime,acc\n",
+        (",", 1000),
+        0.01,
+        1,
+    ),
+    (
+        "Recorded by: ETNA2 sn 1234 sensitivity 1.25 V/g\nNPTS: 60  DELTA: 0.01\nUNIT: m/s**2\n",
+        SERIES,
+        0.01,
+        1,
+    ),
+    ("Ground acceleration [m/s²], dt=0.01 s\n", SERIES, 0.01, 1),
+    ("# fs = 200 Hz\n# a in %g\n", COLUMN, 0.005, G / 100),
+    ("Elcentro NS comp, 0.02 sec intervals, g units, 8 per line\n", SERIES, 0.02, G),
+    ("Velocity record\nunits cm/s\ntime,value\n", (",", 1), 0.01, None),
+    ("displacement (cm)\n", COLUMN, 0.01, None),
+    ("period (s), Sa (g)\n", (",", 1), 0.01, None),
+    ("data type: relative velocity\ntime [s],y\n", (",", 1), 0.01, None),
+    ("NUMBER OF POINTS = 61\nDT = 0.01 S\nUNITS = G\n", COLUMN, 0.01, None),
+    ('# {"dt": 0.01, "unit": "cm/s^2", "component": "EW"}\n', COLUMN, 0.01, 0.01),
+    ("SAMPLES/SEC 100\nACCEL. IN CM/SEC**2\n", SERIES, 0.01, 0.01),
+    ("# acceleration / (m/s^2)\n# sampled every 0.01 s\n", COLUMN, 0.01, 1),
+    ("Acc.(in/s^2)  1 G = 386.09 in/s^2\nsampling frequency 50 Hz\n", COLUMN, 0.02, 0.0254),
+    ("time [s],acceleration [g] (x 0.001)\n", (",", 1), 0.01, None),
+    ("scale factor: 0.001\ntime [s],acceleration [g]\n", (",", 1), 0.01, None),
+    ("acc in 0.1 mg, dt 5 ms\n", COLUMN, 0.005, None),
+    ("units: ft/s2, time step 0.005\n", SERIES, 0.005, 0.3048),
+    ("Time history of acceleration; Unit: kine\n", COLUMN, 0.01, None),
+    ("# amplitude unit: gravity (9.81 m/s2)\n# delta_t=0.01\n", COLUMN, 0.01, G),
+    ("# centimeters per second per second\n# 200 samples per second\n", COLUMN, 0.005, 0.01),
+    ("acceleration [cm/s^2]\n# step: 0.02\n", COLUMN, 0.02, 0.01),
+    ("; Strong motion\n; dt[s]=0.01\n; acc[cm/s^2]\n", COLUMN, 0.01, 0.01),
+    (
+        "Vs30 = 500 m/s, site class B\nStation height 37 m\nunit=gal\nsampling=100Hz\n",
+        COLUMN,
+        0.01,
+        0.01,
+    ),
+    ("INTERVAL(S) 0.01\nACCELERATION(CM/S2)\n", COLUMN, 0.01, 0.01),
+    ("time (min),acceleration (g)\n", (",", 1 / 60), 0.01, G),
+    ("time [us],acceleration [mm/s2]\n", (",", 1e6), 0.01, 0.001),
+    ("t(s) a(g)\n", (" ", 1), 0.01, G),
+    ("# cols: time/s acc/(m/s^2)\n", (" ", 1), 0.01, 1),
+    ('"Time (sec)","Acceleration (cm/s/s)"\n', (",", 1), 0.01, 0.01),
+    ("Corrected acceleration, 60 points, at 0.01 s, in cm/s2\n", SERIES, 0.01, 0.01),
+    ("SAMPLING_RATE: 100 Hz\nUNITS: cm s^-2\n", COLUMN, 0.01, 0.01),
+    ("frequency [Hz],amplitude [g]\n", (",", 1), 0.01, None),
+    ("Fourier amplitude spectrum\nf,acc [g]\n", (",", 1), 0.01, None),
+    ("counts, gain 1e-6\n", COLUMN, 0.01, None),
+    ("sensor output [V]\n", COLUMN, 0.01, None),
+    ("time;acc (mg)\n", (";", 1), 0.01, G / 1000),
+    ("$ DT 0.01\n$ UNIT GAL\n", COLUMN, 0.01, 0.01),
+    ("Acceleration of gravity g = 9.81 m/s2; record in g; dt = .01 s\n", COLUMN, 0.01, G),
+    (
+        "Filter: Butterworth 0.1-25 Hz\nSampling: 0.01 s\nUnits of acceleration are cm/sec^2\n",
+        COLUMN,
+        0.01,
+        0.01,
+    ),
+    ("time_s,acc_mps2\n", (",", 1), 0.01, 1),
+    ("time,acc\n# both in SI: s, m/s2\n", (",", 1), 0.01, 1),
+    (
+        "Peak velocity 10 cm/s, peak displacement 3 cm\nacceleration in gal every 0.01 sec\n",
+        COLUMN,
+        0.01,
+        0.01,
+    ),
+    ("Sa spectrum matched record; units: g; dt: 0.01\n", COLUMN, 0.01, G),
+]
+"""Heads with the layout of the numbers, their step in s, and their unit in m/s²; None of others."""
+
+
+@pytest.mark.parametrize(("head", "layout", "step", "factor"), HEADS)
+def test_heads_of_many_kinds_are_read_as_they_state_or_refused(
+    tmp_path, head, layout, step, factor
+):
+    path = tmp_path / "record.txt"
+    rows = rows_of(layout) if isinstance(layout, int | str) else ""
+    if not rows:
+        mark, scale = layout
+        rows = "".join(f"{0.01 * scale * k:.8f}{mark}{x:.6f}\n" for k, x in enumerate(VALUES))
+    path.write_text(head + rows, encoding="utf-8")
+    if factor is None:
+        for said in ({}, {"unit": "g"}, {"unit": "g", "step": 0.01}):
+            with pytest.raises(RefusedError):
+                read_record(path, **said)
+        return
+    asked = {"step": step, "unit": "cm/s^2"} if "60 points, at" in head else {}
+    record = read_record(path, **asked)
+    assert record.step == pytest.approx(step, rel=1e-6)
+    assert record.samples == pytest.approx(factor * VALUES)
+    other = "gal" if factor > 0.5 else "g"
+    with pytest.raises(RefusedError, match="of unit"):
+        read_record(path, **asked | {"unit": other})

@@ -189,7 +189,7 @@ def test_objects_are_no_matrix_and_no_pickle_is_read(tmp_path):
     np.save(tmp_path / "k.npy", np.array([None, 1.0], object), allow_pickle=True)
     np.savez(tmp_path / "k.npz", k=np.array([None, 1.0], object))
     for name in ("k.npy", "k.npz"):
-        with pytest.raises(RefusedError, match="k.np[yz]"):
+        with pytest.raises(RefusedError, match=r"k.np[yz]"):
             read_matrix(tmp_path / name)
 
 
