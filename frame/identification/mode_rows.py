@@ -71,24 +71,29 @@ def mode_rows(path: Path, unit: str = "", override: Collection[str] = ()) -> tup
             not in others; or all amplitudes of a mode are zero.
     """
     (head_row, header), *rows = fields(path)
-    known = {"frequency": "frequency", "freq": "frequency", "f": "frequency", "mode": "mode"}
     columns: dict[str, int] = {}
     units: dict[str, str] = {}
     for column, cell in enumerate(header):
-        title = re.fullmatch(r"\s*(\w*?)(?:[\s,_]*[\[(]\s*([^\])]*?)\s*[\])])?\s*", cell)
+        pattern = r"\s*([\w .]*?)(?:[\s,_]*[\[(]\s*([^\])]*?)\s*[\])]|[_ ](k?hz))?\s*"
+        title = re.fullmatch(pattern, cell, re.IGNORECASE)
         name = title[1] if title else cell
-        by_word = re.fullmatch(r"(\w+?)[_ ](k?hz)", name.strip(), re.IGNORECASE)
-        if by_word:
-            name = by_word[1]
-        name = known.get(name.lower(), name)
+        if re.fullmatch(r"(?i)(?:natural |eigen|modal )?freq(?:uency|\.)?|f_?n?", name):
+            name = "frequency"
+        elif re.fullmatch(r"(?i)mode(?:[_ ]?(?:no|nr|number))?\.?|no\.?|nr\.?", name):
+            name = "mode"
         columns[name] = column
-        units[name] = by_word[2] if by_word else (title[2] or "") if title else ""
+        units[name] = (title[2] or title[3] or "") if title else ""
     place = f"{path.name}, header"
     shown = ",".join(header)[:80]
-    words = r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation)\b|ω|^T\b"
-    other = next((cell for cell in header if re.search(words, cell.strip())), "")
-    cure = "write frequencies in Hz: ω/(2π), or 1/T"
-    require(not other, place, shown, "frequencies, not angular ones or periods", cure)
+    comments = [x for x in text_of(path).splitlines() if x.startswith("#")]
+    if not override:
+        words = (
+            r"(?i)\b(?:periods?|omega\w*|angular|circular|pulsation|eigenvalues?|lambda|2\s*pi)\b"
+        )
+        words += r"|ω|2\s*π|^T\b"
+        other = next((x for x in [*header, *comments] if re.search(words, x.strip())), "")
+        cure = "write frequencies in Hz: ω/(2π), or 1/T"
+        require(not other, place, other[:80], "frequencies, not angular ones or periods", cure)
     allowed = (
         "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
         " shape_std may stand before q1"

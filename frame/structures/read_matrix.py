@@ -119,24 +119,29 @@ def _stated_factor(path: Path) -> float:
     if path.suffix.lower() not in (".mtx", ".csv", ".pch", ".bdf", ".nas", ".sti", ".mas"):
         return 1.0
     stated = []
-    force = r"(?:[kM]?N|lbf?|kips?|kgf|tonf?|dyn)"
+    force = r"(?:[kMG]?N|lbf?|kips?|kgf|tonf?|dyn)"
     length = r"(?:mm|cm|m|in|ft|inch|inches)"
     quotient = rf"(?<![\w./]){force}\s*(?:\(?[-*·. ]?\s*s(?:\^|\*\*)?[2²]?\)?\s*)?/\s*{length}\b"
-    word = rf"(?<![\w./])(?:{force}|{length}|t|tonnes?|tons?|Mg|kg|g|slugs?)(?![\w.])"
+    sure = r"\btonnes?\b|\b[kMG]Pa\b|\bksi\b|\bpsi\b"
+    word = rf"(?<![\w./])(?:{force}|{length}|t|tons?|Mg|kg|g|slugs?)(?![\w.])"
+    spelled = {"kilo-?newtons?": "kN", "mega-?newtons?": "MN", r"\bnewtons?": "N"}
+    spelled |= {r"milli-?met(?:er|re)s?": "mm", r"\bmet(?:er|re)s?": "m", r"\s+per\s+": "/"}
+    factors = {"k": 1e3, "M": 1e6, "G": 1e9, "N": 1.0, "t": 1e3}
+    cure = "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
     for row, line in enumerate(path.read_text(encoding="latin-1").splitlines(), 1):
         if not re.match(r"\s*(?:%|#|\*\*|\$|//)", line):
             continue
-        units = re.findall(quotient, line)
+        place = f"{path.name}, line {row}"
+        for pattern, symbol in spelled.items():
+            line = re.sub(pattern, symbol, line, flags=re.IGNORECASE)
+        units = re.findall(quotient, line) + re.findall(sure, line)
         if re.search(r"(?i)\bunits?\b|[\[(]", line):
             units += re.findall(word, line)
+        has_factor = units and re.search(r"1e\d|10\s*(?:\^|\*\*)|[x×*]\s*10", line)
+        require(not has_factor, place, line.strip()[:60], "units without a factor", cure)
         for unit in units:
             text = re.sub(r"\s", "", unit)
-            factors = {"k": 1e3, "M": 1e6, "N": 1.0, "t": 1e3}
-            is_metric = re.fullmatch(r"[kM]?N.*/m|[kM]?N|m|kg|t|tonnes?|Mg", text) is not None
-            cure = (
-                "write the matrix in N, m, kg, or say override = ['unit'] if the comment is wrong"
-            )
-            place = f"{path.name}, line {row}"
+            is_metric = re.fullmatch(r"[kMG]?N.*/m|[kMG]?N|m|kg|t|tonnes?|Mg", text) is not None
             require(is_metric, place, f"in {text}", "units of SI, or kN and t with m", cure)
             if text != "m":
                 value = {"Mg": 1e3, "kg": 1.0}.get(text) or factors[text[0]]

@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError, require
-from alphacut.rve.image.spacing import require_spacing
+from alphacut.rve.image.spacing import require_spacing, unit_in_texts
 
 HEADS = (".mhd", ".mha", ".nhdr", ".nrrd")
 """Endings of files with such a head."""
@@ -163,11 +163,13 @@ def read_head(path: Path, sides: Sequence[float], override: Collection[str] = ()
     # Units stand in the order of the axes of the file, those of a space in that of x, y and z.
     in_file_order = "units" in entries.values
     ordered = [units[axis] for axis in order] if in_file_order else units
-    kinds = entries.value("kinds").split()
-    is_time = "time" in kinds or bool({"s", "ms", "sec"} & {unit.lower() for unit in units})
-    require(not is_time, name, f"with a time as an axis, {kinds or units}", "three axes of space")
+    labels = " ".join(entries.value(key) for key in ("kinds", "labels", "space"))
+    is_time = re.search(r'\btime\b|"t"', labels) or {"s", "ms", "sec"} & {u.lower() for u in units}
+    require(not is_time, name, f"with a time as an axis, {labels}", "three axes of space")
     known = ("units", "spacings", "elementspacing", "elementsize", "elementdatafile", "data file")
     texts = [f"{key} {value}" for key, value in entries.values.items() if key not in known]
+    if not any(units):
+        ordered = [unit_in_texts(texts)] * 3
     require_spacing(name, lengths, sides, ordered, texts=texts, override=override)
     endian = entries.value("binarydatabyteordermsb", "elementbyteordermsb", "endian")
     byte_order: Literal[">", "<"] = "<"
@@ -334,6 +336,10 @@ def _layout(name: str, entries: _Entries) -> _Layout:
     """
     spacing = _numbers(name, entries.value("elementspacing", "spacings", "elementsize"))
     require(len(spacing) in (0, 3), name, f"{len(spacing)} spacings", "three")
+    ends = [_numbers(name, entries.value(key)) for key in ("axis mins", "axis maxs")]
+    sizes = _numbers(name, entries.value("sizes"))
+    if not spacing and all(len(numbers) == 3 for numbers in (*ends, sizes)):
+        spacing = list(np.abs(np.subtract(ends[1], ends[0])) / sizes)
     lengths = np.array(spacing or [math.nan] * 3)
     # NRRD writes vectors in brackets, which may be as long as a voxel; MetaImage has three names.
     text = entries.value("space directions", "transformmatrix", "rotation", "orientation")

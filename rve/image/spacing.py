@@ -63,14 +63,30 @@ def require_spacing(
     require(are_alike, name, f"voxels of {shown} along x, y, z", shown_sides, cure)
     number = r"(\d+\.?\d*(?:e[-+]?\d+)?|\.\d+)"
     further = rf"(?:\s*(?:[x×,;*]|\s)\s*{number}\s*[x×,;*\s]\s*{number})?"
-    pattern = rf"(?:vox|pix|spac|resol)[^\d\n]{{0,40}}{number}{further}\s*[\[(]?({_UNITS})\b"
+    words = r"(slice|layer|section|\bz)?[\s_-]*(?:vox|pix|spac|resol|thick)[^\d\n]{0,40}"
+    pattern = rf"{words}{number}{further}\s*[\[(]?({_UNITS})\b"
     for text in texts:
         for match in re.finditer(pattern, text, re.IGNORECASE):
-            lengths = [x or match[1] for x in match.groups()[:3]][: len(expected)]
+            axis_word, first, second, third, unit = match.groups()
+            lengths = [first, second or first, third or first][: len(expected)]
             for axis, (length, side) in enumerate(zip(lengths, expected, strict=True)):
-                own = Stated(METRES[match[4].lower()] * float(length), match[0])
+                if axis_word and axis < 2:  # the distance of slices, which lie along z
+                    continue
+                own = Stated(METRES[unit.lower()] * float(length), match[0])
                 said = Stated(side, f"of {side:g} m along {'xyz'[axis]}")
                 settled(name, "voxel", [own], said, tolerance=0.01)
+
+
+def unit_in_texts(texts: Iterable[str]) -> str:
+    """Return the unit of all lengths that lines state, as "lengths in um"; empty if none does."""
+    spelled = {r"micro-?met\w+": "um", r"milli-?met\w+": "mm", r"nano-?met\w+": "nm"}
+    for text in texts:
+        for pattern, unit in spelled.items():
+            text = re.sub(pattern, unit, text, flags=re.IGNORECASE)
+        pattern = rf"\b(?:in|units?\s*[:=]*(?:\s*(?:are|is|of))?)\s*[\[(\"]?({_UNITS})\b"
+        if match := re.search(pattern, text, re.IGNORECASE):
+            return match[1]
+    return ""
 
 
 def ome_spacing(head: str) -> tuple[list[float], list[str]]:

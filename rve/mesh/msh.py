@@ -62,7 +62,8 @@ def read_msh(content: bytes) -> MshFile:
 
     Raises:
         MissingLibraryError: Gmsh is not installed.
-        RefusedError: Gmsh cannot read the file, ends, or takes too much memory or time; or a node has no finite place, or an element a node that is not there.
+        RefusedError: Gmsh cannot read the file, ends, or takes too much memory or time; or a node
+            has no finite place, or an element a node that is not there.
     """
     with extra_named():
         if find_spec("gmsh") is None:

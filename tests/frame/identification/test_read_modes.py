@@ -88,23 +88,39 @@ def test_other_arguments_are_refused(tmp_path, name, options, key):
     ("head", "unit", "factor"),
     [
         ("mode,frequency [Hz],q1,q2", "", 1),
-        ("mode,frequency (kHz),q1,q2", "", 1000),
-        ("Mode,f_Hz,q1,q2", "", 1),
-        ("# frequencies in Hz\nmode,frequency,q1,q2", "", 1),
+        ("Mode No,Freq (Hz),q1,q2", "", 1),
+        ("mode;f [Hz];q1;q2", "", 1),
+        ("# Natural frequencies (Hz) and mode shapes\nmode,frequency,q1,q2", "", 1),
+        ("mode,natural frequency [Hz],q1,q2", "", 1),
+        ("mode,f_n [Hz],q1,q2", "", 1),
+        ("mode,eigenfrequency [rad/s],q1,q2", "", None),
+        ("mode,frequency [1/s],q1,q2", "", None),
+        ("mode,frequency [cycles/s],q1,q2", "", 1),
+        ("mode,frequency [rpm],q1,q2", "", None),
+        ("# omega in rad/s\nmode,frequency,q1,q2", "", None),
+        ("mode,period,q1,q2", "", None),
+        ("mode,T [s],q1,q2", "", None),
+        ("mode,w,q1,q2", "", None),
+        ("mode,eigenvalue,q1,q2", "", None),
+        ("# lambda = omega^2\nmode,frequency,q1,q2", "", None),
+        ("# all values in hertz\nmode,frequency,q1,q2", "", 1),
+        ("mode,frequency(Hz),q1,q2", "", 1),
+        ("#unit_frequency=kHz\nmode,frequency,q1,q2", "", 1000),
+        ("# frequencies, x 2 pi\nmode,frequency,q1,q2", "", None),
         ("mode,frequency,q1,q2", "Hz", 1),
         ("# sampled at 200 Hz\nmode,frequency,q1,q2", "", None),
         ("mode,frequency,q1,q2", "", None),
         ("mode,frequency,q1,q2", "rad/s", None),
-        ("mode,frequency [rad/s],q1,q2", "", None),
         ("# frequencies in rad/s\nmode,frequency,q1,q2", "Hz", None),
         ("# in kHz\nmode,frequency [Hz],q1,q2", "", None),
         ("mode,frequency [kHz],q1,q2", "Hz", None),
-        ("mode,period [s],q1,q2", "", None),
         ("mode,omega,q1,q2", "Hz", None),
+        ("# lambda = omega^2\nmode,frequency,q1,q2", "Hz", None),
     ],
 )
 def test_the_unit_of_frequencies_is_stated_or_asked_for(tmp_path, head, unit, factor):
-    path = written(tmp_path, f"{head}\n1,1.5,0.5,1\n2,4,-1,0.5\n")
+    rows = "1,1.5,0.5,1\n2,4,-1,0.5\n"
+    path = written(tmp_path, f"{head}\n{rows.replace(',', ';') if ';' in head else rows}")
     if factor is None:
         with pytest.raises(RefusedError):
             read_modes(path, frequency_unit=unit)

@@ -227,23 +227,40 @@ def test_an_archive_that_unpacks_to_more_than_memory_is_refused(tmp_path, monkey
 @pytest.mark.parametrize(
     ("comment", "factor"),
     [
-        ("# stiffness in kN/m", 1e3),
-        ("# units: MN, m, s", 1e6),
-        ("# mass matrix [t]", 1e3),
-        ("# mass matrix (kg)", 1.0),
-        ("# N/m", 1.0),
-        ("# units: N, mm, t", None),
-        ("# lbf/in", None),
-        ("# kN/m, masses (kg)", None),
+        ("kN/m", 1000.0),
+        ("Stiffness matrix in MN/m", 1000000.0),
+        ("units kN and mm", None),
+        ("unit: kip/in", None),
+        ("N/mm", None),
+        ("unit=N/m", 1.0),
+        ("in kN per m", 1000.0),
+        ("force unit: kN, length unit: m", 1000.0),
+        ("kilonewtons per metre", 1000.0),
+        ("MPa", None),
+        ("values in 1e6 N/m", None),
+        ("x 10^3 N/m", None),
+        ("tonnes", 1000.0),
+        ("stiffness, N/mm", None),
+        ("UNITS: kN, m, t", 1000.0),
+        ("mass in tonnes", 1000.0),
+        ("[lb]", None),
+        ("GN/m", 1000000000.0),
+        ("mass matrix [t]", 1e3),
+        ("mass matrix (kg)", 1.0),
+        ("kN/m, masses (kg)", None),
     ],
 )
-def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, comment, factor):
-    path = tmp_path / "k.csv"
-    path.write_text(f"{comment}\n2,-1\n-1,2\n")
+@pytest.mark.parametrize("name", ["k.csv", "k.mtx", "job.mtx"])
+def test_units_in_comments_are_turned_to_si_or_refused(tmp_path, name, comment, factor):
+    path = tmp_path / name
+    abaqus = "1,1, 1,1, 2\n1,1, 1,2, -1\n1,2, 1,2, 2\n"
+    market = f"{HEAD}% {comment}\n2 2 4\n1 1 2\n2 1 -1\n1 2 -1\n2 2 2\n"
+    texts = {"k.csv": f"2,-1\n-1,2\n# {comment}\n", "k.mtx": market}
+    path.write_text(texts.get(name, f"** {comment}\n{abaqus}"))
+    matrix = [[2.0, -1.0], [-1.0, 2.0]]
     if factor is None:
         with pytest.raises(RefusedError):
             read_matrix(path)
-        factor = 1.0
-        assert read_matrix(path, override=["unit"])[0].tolist() == [2, -1]
+        assert read_matrix(path, override=["unit"]).tolist() == matrix
     else:
-        assert read_matrix(path).tolist() == [[2 * factor, -factor], [-factor, 2 * factor]]
+        assert read_matrix(path) == pytest.approx(factor * np.array(matrix))

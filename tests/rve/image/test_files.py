@@ -419,24 +419,45 @@ def test_units_of_single_axes_are_compared_and_may_be_overridden(tmp_path, rng):
 
 
 @pytest.mark.parametrize(
-    ("line", "micrometres"),
+    ("form", "line", "micrometres"),
     [
-        ('spacings: 2 2 5\nunits: "um" "um" "um"', (2, 2, 5)),
-        ('spacings: 2 2 0.005\nunits: "um" "um" "mm"', (2, 2, 5)),
-        ("# made up\nvoxel size:=2.5 um", (2.5, 2.5, 2.5)),
-        ("voxel:=2 x 2 x 5 um", (2, 2, 5)),
-        ('space units: "um" "um" "um"\nspace directions: (0,0,5) (0,2,0) (2,0,0)', (2, 2, 5)),
+        ("mhd", "ElementSpacing = 2 2 5\nDistanceUnits = um", (2, 2, 5)),
+        ("mhd", "Comment = voxel size 2 x 2 x 5 um", (2, 2, 5)),
+        ("mhd", "ElementSize = 0.002 0.002 0.005\nDistanceUnits = mm", (2, 2, 5)),
+        ("mhd", "Comment = resolution 5 microns", (5, 5, 5)),
+        ("nrrd", 'spacings: 2 2 5\nspace units: "microns" "microns" "microns"', (2, 2, 5)),
+        ("nrrd", "# voxel: 2 x 2 x 5 um", (2, 2, 5)),
+        ("nrrd", "pixel_size:=2 um", (2, 2, 2)),
+        ("nrrd", "spacings: 2 2 5\n# lengths in micrometers", (2, 2, 5)),
+        ("mhd", "Spacing: 2 um", (2, 2, 2)),
+        ("nrrd", 'spacings: 2 2 0.005\nunits: "um" "um" "mm"', (2, 2, 5)),
+        (
+            "nrrd",
+            'space units: "um" "um" "um"\nspace directions: (0,0,5) (0,2,0) (2,0,0)',
+            (2, 2, 5),
+        ),
     ],
 )
-def test_sides_that_nrrd_states_with_units_are_those_of_the_case(tmp_path, line, micrometres):
-    nrrd_with(tmp_path / "a.nrrd", line)
-    assert read_image(tmp_path / "a.nrrd", spacing=[x * 1e-6 for x in micrometres])
-    with refuses("a.nrrd"):
-        read_image(tmp_path / "a.nrrd", spacing=[x * 1e-3 for x in micrometres])
+def test_sides_that_heads_state_with_units_are_those_of_the_case(tmp_path, form, line, micrometres):
+    path = tmp_path / "a.nrrd"
+    if form == "nrrd":
+        nrrd_with(path, line)
+    else:
+        path = tmp_path / "a.mhd"
+        meta_image(path, np.zeros(SHAPE, "u1"), head=f"{line}\n")
+    assert read_image(path, spacing=[x * 1e-6 for x in micrometres])
+    with refuses(path.name):
+        read_image(path, spacing=[x * 1e-3 for x in micrometres])
 
 
 @pytest.mark.parametrize(
-    "line", ["kinds: domain domain time", 'units: "um" "um" "s"\nspacings: 1 1 1']
+    "line",
+    [
+        "kinds: domain domain time",
+        'units: "um" "um" "s"\nspacings: 1 1 1',
+        "space: scanner-xyz-time",
+        'labels: "x" "y" "t"',
+    ],
 )
 def test_a_time_as_an_axis_is_no_volume(tmp_path, line):
     nrrd_with(tmp_path / "a.nrrd", line)
