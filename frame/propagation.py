@@ -394,9 +394,9 @@ def require_admissible(system: StructureModel, cuts: Boxes) -> None:
     is_moved = system.ground is not None and np.any(system.ground.samples)
     has_forces = matrices.forces is not None and matrices.forces.value.any()
     is_moved = is_moved or has_forces or matrices.start.value.any()
-    key = "q0, v0, ground and loads"
+    value = "at rest for ever: its start, record and forces are all zero"
     allowed = "a start, a record or a force that moves something"
-    require(is_moved, key, value="zero", allowed=allowed)
+    require(is_moved, "structure", value, allowed)
     if len(system.ratios) > 1:
         # Damping ratios are given by the order of the modes, which must be the same everywhere.
         ratios = [system.parameters[x] if isinstance(x, str) else x for x in system.ratios]

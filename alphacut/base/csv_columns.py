@@ -14,6 +14,7 @@ import numpy as np
 from alphacut.base.arrays import Array, Ints
 from alphacut.base.errors import RefusedError
 from alphacut.base.memory import require_text
+from alphacut.base.seen_folders import unseen
 from alphacut.base.stated import METRES
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
@@ -106,7 +107,7 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = str(getattr(error, "strerror", None) or "no text").lower().removeprefix("is ")
-        raise RefusedError(str(path), reason, "text files in UTF-8") from None
+        raise RefusedError(str(path), reason, "text files in UTF-8", unseen(path)) from None
 
 
 def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:

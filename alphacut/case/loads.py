@@ -201,8 +201,8 @@ def with_forces(
     # floor: F3, and F3_2 for a second force on floor 3. A structure from matrices has F1, F2 …
     model, names = structure.model.with_forces(forces)
     numbers = {**structure.numbers, **dict(zip(names, amplitudes, strict=True))}
-    force_units = dict(zip(names, units, strict=True))
-    structure = replace(structure, model=model, numbers=numbers, force_units=force_units)
+    input_units = {**structure.input_units, **dict(zip(names, units, strict=True))}
+    structure = replace(structure, model=model, numbers=numbers, input_units=input_units)
     ranges = [section.history.frequency for section in sections if section.history.frequency]
     if not ranges:
         return structure

@@ -124,7 +124,7 @@ def _terms_of_exports(value: object, info: ValidationInfo) -> object:
         allowed = 'tables alone, as { file = "soft.mtx", E = "100 GPa" }'
         require(is_export, "", export, allowed)
         parameters = {
-            name: _parameter(number, info).nominal
+            name: _parameter(number, info)[0].nominal
             for name, number in export.items()
             if name != "file"
         }
@@ -168,8 +168,8 @@ def _require_shape(name: str, array: Array, n: int) -> None:
     require(array.shape == (n, n), name, value, f"({n}, {n})", cure)
 
 
-def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
-    """Return the quantity that a parameter of the matrices has in SI units, whatever its dimension.
+def _parameter(value: object, info: ValidationInfo) -> tuple[FuzzyNumber, str]:
+    """Return a parameter of the matrices in SI units, and this unit, whatever its dimension.
 
     Args:
         value: A number, or a text such as "30 GPa ± 5 %".
@@ -179,10 +179,9 @@ def _parameter(value: object, info: ValidationInfo) -> FuzzyNumber:
         RefusedError: The value is no quantity.
     """
     try:
-        number, _ = parse_fuzzy_in_any_unit(value)
+        return parse_fuzzy_in_any_unit(value)
     except ValueError as error:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
-    return number
 
 
 def _one_direction(value: object) -> object:
@@ -205,7 +204,7 @@ def _entry(value: object) -> float:
 
 
 Entry = Annotated[float, text(_entry)]
-Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
+Parameters = dict[str, Annotated[tuple[FuzzyNumber, str], text(_parameter)]]
 Direction = Annotated[str | dict[str, Entry], BeforeValidator(_one_direction)]
 """Direction of the ground: that of unknowns NODE.DIRECTION, or the influence vector by unknown."""
 
@@ -362,7 +361,8 @@ class MatricesSection(StructureSection):
         else:
             ratios = damping_ratios_by_name(self.damping_ratio, None)
         # A structure needs one parameter at least: if there is none, an unused one is added.
-        numbers = self.parameters | ratios or {"scale": Crisp(1.0)}
+        numbers = {name: number for name, (number, _) in self.parameters.items()}
+        numbers = numbers | ratios or {"scale": Crisp(1.0)}
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
         rows: dict[str, Array] = {}
@@ -397,7 +397,8 @@ class MatricesSection(StructureSection):
         except RefusedError as error:
             key = f"matrices: {error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        return Structure(model, numbers)
+        units = {name: unit for name, (_, unit) in self.parameters.items()}
+        return Structure(model, numbers, input_units=units)
 
     def warnings(self, structure: Structure | None) -> Iterator[str]:
         """Yield sentences on fuzzy parameters in no factor, and on unknowns that are not named.
@@ -412,7 +413,7 @@ class MatricesSection(StructureSection):
         for output in self.outputs.values():
             used.update(dict(output.factor.powers))
         yield from self.file_warnings()
-        for name, number in self.parameters.items():
+        for name, (number, _) in self.parameters.items():
             if number.support.width > 0 and name not in used:
                 yield f"matrices.parameters.{name} is in no factor: is a name misspelt?"
 

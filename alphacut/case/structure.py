@@ -120,7 +120,8 @@ class Structure:
         model: The structure at its nominal parameters.
         numbers: Every parameter by name, crisp or fuzzy, in SI units.
         heights: Heights of storeys in m by the names of their drifts and residual drifts.
-        force_units: SI units of the amplitudes of forces by parameter, empty of factors.
+        input_units: SI units of parameters by name where the case states them: of amplitudes of
+            forces, empty of factors, and of factors of matrices.
         learned: Set of parameters that measured modes left; None if none were learned.
         always_fuzzy: Parameters that are fuzzy whether the case lists them or not.
     """
@@ -128,7 +129,7 @@ class Structure:
     model: StructureModel
     numbers: Mapping[str, FuzzyNumber]
     heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
-    force_units: Mapping[str, str] = field(default_factory=dict)
+    input_units: Mapping[str, str] = field(default_factory=dict)
     learned: Identified | None = None
     always_fuzzy: tuple[str, ...] = ()
 
@@ -157,7 +158,7 @@ class Structure:
 
     def input_unit(self, name: str) -> str:
         """Return the SI unit of a parameter; empty where it has none, or none is known."""
-        return self.force_units.get(name, self.model.parameter(name).unit)
+        return self.input_units.get(name, self.model.parameter(name).unit)
 
     def fuzzy_members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Return the fuzzy parameters that a name stands for, as "m" for m1 … mn of a frame.
@@ -174,7 +175,11 @@ class Structure:
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
             # The model does not know the name, or knows a group of which the case has no numbers.
+            # Who writes the key of a list, as stiffness, means its numbers.
             cure = suggestion(name, self.numbers)
+            listed = SYMBOLS.get(name, "").format("").replace("_", "")
+            if listed and listed + "1" in self.numbers:
+                cure = f"did you mean {listed}?"
             raise RefusedError(key, name, ", ".join(self.numbers), cure) from None
         require(bool(fuzzy), key, name, "inputs that are fuzzy", cure=f"{name} is one number")
         return fuzzy

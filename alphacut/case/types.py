@@ -30,6 +30,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from alphacut.base import quantity as base
 from alphacut.base.errors import RefusedError, is_number, require
+from alphacut.base.seen_folders import unseen
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.quantity import QUANTITIES
@@ -280,6 +281,7 @@ def case_file(value: object, info: ValidationInfo) -> Path:
         is_file = False
         reason = (error.strerror or str(error)).lower()
     if not isinstance(value, str) or not is_file:
+        reason = reason or unseen(folder / str(value))
         raise RefusedError("", value, f"a file, from the folder {folder.absolute()}", reason)
     return folder / value
 

@@ -128,10 +128,7 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                 yield from rows_of(f"{row_key}.", entry)
             elif isinstance(entry, FuzzyNumber):
                 if is_stated or is_default:
-                    # Parameters of matrices have any unit, which is converted when it is read.
                     words = _numbers(entry, si)
-                    if key == "parameters":
-                        words += " in SI"
                     kind = "default"
                     if is_stated:
                         kind = _kind_of(entry)

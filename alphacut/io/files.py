@@ -16,9 +16,8 @@ import numpy as np
 from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.extras import MissingLibraryError, install_command
 from alphacut.base.kept_files import is_special
+from alphacut.base.seen_folders import INSIDE
 
-INSIDE = "ALPHACUT_INSIDE"
-"""Variable that ./enter sets."""
 Document = dict[str, Any]
 """A JSON document: numbers, texts, lists and documents by name; its reader knows their types."""
 

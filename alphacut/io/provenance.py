@@ -18,7 +18,7 @@ from types import FunctionType
 import numpy as np
 
 from alphacut.base.kept_files import digest_of
-from alphacut.io.files import INSIDE
+from alphacut.base.seen_folders import INSIDE
 
 FORMAT = 5
 """Format of a folder of results. 5: arrays are in the classic format of NetCDF, no longer in HDF5,

@@ -21,7 +21,7 @@ from alphacut.base.number_text import ShownUnit, Table
 from alphacut.case.analyses import ANALYSES
 from alphacut.figures.register import FIGURES, caption
 from alphacut.frame import Sensitivity
-from alphacut.frame.analyses.answer import enclosing_box_words, table_of
+from alphacut.frame.analyses.answer import table_of
 from alphacut.fuzzy.result import Nature, of_enclosing_box
 from alphacut.io.files import Document, say
 from alphacut.io.results import ResultsFolder
@@ -85,7 +85,7 @@ def render_page(folder: ResultsFolder) -> str:
         fractions_text=results.fractions_text,
         width_text=results.width_text,
         isotropic_label=isotropic_label,
-        enclosing_box_words=enclosing_box_words,
+        box_words=results.box_words,
         envelopes=envelopes,
         analyses=ANALYSES,
     )

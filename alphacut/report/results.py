@@ -539,7 +539,7 @@ def natures(parts: Parts) -> Iterator[str]:
     if groups:
         yield f"Peaks are largest magnitudes {over}, {', '.join(groups)}"
     if parts.encloses:
-        yield enclosing_box_words(parts.encloses)
+        yield box_words(parts)
     learned = parts.update
     if learned is not None and learned.narrowed and min(learned.narrowed.values()) > 0.99:
         yield "The measured modes teach nothing: no input has a narrower range than before"
@@ -552,6 +552,15 @@ def natures(parts: Parts) -> Iterator[str]:
     for is_guaranteed, count in tested.items():
         if count:
             yield f"{count} exact motions by another algorithm {agreement(is_guaranteed)}"
+
+
+def box_words(parts: Parts) -> str:
+    """Return sentences on bounds of a box around a set, with its studies unless it has all."""
+    words = enclosing_box_words(parts.encloses)
+    boxed = [x for x, y in parts.envelopes.items() if any(z.encloses for z in y.peak.values())]
+    if len(boxed) in (0, len(parts.envelopes)):
+        return words
+    return f"{', '.join(boxed)}: {words[0].lower()}{words[1:]}"
 
 
 def agreement(is_guaranteed: bool) -> str:

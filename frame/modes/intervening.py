@@ -214,7 +214,10 @@ def oscillators(
     for j in range(len(modes)):
         eigenvalue = eigenvalue_block[j, j]
         decay = a * 0.5 + b * eigenvalue * 0.5 + ratios[j] * eigenvalue**0.5
-        omega = (eigenvalue - decay * decay) ** 0.5
+        squared = eigenvalue - decay * decay
+        if range_of(squared)[1] <= 0:
+            raise UnprovedError("a mode does not oscillate", "take less damping")
+        omega = squared**0.5
         quotient = decay * omega**-1.0
         q_low, q_high = range_of(quotient)
         lowest_omega = float(low / np.sqrt(1 + q_high**2))  # ω² = λ / (1 + (g/ω)²)

@@ -54,6 +54,6 @@ def test_allowed_values_of_a_key_are_told_in_words():
 def test_entries_of_tables_with_free_names_are_changed_and_others_suggested(capfd):
     case = "cases/plane-frame.toml"
     assert main(["check", case, "--set", 'matrices.parameters.Ec="1.2 ± 5 %"']) == 0
-    assert "matrices.parameters.Ec                     1.14 … 1.26" in capfd.readouterr().out
+    assert "matrices.parameters.Ec 1.14 … 1.26" in " ".join(capfd.readouterr().out.split())
     assert main(["check", case, "--set", "matrices.parametrs.Ec=1.2"]) == 2
     assert "did you mean matrices.parameters?" in capfd.readouterr().err

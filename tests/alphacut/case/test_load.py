@@ -63,6 +63,7 @@ WRONG = [  # text in the case, its replacement; key, and what the message says
     ('"graph-follower"', '"graph-folower"', "envelope.method", "did you mean graph-follower?"),
     ('"ground"', '"floor"', "frame.damper_placement", "ground"),
     ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "n"]', "envelope.fuzzy", "n; allowed"),
+    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "masses"]', "envelope.fuzzy", "did you mean m?"),
     ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "E"]', "envelope.fuzzy", "each name once"),
     ("[0, 0.5, 1]", "[0.5, 0, 1]", "envelope.alpha", "rising order"),
     ("[0, 0.5, 1]", "0.5", "envelope.alpha", "write alpha = [0.5]"),

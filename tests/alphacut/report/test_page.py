@@ -23,7 +23,7 @@ from alphacut.frame import Limit, Peak, SuitePeaks, decide
 from alphacut.fuzzy import Nature
 from alphacut.io.results import ResultsFolder
 from alphacut.report.page import render_page, render_template
-from alphacut.report.results import answers, comparison, drivers, peak_table, run_text
+from alphacut.report.results import answers, compared, comparison, drivers, peak_table, run_text
 from alphacut.report.tables import frames, latex, shown, write_csv, write_tables
 from alphacut.stages.envelope import EnvelopeResult
 from alphacut.stages.summary import FrameResult, Parts, Summary
@@ -232,7 +232,9 @@ def test_statistics_of_records_stand_in_the_order_of_their_file():
     facts = {"period_s": 1.0, "damping_ratio": 0.05, "alpha": np.zeros(1), "units": {"q1": "m"}}
     facts |= {"by_record": {}, "peak": {}, "farthest_record": {}}
     parts = Parts(records=SuitePeaks(**facts, statistics=statistics))
-    assert [row[0].partition(" of")[0] for row in comparison(parts, parts).rows] == names
+    assert [
+        row[0].partition(" of")[0] for row in comparison(compared([parts, parts])).rows
+    ] == names
 
 
 def test_numbers_of_csv_are_exact_and_its_texts_are_no_formulas(tmp_path):

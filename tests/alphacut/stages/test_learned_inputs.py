@@ -108,3 +108,14 @@ def test_limited_outputs_that_are_not_listed_have_the_bounds_of_the_learned_set(
         assert ("envelope_all-drift2" in tables) == (name == "listed")
     assert upper[0] == upper[1]
     assert members[0] == members[1] <= upper[0]
+
+
+def test_nothing_is_said_to_be_open_of_studies_whose_column_reached_is_filled(tmp_path, capfd):
+    studies = '[[study]]\nname = "set"\nfuzzy = ["k"]\nduration = "0.5 s"\n'
+    studies += '[[study]]\nname = "box"\nfuzzy = ["k", "zeta"]\nduration = "0.5 s"\n'
+    _, told, page, tables = run_with(tmp_path, CASE.replace("[0.05, 1]", "[0.05]") + studies, capfd)
+    assert "box: all bounds are those of the box around the learned set." in told
+    assert "box: all bounds are those" in page
+    reached = tables["peaks"].set_index("study")["peak reached"]
+    assert reached["set"] > 0
+    assert pd.isna(reached["box"])

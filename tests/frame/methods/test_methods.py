@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from alphacut import frame
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods.sampled import independent_excess
 from alphacut.fuzzy import FailedError, Interval, Nature, RefusedError, Triangular
 from tests.frame.motions import exact_motions, random_points, require_inside
@@ -147,6 +148,14 @@ def test_auto_takes_a_proof_else_the_follower_and_says_why():
         )
         assert found.nature is nature
         assert found.notes[0].startswith(why)
+
+
+def test_a_floor_that_does_not_oscillate_is_said_to_have_much_damping():
+    chain = StoreyFrame([20e3], stiffness=[8e6], dampers=[2e6], ground=RECORD)
+    inputs = {"k1": Interval(7.9e6, 8.1e6)}
+    for method in ("dual", "proof"):
+        with pytest.raises(UnprovedError, match="does not oscillate; take less damping"):
+            envelope(chain, inputs, method=method, **MOTION)
 
 
 @pytest.mark.parametrize("dashpots", [(), (0.0, 2e4, 5e3)])
