@@ -29,7 +29,7 @@ MIN_BYTES = 700e6
 """Memory that a reader may take beyond what it maps at its start; libraries take some 300 MB."""
 BYTES_PER_BYTE = 40
 """Further bytes of memory for each byte of the file; texts of short numbers take the most."""
-MIN_SECONDS = 12
+MIN_SECONDS = 6
 """Processor time that a reader may take for a small file."""
 SECONDS_PER_BYTE = 2e-6
 MPI = ("OMPI_", "PMI", "PMIX", "MPI", "HYDRA", "I_MPI", "SLURM_")
@@ -77,11 +77,11 @@ def read_apart(
             # The process is killed where this one is interrupted.
             ended = subprocess.run(
                 command, env=environment, stdin=null, stdout=null, stderr=null, check=False,
-                timeout=10 * seconds,
+                timeout=4 * seconds,
             )  # fmt: skip
             reason = f"{library} ended by signal {-ended.returncode}"
         except subprocess.TimeoutExpired:
-            reason = f"{library} took more than {10 * seconds:.0f} s"
+            reason = f"{library} took more than {4 * seconds:.0f} s"
         told = Path(folder, "told.json")
         if told.exists():
             reason = json.loads(told.read_text(encoding="utf-8"))

@@ -97,16 +97,16 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
     # A data set 2414 has its codes, the number of the mode, the frequency and the eigenvalue in
     # other lines, and each in a line of its own.
     is_2414 = len(head) > 8
-    codes, counts, numbers = (8, 9, 11) if is_2414 else (5, 6, 7)
+    code_line, mode_line, real_line = (8, 9, 11) if is_2414 else (5, 6, 7)
     # The line of codes has six: of the model, the analysis (2 of normal modes, 3 and 7 of
     # complex modes of first and second order), the kind of the data (as of a displacement in three
     # directions), its meaning, the type of its numbers, and their count at a node.
-    _, analysis, _, _, kind, size = (int(word) for word in head[codes].split()[:6])
+    _, analysis, _, _, kind, size = (int(word) for word in head[code_line].split()[:6])
     is_normal = analysis == 2
     is_complex = analysis in (3, 7)
     if not (is_normal or is_complex):
         return None
-    hertz = floats(head[numbers])[1 if is_2414 else 0]
+    hertz = floats(head[real_line])[1 if is_2414 else 0]
     if is_complex:
         # The first two numbers are the complex eigenvalue s; its frequency is |s| / 2π.
         real, imaginary = floats(head[12 if is_2414 else 7])[:2]
@@ -130,7 +130,7 @@ def _parse_shape(head: list[str], values: list[str]) -> UffShape | None:
             amplitudes[f"{node}.{axis}"] = complex(*numbers[k : k + numbers_of_value])
     # The seventh line of a data set 55 has the counts of its codes and of its numbers, the load
     # case and the mode; the tenth of a data set 2414 has the mode as its sixth number.
-    mode = int(head[counts].split()[5 if is_2414 else 3])
+    mode = int(head[mode_line].split()[5 if is_2414 else 3])
     return UffShape(mode, hertz, amplitudes)
 
 

@@ -158,12 +158,7 @@ def _read_by_marks(
         further: RecordFormat = resolve_name(place)
         if further.has_marked(file):
             return further.read(file, unit)
-    if re.match(rb"(?i)\s*<(?:!doctype|html|\?xml)", content):
-        cure = "this is a page of the web, perhaps of a login: load the record itself anew"
-        raise RefusedError(path.name, "no record but a page in HTML or XML", allowed, cure)
     cure = "" if is_described else "numbers alone are read with records.step and records.unit"
-    if any(re.search(r"\bspectr(?:a|um)\b", line, re.IGNORECASE) for line in file.lines[:3]):
-        cure = "this seems to be a file of spectra: take the record of the acceleration over time"
     raise RefusedError(path.name, "of no format that is read", allowed, cure)
 
 

@@ -175,8 +175,8 @@ def _steps(text: str, place: str) -> Iterator[Stated]:
         is_bare = match["before"] is None and not match["unit"]
         # "time 12 s" is a time, and "sampling 100" has no unit.
         words = r"(?i)interval|step|period|spacing|increment|d(?:elta)?_?\s?t|Δt|delta"
-        is_step = re.search(words, match[0])
-        is_step = is_step or (not is_bare and re.match(r"(?i)sampl", match[0]))
+        is_sampling = not is_bare and re.match(r"(?i)sampl", match[0]) is not None
+        is_step = is_sampling or re.search(words, match[0]) is not None
         factor = 1.0 if is_bare else seconds_of(unit)
         if factor and is_step:
             yield _step(match["number"], factor, f"{match['number']} {unit or 's'}", place)

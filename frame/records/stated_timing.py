@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from alphacut.base.stated import Stated, settled
 from alphacut.frame.records.text_file import TextFile, require_step
 
 
@@ -62,20 +63,18 @@ def require_timing(
         count: Number of samples.
         step: Time between samples, in s.
     """
-    require_step(file.location(line), step)
+    place = file.location(line)
+    require_step(place, step)
+    # Heads round steps to milliseconds or less, as 1/204.8 s to .005, and durations may be those of
+    # one step more or less. A mistaken step is wrong by a quarter at least (tuned).
+    by_kind = {"count": (float(count), 1e-9), "step": (step, 0.05), "duration": (count * step, 0.0)}
     for other in stated:
-        words = ""
-        # Heads round steps to milliseconds or less, as 1/204.8 s to .005, and durations may be
-        # those of one step more or less. A mistaken step is wrong by a quarter at least (tuned).
-        tolerance = 2 * step + 0.05 * other.duration
-        if other.count not in (0, count):
-            words = f"{other.count} samples"
-        elif other.step and abs(other.step - step) > 0.05 * step:
-            words = f"steps of {other.step:g} s"
-        elif other.duration and abs(other.duration - count * step) > tolerance:
-            words = f"{other.duration:g} s in all"
-        if words:
-            what = f"{count} samples in steps of {step:g} s"
-            allowed = f"{words}, as line {file.line_number(other.line)} states"
-            cure = "load the file anew, or mend the line that is wrong"
-            raise file.refusal(line, what, allowed, cure)
+        for kind, (value, tolerance) in by_kind.items():
+            own = float(getattr(other, kind))
+            if kind == "duration":
+                tolerance = 0.05 + 2 * step / (own or 1.0)
+            if own:
+                place_of_other = f"line {file.line_number(other.line)}"
+                found = [Stated(value, f"{value:g}", f"line {file.line_number(line)}")]
+                found.append(Stated(own, f"{own:g}", place_of_other))
+                settled(place, kind, found, tolerance=tolerance)

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from alphacut.base.arrays import Array
-from alphacut.base.errors import RefusedError, cure_of, printable, require
+from alphacut.base.errors import RefusedError, printable, require
 from alphacut.base.memory import require_text
 from alphacut.frame.records.recording import Recording
 from alphacut.frame.records.stated_peak import StatedPeak, remarks_on_peak
@@ -58,18 +58,8 @@ class TextFile:
             RefusedError: The content has zero bytes, as binary files do, with a hint for workbooks,
                 archives and UTF-16; or a line has more than 10,000 characters.
         """
-        # A text has no zero bytes, but in UTF-16. What a file is instead is told by its first
-        # bytes, decoded as Latin-1: PK for archives and workbooks, D0 CF 11 E0 for older workbooks,
-        # 1F 8B for gzip; the mark FF FE or FE FF, or every second byte a zero, for UTF-16.
-        cures = {
-            r"^PK(?s:.*)(?:\[Content_Types\]|xl/)|^\xd0\xcf\x11\xe0": "this is a workbook of a"
-            " spreadsheet: save its sheet as CSV",
-            r"^PK|^\x1f\x8b": "this is an archive: unpack it, and name the file inside",
-            r"^(?:\xff\xfe|\xfe\xff|(?:[ -~]\0){4}|(?:\0[ -~]){4})": "this is text in UTF-16:"
-            " save it in UTF-8",
-        }
-        start = content[:100].decode("latin-1")
-        cure = cure_of(start, cures, "load it anew, or export its record as text")
+        # A text has no zero bytes, but in UTF-16; archives and workbooks have.
+        cure = "export its record as text in UTF-8; unpack an archive, save a sheet as CSV"
         require(b"\0" not in content, name, "no text", "a text file with a record", cure)
         lines = re.split(r"\r\n|\r|\n", decoded(content))
         first = next((k for k, line in enumerate(lines) if line.strip()), 0)
@@ -123,10 +113,7 @@ class TextFile:
                 value = float(word.replace("D", "e").replace("d", "e")) if is_number else nan
                 if not isfinite(value):
                     allowed = "finite numbers such as -.1394908E-02"
-                    cure = ""
-                    if re.search(r"\d,\d", word):
-                        cure = "write decimal points"
-                    raise self.refusal(row, repr(word), allowed, cure)
+                    raise self.refusal(row, repr(word), allowed)
                 values.append(value)
         return np.array(values)
 

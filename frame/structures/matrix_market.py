@@ -35,28 +35,20 @@ def matrix_market(name: str, content: bytes, *, max_rows: int) -> Array:
     # SciPy's reader is compiled code that a damaged file can end the process in, so the text is
     # parsed here; every number goes through `float`.
     lines = [line for line in content.splitlines() if line.strip()]
-    head = re.compile(
-        rb"%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
-        rb"(general|symmetric)\s*",
-        re.IGNORECASE,
-    )
-    match = head.fullmatch(lines[0]) if lines else None
+    head = rb"(?i)%%MatrixMarket\s+matrix\s+(coordinate|array)\s+(?:real|double|integer)\s+"
+    match = re.fullmatch(head + rb"(general|symmetric)\s*", lines[0]) if lines else None
     if match is None:
         first = lines[0][:60].decode("latin-1") if lines else "empty"
-        cure = "mend or write the first line, as %%MatrixMarket matrix coordinate real symmetric"
         allowed = "%%MatrixMarket matrix coordinate or array, real or integer, general or symmetric"
-        raise RefusedError(name, first, allowed, cure)
+        raise RefusedError(name, first, allowed, "mend or write the first line")
     is_sparse = match[1].lower() == b"coordinate"
     is_symmetric = match[2].lower() == b"symmetric"
     body = [line for line in lines[1:] if not line.lstrip().startswith(b"%")]
     _require_numbers_alone(name, body)
 
     sizes = numbers_in(name, body[0]) if body else np.empty(0)
-    n_sizes = 2
-    cure = "the line of sizes of an array is as 18 18 for 18 rows and 18 columns"
-    if is_sparse:
-        n_sizes = 3
-        cure = "the line of sizes is as 18 18 42 for 18 rows, 18 columns and 42 entries"
+    n_sizes = 3 if is_sparse else 2
+    cure = "the line of sizes has rows, columns, and the entries of a sparse matrix, as 18 18 42"
     are_sizes = len(sizes) == n_sizes and bool(((sizes >= 0) & (sizes == np.floor(sizes))).all())
     require(are_sizes, name, f"sizes {sizes.tolist()}", f"{n_sizes} whole numbers", cure)
     # A size beyond 64 bits stays one that is too large. Numbers were read as floats, and NumPy's
@@ -109,14 +101,12 @@ def _require_numbers_alone(name: str, lines: list[bytes]) -> None:
     """Check that lines have no characters but those of numbers, signs, points, e, E and blanks.
 
     Raises:
-        RefusedError: A line has another character; the hint is for commas and for FORTRAN's D.
+        RefusedError: A line has another character, as a comma or FORTRAN's D.
     """
     for line in lines:
-        if found := re.search(rb"[^-+.0-9eE\s]", line):
+        if re.search(rb"[^-+.0-9eE\s]", line):
             value = f"with {line[:40].decode('latin-1')!r}"
-            cures = {b",": "write decimal points", b"d": "write 1e3 in place of 1D3"}
-            cure = cures.get(found[0].lower(), "mend this line, or load the file anew")
-            raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", cure)
+            raise RefusedError(name, value, "numbers such as 1.25 or 1e-3", "mend this line")
 
 
 def require_size(name: str, shape: tuple[int, ...], max_rows: int) -> None:

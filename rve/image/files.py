@@ -46,7 +46,6 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
         RefusedError: The file cannot be read; its array is of another dimension, complex, shorter
             than 2 along an axis, not finite everywhere, or too large for memory; or the file states
             other sides of a voxel, or other ratios of those of a pixel.
-        MemoryError: The file did not fit into memory while it was read.
     """
     dimension = len(sides)
     take_voxel = "a volume takes cell.voxel in place of cell.pixel"
@@ -68,7 +67,7 @@ def read_grid(path: Path, sides: Sequence[float], override: Collection[str] = ()
             values = _read_picture(path, has_square_pixels=sides[0] == sides[1])
         else:
             values = _read_volume(path, sides, override)
-    except (RefusedError, MemoryError):
+    except RefusedError:
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
         raise RefusedError(path.name, f"unreadable ({error})", allowed_file) from None
@@ -115,20 +114,9 @@ def _read_volume(path: Path, sides: Sequence[float], override: Collection[str]) 
         head = read_head(path, sides, override)
         require_memory(head.shape)
         return head.read()
-    from_hdf5 = 'np.save("v.npy", h5py.File("v.h5")["data"])'
-    # How to convert a file, by its ending.
-    cures = {
-        ".nii": 'np.save("v.npy", nibabel.load("v.nii").get_fdata().T)',
-        ".h5": from_hdf5,
-        ".hdf5": from_hdf5,
-        ".vti": 'm = pyvista.read("v.vti"); '
-        'np.save("v.npy", m.active_scalars.reshape(m.dimensions[::-1]))',
-    }
-    for picture_suffix in (*SLICES, ".jpg", ".jpeg"):
-        cures[picture_suffix] = "a picture takes cell.pixel in place of cell.voxel"
-    cure = "write raw data beside a .mhd head with DimSize, ElementType and ElementDataFile"
-    for suffix in path.suffixes:  # "v.nii.gz" has two
-        cure = cures.get(suffix.lower(), cure)
+    cure = "save the array along (z, y, x) by numpy.save, or raw data beside a .mhd head"
+    if ending in (*SLICES, ".jpg", ".jpeg"):
+        cure = "a picture takes cell.pixel in place of cell.voxel"
     allowed = "a TIFF stack, a folder of slices, .npy, .mhd or .nhdr"
     raise RefusedError(path.name, f"a file of kind {path.suffix or 'unknown'}", allowed, cure)
 
